@@ -1,0 +1,163 @@
+"""The robot description: all that a console needs to know to drive a robot it has never seen.
+
+Units are SI; angles in radians; frames and signs follow ROS REP 103 (x forward, y left, z up).
+"""
+
+from typing import Literal
+
+import msgspec
+
+__all__ = [
+    "Axis",
+    "Binding",
+    "Body",
+    "BodyJoint",
+    "Camera",
+    "ControlLayer",
+    "Geom",
+    "Joint",
+    "Microphone",
+    "PadInput",
+    "RangeRing",
+    "RobotDescription",
+    "TouchPad",
+    "WrenchSensor",
+]
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]  # w, x, y, z
+Rgba = tuple[float, float, float, float]  # 0 to 1 each
+
+PadInput = Literal["left_x", "left_y", "right_x", "right_y", "dpad_x", "dpad_y", "triggers"]
+TouchPad = Literal["left_x", "left_y", "right_x", "right_y"]
+
+
+class Axis(msgspec.Struct, frozen=True, kw_only=True):
+    """One value of a command, in physical units."""
+
+    name: str  # "base.vx"
+    label: str  # "Forward"
+    unit: str  # "m/s"
+    minimum: float
+    maximum: float
+    slew: float  # largest change per second while driving, in unit/s
+    brake: float  # change per second when coming to rest (hold ended, rest, stop), in unit/s
+    rest: float = 0.0  # the value that means "do not move"
+
+
+class Joint(msgspec.Struct, frozen=True, kw_only=True):
+    """One measured joint position, in the order of `Feedback.joints`."""
+
+    name: str
+    unit: Literal["rad", "m"]
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+class WrenchSensor(msgspec.Struct, frozen=True, kw_only=True):
+    """A force and torque sensor; `full_scale_force` is the force that is felt and drawn as "all there is"."""
+
+    name: str
+    body: str  # name of the kinematic body it sits on
+    threshold_force: float  # N, below it nothing is felt
+    full_scale_force: float  # N
+    full_scale_torque: float  # N m
+
+
+class RangeRing(msgspec.Struct, frozen=True, kw_only=True):
+    """Range sensors in a plane, with the field names of sensor_msgs/LaserScan."""
+
+    name: str
+    body: str
+    count: int
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+
+
+class Camera(msgspec.Struct, frozen=True, kw_only=True):
+    name: str
+    label: str
+    width: int
+    height: int
+    frame_rate: float  # Hz
+
+
+class Microphone(msgspec.Struct, frozen=True, kw_only=True):
+    name: str
+    label: str
+    sample_rate: int  # Hz
+    channels: int = 1
+
+
+class Geom(msgspec.Struct, frozen=True, kw_only=True):
+    """A shape for the 3D view.
+
+    `size`: box: half extents; sphere: (radius, 0, 0); cylinder and capsule: (radius, half length, 0).
+    """
+
+    shape: Literal["box", "sphere", "cylinder", "capsule"]
+    size: Vector3
+    position: Vector3 = (0.0, 0.0, 0.0)
+    orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    rgba: Rgba = (0.7, 0.7, 0.7, 1.0)
+
+
+class BodyJoint(msgspec.Struct, frozen=True, kw_only=True):
+    """How a body moves against its parent: the named entry of `RobotDescription.joints` about or along `axis`."""
+
+    joint: str
+    kind: Literal["revolute", "prismatic"]
+    axis: Vector3
+
+
+class Body(msgspec.Struct, frozen=True, kw_only=True):
+    """A rigid body of the kinematic tree.
+
+    Its joints act in list order, in the body's own frame, after `position` and `orientation`.
+    """
+
+    name: str
+    parent: str  # "" for the world
+    position: Vector3 = (0.0, 0.0, 0.0)
+    orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    joints: tuple[BodyJoint, ...] = ()
+    geoms: tuple[Geom, ...] = ()
+
+
+class Binding(msgspec.Struct, frozen=True, kw_only=True):
+    """What moves an axis. A positive input drives the axis up to `scale * maximum`, after `invert`."""
+
+    axis: str
+    pad: PadInput | None = None  # W3C standard mapping: left and up are negative; "triggers" is right minus left
+    touch: TouchPad | None = None  # an on-screen stick: right and up are positive
+    invert_pad: bool = False
+    invert_touch: bool = False
+    key_positive: str = ""  # KeyboardEvent.code, "KeyW"
+    key_negative: str = ""
+    scale: float = 1.0  # 0 to 1
+
+
+class ControlLayer(msgspec.Struct, frozen=True, kw_only=True):
+    """A set of bindings that are active together; the operator switches between layers."""
+
+    name: str
+    label: str
+    bindings: tuple[Binding, ...]
+
+
+class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
+    name: str  # "mobile-manipulator"
+    label: str  # "Mobile manipulator"
+    axes: tuple[Axis, ...]
+    joints: tuple[Joint, ...] = ()
+    layers: tuple[ControlLayer, ...] = ()
+    cameras: tuple[Camera, ...] = ()  # the first is the main one
+    microphones: tuple[Microphone, ...] = ()
+    wrench: WrenchSensor | None = None
+    ranges: RangeRing | None = None
+    bodies: tuple[Body, ...] = ()
+    hold: float = 0.3  # s a command is held before the robot comes to rest by itself
+    max_event_age: float = 2.0  # s after which a feedback may no longer be answered
+    max_event_rate: float = 25.0  # Hz, the most events per second that the robot wants

@@ -1,0 +1,79 @@
+"""What the bridge needs of a robot."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Media
+
+__all__ = ["Measurement", "MediaSource", "Robot", "Stamp"]
+
+
+class Measurement(NamedTuple):
+    """State of the robot, in the order and units of its description."""
+
+    axes: list[float]  # measured value of each axis
+    joints: list[float]
+    wrench: list[float]  # fx fy fz (N), tx ty tz (N m); empty without a sensor
+    ranges: list[float]  # m; empty without a ring
+    at_rest: bool
+    faults: list[str]
+
+
+class Stamp(NamedTuple):
+    """The event reference that holds now, and now on the bridge's monotonic clock (s)."""
+
+    event: int
+    time: float
+
+
+class MediaSource(ABC):
+    """A camera or microphone captured beside the robot."""
+
+    @abstractmethod
+    async def run(self, stamp: Callable[[], Stamp], emit: Callable[[Media], None]) -> None:
+        """Capture until cancelled.
+
+        Call `stamp` at the instant of capture (the start of a sound segment), on the event loop, together with
+        reading the state that the medium will show: a stamp may be older than the truth, never newer. Slow work
+        (rendering, encoding) runs in a thread. `emit` never blocks; the newest picture wins if the link is busy.
+        """
+
+
+class Robot(ABC):
+    """One robot. All methods are called from the bridge's event loop and must return at once.
+
+    Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`.
+    Values reach `apply` already clamped, slew-limited and, when there is nothing to execute, at rest.
+    """
+
+    tick_seconds: float = 0.004
+
+    @abstractmethod
+    def describe(self) -> RobotDescription:
+        """The description; the same for the life of the object."""
+
+    @abstractmethod
+    def apply(self, values: Sequence[float]) -> None:
+        """Drive the axes with these values during the coming tick, in the description's order and units."""
+
+    def tick(self) -> None:
+        """Let one `tick_seconds` pass. Only simulations need it."""
+
+    @abstractmethod
+    def measure(self) -> Measurement:
+        """The state now."""
+
+    def stop(self) -> None:
+        """The stop was latched: also engage brakes or cut power where the robot can."""
+
+    def reset(self) -> None:
+        """The stop was released: undo `stop`. Must not move anything."""
+
+    def sources(self) -> Sequence[MediaSource]:
+        """Cameras and microphones; their names are those in the description."""
+        return ()
+
+    def close(self) -> None:
+        """Release what the robot holds."""

@@ -1,0 +1,1 @@
+"""The console service: signalling, seat, media, scene."""
