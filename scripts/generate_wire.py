@@ -1,0 +1,68 @@
+"""Write the JSON Schemas of the console's and the robot link's messages to docs/schemas/.
+
+The page's TypeScript types (web/src/wire.ts) are made from the first by `npm run generate` in web/.
+With `--check` nothing is written and a difference ends with status 1.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any, get_args
+
+import msgspec
+
+from robot_bridge.protocol.console import ClientMessage, ServerMessage
+from robot_bridge.protocol.messages import LinkMessage
+
+SCHEMAS = Path(__file__).resolve().parent.parent / "docs" / "schemas"
+
+
+def _reachable(union: Any) -> set[str]:
+    _, components = msgspec.json.schema_components(get_args(union), ref_template="#/$defs/{name}")
+    return set(components)
+
+
+def _schema(title: str, unions: dict[str, Any], received_only: frozenset[str] = frozenset()) -> str:
+    """One schema whose `$defs` hold every message, and each union by its name.
+
+    `received_only` names the structs that only ever arrive at a reader of this schema. Lockstep writes every field
+    of those, so all are required.
+    """
+    members = [message for union in unions.values() for message in get_args(union)]
+    _, components = msgspec.json.schema_components(members, ref_template="#/$defs/{name}")
+    for name in received_only:
+        components[name]["required"] = list(components[name].get("properties", {}))
+    for name, union in unions.items():
+        components[name] = {"oneOf": [{"$ref": f"#/$defs/{member.__name__}"} for member in get_args(union)]}
+    document = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": title,
+        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in unions],
+        "$defs": dict(sorted(components.items())),
+    }
+    return json.dumps(document, indent=2) + "\n"
+
+
+def generated() -> dict[Path, str]:
+    """Every generated file with the text it should have."""
+    console = {"ClientMessage": ClientMessage, "ServerMessage": ServerMessage}
+    received = frozenset(_reachable(ServerMessage) - _reachable(ClientMessage))
+    return {
+        SCHEMAS / "console.schema.json": _schema("Lockstep console messages", console, received),
+        SCHEMAS / "robot-link.schema.json": _schema("Lockstep robot link messages", {"LinkMessage": LinkMessage}),
+    }
+
+
+def main(arguments: list[str]) -> int:
+    stale = [path for path, text in generated().items() if not path.exists() or path.read_text() != text]
+    if "--check" in arguments:
+        for path in stale:
+            print(f"{path.name} is not what the messages say: run scripts/generate_wire.py", file=sys.stderr)
+        return 1 if stale else 0
+    for path in stale:
+        path.write_text(generated()[path])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
