@@ -1,0 +1,1 @@
+"""Media: capture, stamp, encode once, packetise once, fan out to every peer."""
