@@ -1,0 +1,88 @@
+# The commands that people and continuous integration use. `make` alone lists them.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUN_PACKAGES := libegl1 libgl1-mesa-dri
+TEST_PACKAGES := $(RUN_PACKAGES) chromium firefox-esr
+WEB_SOURCES := $(shell find web -path web/node_modules -prune -o -type f -print 2>/dev/null)
+PIP := $(BIN)/python -m pip --disable-pip-version-check -q
+ARGS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help setup run test test-unit test-web test-browser check format bench lock generate clean
+
+help: ## List the commands
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/  make \1|\2/' | column -t -s '|'
+
+setup: $(VENV)/.runtime server/web_dist/index.html ## Install what the console and the simulated robot need
+	@scripts/system-packages $(RUN_PACKAGES)
+
+run: setup ## Start the simulated robot and the console, and print the links (ARGS="--port 9000" …)
+	@exec $(BIN)/lockstep up $(ARGS)
+
+test: $(VENV)/.dev setup ## Install what the tests need and run all of them
+	@scripts/system-packages $(TEST_PACKAGES)
+	$(MAKE) --no-print-directory test-web test-unit test-browser
+
+test-web: web/node_modules/.installed
+	cd web && npm test --silent
+
+test-unit: $(VENV)/.dev
+	$(BIN)/python -m pytest -q -m "not browser" -n 2 --dist loadfile
+
+test-browser: $(VENV)/.dev server/web_dist/index.html
+	$(BIN)/python -m pytest -q -m browser
+
+check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, generated files and known vulnerabilities
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m scripts.generate_wire --check
+	cd web && npm run --silent check
+	$(BIN)/pip-audit --disable-pip --require-hashes -r requirements-dev.lock
+
+format: $(VENV)/.dev web/node_modules/.installed ## Format the code
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(VENV)/.dev setup ## Measure; results belong in docs/performance.md (ARGS="--json results.json")
+	@scripts/system-packages $(TEST_PACKAGES)
+	$(BIN)/python -m bench $(ARGS)
+
+generate: $(VENV)/.dev web/node_modules/.installed ## Write the JSON Schemas and the page's message types
+	$(BIN)/python -m scripts.generate_wire
+	cd web && npm run --silent generate
+
+lock: ## Resolve the pinned, hashed dependencies again (needs uv)
+	uv pip compile pyproject.toml --extra build --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements.lock
+	uv pip compile pyproject.toml --extra build --extra dev -c requirements.lock --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements-dev.lock
+
+clean: ## Remove what the commands above made
+	rm -rf $(VENV) web/node_modules server/web_dist
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Lockstep needs Python 3.11 or newer"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || scripts/system-packages python3-venv
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.runtime: requirements.lock pyproject.toml | $(BIN)/python
+	@echo "Installing the Python packages"
+	@$(PIP) install --require-hashes -r requirements.lock
+	@$(PIP) install --no-build-isolation --no-deps -e .
+	@touch $@
+
+$(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
+	@echo "Installing the Python packages for development"
+	@$(PIP) install --require-hashes -r requirements-dev.lock
+	@touch $@
+
+web/node_modules/.installed: web/package-lock.json
+	@echo "Installing the page's packages"
+	@cd web && npm ci --silent --no-audit --no-fund
+	@touch $@
+
+server/web_dist/index.html: web/node_modules/.installed $(filter-out web/node_modules/%,$(WEB_SOURCES))
+	@echo "Building the page"
+	@cd web && npm run --silent build
+	@touch $@
