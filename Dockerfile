@@ -1,0 +1,39 @@
+# Two images from one file: `robot` (bridge and simulated robot) and `console` (the service and its page).
+
+FROM node:20-bookworm-slim AS page
+WORKDIR /src/web
+COPY web/package.json web/package-lock.json ./
+RUN npm ci --no-audit --no-fund
+COPY web ./
+RUN npm run build
+
+FROM python:3.11-slim-bookworm AS base
+ENV PYTHONUNBUFFERED=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
+WORKDIR /src
+COPY requirements.lock ./
+RUN pip install --require-hashes -r requirements.lock
+COPY pyproject.toml README.md LICENSE ./
+COPY robot_bridge ./robot_bridge
+COPY server ./server
+COPY client ./client
+RUN useradd --system --create-home lockstep
+
+FROM base AS robot
+RUN apt-get update \
+    && apt-get install -y --no-install-recommends libegl1 libgl1-mesa-dri \
+    && rm -rf /var/lib/apt/lists/*
+RUN pip install --no-build-isolation --no-deps .
+USER lockstep
+WORKDIR /home/lockstep
+EXPOSE 5600
+ENTRYPOINT ["lockstep", "robot"]
+CMD ["mobile-manipulator", "--host", "0.0.0.0", "--port", "5600"]
+
+FROM base AS console
+COPY --from=page /src/server/web_dist ./server/web_dist
+RUN pip install --no-build-isolation --no-deps .
+USER lockstep
+WORKDIR /home/lockstep
+EXPOSE 8000
+ENTRYPOINT ["lockstep", "serve"]
+CMD ["--robot", "tcp://127.0.0.1:5600"]
