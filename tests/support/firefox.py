@@ -1,0 +1,76 @@
+"""Firefox for a test, through WebDriver BiDi (puppeteer-core in a Node process of its own)."""
+
+import asyncio
+import json
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+__all__ = ["Firefox", "running_firefox"]
+
+DRIVER = Path(__file__).with_name("firefox_driver.mjs")
+ANSWER_LIMIT = 16 << 20  # bytes in one answer line
+
+
+class Firefox:
+    """One page in one Firefox."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self._process = process
+
+    async def open(self, url: str) -> None:
+        await self._ask("open", url=url)
+
+    async def evaluate(self, expression: str) -> Any:
+        return await self._ask("evaluate", expression=expression)
+
+    async def wait(self, expression: str, seconds: float = 20.0) -> None:
+        """Until `expression` is true in the page; raises RuntimeError when it does not come true in time."""
+        await self._ask("wait", expression=expression, timeout=seconds * 1000)
+
+    async def key(self, code: str, *, down: bool) -> None:
+        await self._ask("key", code=code, down=down)
+
+    async def screenshot(self, path: Path) -> None:
+        await self._ask("screenshot", path=str(path))
+
+    async def errors(self) -> list[str]:
+        """Uncaught errors of the page so far."""
+        found: list[str] = await self._ask("errors")
+        return found
+
+    async def _ask(self, verb: str, **arguments: object) -> Any:
+        if self._process.stdin is None or self._process.stdout is None:
+            raise RuntimeError("the driver has no pipes")
+        self._process.stdin.write(json.dumps({"verb": verb, **arguments}).encode() + b"\n")
+        await self._process.stdin.drain()
+        line = await self._process.stdout.readline()
+        if not line:
+            raise RuntimeError("the Firefox driver ended")
+        answer = json.loads(line)
+        if "error" in answer:
+            raise RuntimeError(f"{verb}: {answer['error']}")
+        return answer["value"]
+
+
+@asynccontextmanager
+async def running_firefox() -> AsyncIterator[Firefox]:
+    """A headless Firefox with one empty page and its own profile, closed on leaving."""
+    executable = shutil.which("firefox-esr") or shutil.which("firefox")
+    if executable is None:
+        raise RuntimeError("Firefox is not installed: make test installs Debian's firefox-esr")
+    process = await asyncio.create_subprocess_exec(
+        *("node", str(DRIVER), executable),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        limit=ANSWER_LIMIT,
+    )
+    try:
+        yield Firefox(process)
+    finally:
+        if process.stdin is not None:
+            process.stdin.close()
+        async with asyncio.timeout(20):
+            await process.wait()

@@ -1,0 +1,44 @@
+// Drives Firefox through WebDriver BiDi for the Python tests: one JSON request a line in, one answer a line out.
+import { createInterface } from "node:readline";
+import { createRequire } from "node:module";
+
+const require = createRequire(new URL("../../web/package.json", import.meta.url));
+const { default: puppeteer } = await import(require.resolve("puppeteer-core"));
+
+const browser = await puppeteer.launch({
+  browser: "firefox",
+  executablePath: process.argv[2],
+  headless: true,
+  args: ["--no-sandbox"],
+  extraPrefsFirefox: {
+    "media.peerconnection.ice.loopback": true,
+    "media.autoplay.default": 0,
+    "media.autoplay.blocking_policy": 0,
+    "app.update.enabled": false,
+    "datareporting.policy.dataSubmissionEnabled": false,
+    "network.captive-portal-service.enabled": false,
+    "network.connectivity-service.enabled": false,
+  },
+});
+const page = await browser.newPage();
+const errors = [];
+page.on("pageerror", (error) => errors.push(String(error)));
+
+const verbs = {
+  open: ({ url }) => page.goto(url).then(() => null),
+  evaluate: ({ expression }) => page.evaluate(expression),
+  wait: ({ expression, timeout }) => page.waitForFunction(expression, { timeout }).then(() => null),
+  key: ({ code, down }) => (down ? page.keyboard.down(code) : page.keyboard.up(code)).then(() => null),
+  screenshot: ({ path }) => page.screenshot({ path }).then(() => null),
+  errors: async () => errors,
+};
+
+for await (const line of createInterface({ input: process.stdin })) {
+  const request = JSON.parse(line);
+  try {
+    console.log(JSON.stringify({ value: (await verbs[request.verb](request)) ?? null }));
+  } catch (error) {
+    console.log(JSON.stringify({ error: String(error) }));
+  }
+}
+await browser.close();

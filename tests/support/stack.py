@@ -1,0 +1,100 @@
+"""`lockstep up` as its user runs it: a process of its own on free ports, ended by its signal."""
+
+import asyncio
+import json
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+__all__ = ["Stack", "running_stack"]
+
+START_SECONDS = 40.0  # a loaded two-core machine importing everything and opening GL
+STOP_SECONDS = 15.0
+
+
+@dataclass
+class Stack:
+    """A running console with its robot bridge.
+
+    Attributes:
+        console: "http://127.0.0.1:PORT"
+        operator: the operator's link, token in the fragment
+        observer: the observers' link
+        robot: "tcp://127.0.0.1:PORT"
+        event_log: the bridge's own record, JSON lines
+    """
+
+    process: asyncio.subprocess.Process
+    console: str
+    operator: str
+    observer: str
+    robot: str
+    event_log: Path
+    output: list[str] = field(default_factory=list)  # its last lines on standard error
+
+    def events(self, kind: str) -> Iterator[dict[str, Any]]:
+        """The bridge's records of one kind so far."""
+        for line in self.event_log.read_text().splitlines():
+            record = json.loads(line)
+            if record["kind"] == kind:
+                yield record
+
+
+@asynccontextmanager
+async def running_stack(
+    directory: Path, *, robot: str = "planar", port: int = 0, extra: tuple[str, ...] = ()
+) -> AsyncIterator[Stack]:
+    """Start `lockstep up`, wait until it says that it is ready, and end it on leaving."""
+    event_log = directory / "events.jsonl"
+    command = [
+        *(str(Path(sys.executable).with_name("lockstep")), "up", "--json", "--robot", robot),
+        *("--port", str(port), "--event-log", str(event_log), *extra),
+    ]
+    environment = os.environ | {"PYTHONWARNINGS": "default"}
+    process = await asyncio.create_subprocess_exec(
+        *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, env=environment
+    )
+    output: list[str] = []
+    reader = asyncio.create_task(_keep_last_lines(process, output))
+    try:
+        links = await _ready_line(process, output)
+        yield Stack(process, links["console"], links["operator"], links["observer"], links["robot"], event_log, output)
+    finally:
+        await _end(process)
+        await reader
+
+
+async def _ready_line(process: asyncio.subprocess.Process, output: list[str]) -> dict[str, str]:
+    if process.stdout is None:
+        raise RuntimeError("the process has no output to read")
+    async with asyncio.timeout(START_SECONDS):
+        line = await process.stdout.readline()
+    if not line:
+        raise RuntimeError("lockstep up ended before it was ready:\n" + "\n".join(output))
+    links: dict[str, str] = json.loads(line)
+    return links
+
+
+async def _keep_last_lines(process: asyncio.subprocess.Process, output: list[str]) -> None:
+    if process.stderr is None:
+        return
+    async for line in process.stderr:
+        output.append(line.decode(errors="replace").rstrip())
+        del output[:-200]
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    if process.returncode is None:
+        process.send_signal(signal.SIGTERM)
+    try:
+        async with asyncio.timeout(STOP_SECONDS):
+            await process.wait()
+    except TimeoutError:
+        process.kill()
+        await process.wait()
+        raise RuntimeError("lockstep up did not end on SIGTERM") from None
