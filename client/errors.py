@@ -1,0 +1,100 @@
+"""What can go wrong at a client.
+
+ConsoleError
+├── LinkFormatError         the link given to Console is not one that `lockstep up` prints     (caller)
+├── CommandError            values that no robot could be asked for                             (caller)
+├── SignallingRefused       the console answered WHEP with an error
+├── ConnectFailed           the console, or the way to it, did not work within the time allowed
+├── ConsoleLost             an established connection ended; terminal, make a new Console
+└── Refused                 the console or the robot said no
+    ├── CommandRefused      … to a command
+    └── SeatRefused         … to the control seat
+"""
+
+__all__ = [
+    "CommandError",
+    "CommandRefused",
+    "ConnectFailed",
+    "ConsoleError",
+    "ConsoleLost",
+    "LinkFormatError",
+    "Refused",
+    "SeatRefused",
+    "SignallingRefused",
+]
+
+ADVICE = {
+    "unauthorized": "use a link that the running console printed; links end with the console that printed them",
+    "forbidden": "this link's role does not permit it; use the operator's link",
+    "robot_unreachable": "start the robot bridge, or give the console its address",
+    "unknown_stream": "offer only what the robot's description lists",
+}
+
+
+class ConsoleError(Exception):
+    """Base of all errors of this package."""
+
+    def __init__(self, detail: str) -> None:
+        super().__init__(detail)
+        self.detail = detail
+
+    def __str__(self) -> str:
+        return self.detail
+
+
+class LinkFormatError(ConsoleError):
+    """The link is not `http://host:port/#token=…`."""
+
+
+class CommandError(ConsoleError):
+    """An axis that the robot does not have, or a value that is not a number."""
+
+
+class SignallingRefused(ConsoleError):
+    """The console refused the connection.
+
+    Attributes:
+        status: HTTP status
+        error: stable name given by the console, "" when it gave none
+    """
+
+    def __init__(self, status: int, error: str, detail: str) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.error = error
+
+    def __str__(self) -> str:
+        said = f"the console answered {self.status} {self.error}".rstrip()
+        advice = ADVICE.get(self.error, "")
+        return said + (f": {self.detail}" if self.detail else "") + (f"; {advice}" if advice else "")
+
+
+class ConnectFailed(ConsoleError):
+    """No connection within the time allowed."""
+
+
+class ConsoleLost(ConsoleError):
+    """The connection ended. The robot comes to rest by itself; a new Console connects again."""
+
+
+class Refused(ConsoleError):
+    """A refusal.
+
+    Attributes:
+        reason: one of `robot_bridge.protocol.messages.RefusalReason`
+    """
+
+    def __init__(self, reason: str, detail: str = "") -> None:
+        super().__init__(detail)
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"{self.reason}: {self.detail}" if self.detail else self.reason
+
+
+class CommandRefused(Refused):
+    """The command was not executed, and repeating it would not help."""
+
+
+class SeatRefused(Refused):
+    """The control seat was not given."""

@@ -1,0 +1,106 @@
+"""The gate for pictures and sound: one rule, the same in web/, both held to tests/vectors/gate.json. No I/O."""
+
+from typing import Generic, Literal, NamedTuple, TypeVar
+
+from robot_bridge.protocol.serial import event_gap
+
+__all__ = ["Gated", "MediaGate", "Verdict", "verdict"]
+
+Verdict = Literal["render", "discard", "hold"]
+Medium = TypeVar("Medium")
+
+
+def verdict(
+    feedback: int | None, stamp: int | None, tolerance: int, enabled: bool = True
+) -> tuple[Verdict, int | None]:
+    """What to do with a medium stamped `stamp` while `feedback` is the newest event, and its gap.
+
+    The gap is None when either side is unknown.
+    """
+    gap = None if feedback is None or stamp is None else event_gap(feedback, stamp)
+    if not enabled:
+        return "render", gap
+    if stamp is None:
+        return "discard", None
+    if gap is None or gap < -tolerance:
+        return "hold", gap
+    return ("render" if gap <= tolerance else "discard"), gap
+
+
+class Gated(NamedTuple, Generic[Medium]):
+    """A medium that may be rendered now."""
+
+    medium: Medium
+    stamp: int | None
+    gap: int | None
+
+
+class MediaGate(Generic[Medium]):
+    """Gate of one stream. Keeps the newest medium that overtook the feedback, and counts.
+
+    Call `feedback` on every feedback and `offer` with every medium; each returns what to render now, or None.
+    """
+
+    def __init__(self, tolerance: int, enabled: bool = True) -> None:
+        self.tolerance = tolerance
+        self.enabled = enabled
+        self.stamp = 0  # last one seen, 0 before the first
+        self.gap = 0  # at the last rendering
+        self.max_gap = 0  # largest |gap| rendered
+        self.rendered = 0
+        self.discarded = 0
+        self.held = 0  # media that had to wait, whatever became of them
+        self._feedback: int | None = None
+        self._waiting: tuple[Medium, int | None] | None = None
+
+    def feedback(self, event: int) -> Gated[Medium] | None:
+        """The newest feedback is of `event`."""
+        if self._feedback is not None and event_gap(event, self._feedback) <= 0:
+            return None
+        self._feedback = event
+        if self._waiting is None:
+            return None
+        medium, stamp = self._waiting
+        decision, gap = verdict(event, stamp, self.tolerance, self.enabled)
+        if decision == "hold":
+            return None
+        self._waiting = None
+        return self._settle(decision, medium, stamp, gap)
+
+    def offer(self, medium: Medium, stamp: int | None) -> Gated[Medium] | None:
+        """A medium arrived."""
+        if stamp is not None:
+            self.stamp = stamp
+        decision, gap = verdict(self._feedback, stamp, self.tolerance, self.enabled)
+        if decision == "hold":
+            self._hold(medium, stamp)
+            return None
+        return self._settle(decision, medium, stamp, gap)
+
+    def check(self, stamp: int | None) -> tuple[Verdict, int | None]:
+        """The verdict now on a medium that was let through before."""
+        return verdict(self._feedback, stamp, self.tolerance, self.enabled)
+
+    def _hold(self, medium: Medium, stamp: int | None) -> None:
+        if self._waiting is not None:
+            self.discarded += 1  # newest wins
+        self._waiting = (medium, stamp)
+        self.held += 1
+
+    def _settle(self, decision: Verdict, medium: Medium, stamp: int | None, gap: int | None) -> Gated[Medium] | None:
+        if decision == "discard":
+            self.discarded += 1
+            return None
+        if self._waiting is not None and self._overtaken(stamp):
+            self._waiting = None
+            self.discarded += 1
+        self.rendered += 1
+        if gap is not None:
+            self.gap = gap
+            self.max_gap = max(self.max_gap, abs(gap))
+        return Gated(medium, stamp, gap)
+
+    def _overtaken(self, stamp: int | None) -> bool:
+        """Whether the waiting medium is not newer than the one being rendered: it would step back in time."""
+        waiting = self._waiting[1] if self._waiting is not None else None
+        return waiting is None or stamp is None or event_gap(waiting, stamp) <= 0

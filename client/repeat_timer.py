@@ -1,0 +1,51 @@
+"""When to repeat an unanswered command: RFC 6298 with a sub-second floor and cap. Held to tests/vectors/repeat.json.
+
+No I/O; all times in seconds.
+"""
+
+__all__ = ["RepeatTimer"]
+
+ALPHA = 1 / 8
+BETA = 1 / 4
+K = 4
+GRANULARITY = 0.010
+FLOOR = 0.020  # below it a repeat would overtake an answer that is only a control tick late
+CAP = 0.500
+INITIAL = 0.100  # before the first sample
+
+
+class RepeatTimer:
+    """Estimates the round trip of a command and says how long to wait for its answer."""
+
+    def __init__(self) -> None:
+        self.interval = INITIAL
+        self._smoothed: float | None = None
+        self._variation = 0.0
+
+    @property
+    def round_trip(self) -> float | None:
+        """Smoothed command-to-feedback time, None before the first sample."""
+        return self._smoothed
+
+    def sample(self, round_trip: float) -> None:
+        """One measured round trip (RFC 6298 2.2, 2.3).
+
+        Karn's rule is the caller's: never of a command that was repeated, since its answer cannot be told from
+        the answer to the repeat.
+        """
+        if self._smoothed is None:
+            self._smoothed = round_trip
+            self._variation = round_trip / 2
+        else:
+            self._variation += BETA * (abs(self._smoothed - round_trip) - self._variation)
+            self._smoothed += ALPHA * (round_trip - self._smoothed)
+        waited = self._smoothed + max(GRANULARITY, K * self._variation)
+        self.interval = min(CAP, max(FLOOR, waited))
+
+    def wait(self, sends: int) -> float:
+        """How long to wait after the `sends`-th sending of one event.
+
+        The first two repeats come at the interval. Backing off at once, as TCP does (RFC 6298 5.5), would protect
+        a queue that lock-step never builds: at most one small command is in flight.
+        """
+        return min(CAP, self.interval * 2.0 ** min(16, max(0, sends - 2)))
