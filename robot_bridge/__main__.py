@@ -1,0 +1,5 @@
+"""`python -m robot_bridge` is `lockstep robot`."""
+
+from robot_bridge.cli import main
+
+main()

@@ -1,0 +1,61 @@
+"""From commanded to applied axis values: clamp, slew, hold, brake. No I/O, no clock.
+
+Every value stays inside an envelope around its rest value that closes at the axis' `brake` rate and has closed `hold`
+seconds after the last execution. So a command never outlives `hold`, whatever else happens, and no ramp is ever
+steeper than `brake` unless ticks were missed.
+"""
+
+from collections.abc import Sequence
+
+from robot_bridge.protocol.description import Axis
+
+__all__ = ["AxisShaper"]
+
+
+class AxisShaper:
+    """Call `drive` at execution, `rest` to come to rest early, and `step` once a tick."""
+
+    def __init__(self, axes: Sequence[Axis], *, hold: float) -> None:
+        self._axes = tuple(axes)
+        self._hold = hold
+        self._rest_values = [axis.rest for axis in axes]
+        self._values = list(self._rest_values)  # applied last, [0.4, 0.0, 0.0]
+        self._targets: list[float] | None = None  # None: coming to rest or there
+        self._deadline = float("-inf")  # s, when all values must be at rest
+
+    @property
+    def values(self) -> list[float]:
+        """What was applied last."""
+        return list(self._values)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether all applied values are at rest and none is to leave it."""
+        return self._values == self._rest_values and self._targets in (None, self._rest_values)
+
+    def drive(self, values: Sequence[float], now: float) -> None:
+        """Aim for `values` (finite, one per axis), clamped to the axes' limits."""
+        self._targets = [
+            min(max(value, axis.minimum), axis.maximum) for value, axis in zip(values, self._axes, strict=True)
+        ]
+        self._deadline = now + self._hold
+
+    def rest(self) -> None:
+        """Come to rest at the brake rate from the next step on."""
+        self._targets = None
+
+    def step(self, now: float, dt: float) -> list[float]:
+        """The values for a tick of `dt` seconds that begins now."""
+        left = self._deadline - now
+        if left <= 0:
+            self._targets = None
+        for index, axis in enumerate(self._axes):
+            self._values[index] = self._step_axis(index, axis, left, dt)
+        return list(self._values)
+
+    def _step_axis(self, index: int, axis: Axis, left: float, dt: float) -> float:
+        target, rate = (axis.rest, axis.brake) if self._targets is None else (self._targets[index], axis.slew)
+        change = target - self._values[index]
+        value = target if abs(change) <= rate * dt else self._values[index] + (rate * dt if change > 0 else -rate * dt)
+        reach = axis.brake * max(left, 0.0)
+        return min(max(value, axis.rest - reach), axis.rest + reach)

@@ -1,0 +1,270 @@
+"""Puts the bridge together: link server, event core, axis shaper, robot, media sources, event log."""
+
+import asyncio
+import contextlib
+import logging
+import secrets
+import time
+from types import TracebackType
+from typing import Self
+
+from robot_bridge.axis_shaper import AxisShaper
+from robot_bridge.check_description import check_description
+from robot_bridge.counters import BridgeCounters
+from robot_bridge.errors import RobotFailed
+from robot_bridge.event_core import Answered, EventCore, Executed, Refused
+from robot_bridge.event_log import EventKind, EventLog
+from robot_bridge.link_server import LinkPeer, LinkServer
+from robot_bridge.link_session import BadInput
+from robot_bridge.metronome import Metronome
+from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop
+from robot_bridge.robots.base import MediaSource, Robot, Stamp
+from robot_bridge.settings import BridgeSettings
+
+__all__ = ["Bridge"]
+
+REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
+MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
+
+_logger = logging.getLogger(__name__)
+
+
+class Bridge:
+    """One run of a robot: one epoch. `start` returns when it listens; `close` leaves the robot at rest."""
+
+    def __init__(self, robot: Robot, settings: BridgeSettings) -> None:
+        """Raises:
+        DescriptionError: the robot's description contradicts itself.
+        """
+        self.description = robot.describe()
+        check_description(self.description)
+        self.epoch = secrets.token_hex(8)
+        self.address = (settings.host, settings.port)
+        self.counters = BridgeCounters()
+        self._robot = robot
+        self._settings = settings
+        self._core = EventCore(
+            self.description.axes, max_event_age=self.description.max_event_age, first_event=settings.first_event
+        )
+        self._shaper = AxisShaper(self.description.axes, hold=self.description.hold)
+        self._links = LinkServer(self, self.description, self.epoch, self.counters, max_links=settings.max_links)
+        self._log: EventLog | None = None
+        self._source_faults: list[str] = []  # "camera overview: ..."
+        self._running: asyncio.Task[None] | None = None
+        self._at_rest = asyncio.Event()  # nothing is driven
+        self._closed = False
+
+    @property
+    def event(self) -> int:
+        """The event reference."""
+        return self._core.current
+
+    @property
+    def links(self) -> int:
+        """Open connections."""
+        return self._links.links
+
+    async def start(self) -> None:
+        """Returns when listening.
+
+        Raises:
+            ListenError: the address cannot be had.
+            OSError: the event log cannot be opened.
+        """
+        self.address = await self._links.listen(self._settings.host, self._settings.port)
+        if self._settings.event_log is not None:
+            try:
+                self._log = EventLog(self._settings.event_log)
+            except OSError:
+                await self._links.close()
+                raise
+        self._record("start", self._core.current, epoch=self.epoch)
+        self._issue(time.monotonic())
+        self._running = asyncio.get_running_loop().create_task(self._run(), name="bridge")
+
+    async def wait(self) -> None:
+        """Until closed.
+
+        Raises:
+            RobotFailed: the robot adapter raised; the bridge has come to an end.
+        """
+        if self._running is not None:
+            await asyncio.wait([self._running])
+            if not self._running.cancelled() and (error := self._running.exception()) is not None:
+                raise error
+
+    async def close(self) -> None:
+        """Bring the robot to rest, end all links and the robot. May be called again."""
+        if self._closed:
+            return
+        self._closed = True
+        await self._links.close()
+        if self._running is not None:
+            await self._come_to_rest(self._running)
+            self._running.cancel()
+            await asyncio.wait([self._running])
+        self._robot.close()
+        if self._log is not None:
+            await asyncio.to_thread(self._log.close)
+
+    async def _come_to_rest(self, running: asyncio.Task[None]) -> None:
+        """Let the ticks go on until nothing is driven; gives up when they ended or take too long."""
+        self._shaper.rest()
+        running.add_done_callback(lambda _: self._at_rest.set())
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(self.description.hold + REST_MARGIN):
+                while not (self._shaper.at_rest or running.done()):
+                    self._at_rest.clear()
+                    await self._at_rest.wait()
+
+    async def __aenter__(self) -> Self:
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    # LinkHandler
+
+    def link_opened(self, peer: LinkPeer) -> None:
+        self._core.want_issue()
+
+    def link_message(self, peer: LinkPeer, message: Command | Rest | Stop | Reset) -> None:
+        match message:
+            case Command():
+                self._command(peer, message)
+            case Rest():
+                applied = self._core.rest(message.event)
+                if applied:
+                    self._shaper.rest()
+                self._record("rest", message.event, applied=applied)
+            case Stop():
+                self._stop(message)
+            case Reset():
+                self._reset(message)
+
+    def link_bad_input(self, peer: LinkPeer, bad: BadInput) -> None:
+        if bad.name == "malformed" or bad.name == "not_allowed":
+            self._refuse(peer, self._core.refusal(bad.event, bad.name, bad.detail))
+
+    def operator_lost(self) -> None:
+        self._shaper.rest()
+
+    def _command(self, peer: LinkPeer, command: Command) -> None:
+        now = time.monotonic()
+        outcome = self._core.command(command, now)
+        if isinstance(outcome, Executed):
+            self._shaper.drive(outcome.values, now)
+            self.counters.executed += 1
+            self._record("executed", outcome.event, issue=command.issue, values=outcome.values)
+        elif isinstance(outcome, Answered):
+            peer.send(outcome.feedback)
+        elif isinstance(outcome, Refused):
+            self._refuse(peer, outcome.refusal)
+
+    def _refuse(self, peer: LinkPeer, refusal: Refusal) -> None:
+        self.counters.refusals[refusal.reason] += 1
+        self._record("refused", refusal.event, reason=refusal.reason, current=refusal.current)
+        peer.send(refusal)
+
+    def _stop(self, stop: Stop) -> None:
+        if self._core.stop(stop.by, stop.reason):
+            self._shaper.rest()
+            self._robot.stop()
+            self._record("stop", self._core.current, by=stop.by, reason=stop.reason)
+
+    def _reset(self, reset: Reset) -> None:
+        if self._core.reset():
+            self._robot.reset()
+            self._record("reset", self._core.current, by=reset.by)
+
+    # the tick
+
+    async def _run(self) -> None:
+        try:
+            async with asyncio.TaskGroup() as group:
+                group.create_task(self._links.run())
+                group.create_task(self._run_ticks())
+                group.create_task(self._run_reports())
+                for source in self._robot.sources():
+                    group.create_task(self._run_source(source))
+        except* Exception as errors:
+            error = errors.exceptions[0]
+            _logger.error("the robot failed: %s", error, exc_info=error)
+            with contextlib.suppress(Exception):
+                self._robot.stop()
+            await self._links.close()
+            raise RobotFailed(f"{type(error).__name__}: {error}") from error
+
+    async def _run_ticks(self) -> None:
+        metronome = Metronome(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
+        while True:
+            await asyncio.sleep(metronome.wait(time.monotonic()))
+            self.counters.skipped_ticks = metronome.skipped
+            self._tick(time.monotonic())
+
+    def _tick(self, now: float) -> None:
+        self._robot.apply(self._shaper.step(now, self._robot.tick_seconds))
+        self._robot.tick()
+        if self._shaper.at_rest:
+            self._at_rest.set()
+        if self._core.issue_due(now):
+            self._issue(time.monotonic())
+
+    def _issue(self, now: float) -> None:
+        measured = self._robot.measure()
+        if self._source_faults:
+            measured = measured._replace(faults=[*measured.faults, *self._source_faults])
+        feedback = self._core.issue(measured._replace(at_rest=measured.at_rest and self._shaper.at_rest), now)
+        self.counters.issued += 1
+        self._record("feedback", feedback.event, issue=feedback.issue, at_rest=feedback.at_rest)
+        self._links.publish_feedback(feedback)
+
+    # media
+
+    async def _run_source(self, source: MediaSource) -> None:
+        """A source that breaks is a fault of the robot, not the end of the bridge."""
+        try:
+            await source.run(self._stamp, self._emit)
+        except Exception as error:
+            _logger.error("a media source failed: %s", error, exc_info=error)
+            self._source_faults.append(f"media: {type(error).__name__}: {error}"[:200])
+            self._core.want_issue()
+
+    def _stamp(self) -> Stamp:
+        return Stamp(self._core.current, time.monotonic())
+
+    def _emit(self, media: Media) -> None:
+        self.counters.media += 1
+        self._record("media", media.stamp, stream=media.stream, captured=media.time)
+        self._links.publish_media(media)
+
+    # reporting
+
+    async def _run_reports(self) -> None:
+        while True:
+            await asyncio.sleep(self._settings.log_interval)
+            self.report()
+
+    def report(self) -> None:
+        """One log line with the counters."""
+        counters = self.counters
+        _logger.info(
+            "event %d, executed %d, issued %d, media %d, skipped ticks %d, refusals %s, bad input %s, drops %s, "
+            "endings %s",
+            self._core.current,
+            counters.executed,
+            counters.issued,
+            counters.media,
+            counters.skipped_ticks,
+            dict(counters.refusals),
+            dict(counters.bad_input),
+            dict(self._links.drops()),
+            dict(counters.endings),
+        )
+
+    def _record(self, kind: EventKind, event: int, **fields: str | float | bool | list[float]) -> None:
+        if self._log is not None:
+            self._log.record(kind, time.monotonic(), event, **fields)

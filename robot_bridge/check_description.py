@@ -1,0 +1,77 @@
+"""Whether a robot's description makes sense, checked once before the bridge listens."""
+
+import math
+from collections.abc import Iterable
+
+from robot_bridge.errors import DescriptionError
+from robot_bridge.protocol.description import Axis, RobotDescription
+
+__all__ = ["check_description"]
+
+
+def check_description(description: RobotDescription) -> None:
+    """Raises:
+    DescriptionError: with the first contradiction found.
+    """
+    if not description.axes:
+        raise DescriptionError("a robot needs at least one axis")
+    if not 0 < description.hold <= 5:
+        raise DescriptionError(f"hold must be in (0, 5] s, not {description.hold}")
+    if not 0 < description.max_event_age <= 10:
+        raise DescriptionError(f"max_event_age must be in (0, 10] s, not {description.max_event_age}")
+    if not 0 < description.max_event_rate <= 1000:
+        raise DescriptionError(f"max_event_rate must be in (0, 1000] Hz, not {description.max_event_rate}")
+    for axis in description.axes:
+        _check_axis(axis, description.hold)
+    _check_unique("axis", (axis.name for axis in description.axes))
+    _check_unique("joint", (joint.name for joint in description.joints))
+    _check_unique("body", (body.name for body in description.bodies))
+    _check_unique(
+        "stream", [camera.name for camera in description.cameras] + [source.name for source in description.microphones]
+    )
+    _check_references(description)
+
+
+def _check_axis(axis: Axis, hold: float) -> None:
+    numbers = (axis.minimum, axis.maximum, axis.slew, axis.brake, axis.rest)
+    if not all(map(math.isfinite, numbers)):
+        raise DescriptionError(f"axis {axis.name}: every number must be finite")
+    if not axis.minimum <= axis.rest <= axis.maximum:
+        raise DescriptionError(f"axis {axis.name}: rest must lie between minimum and maximum")
+    if axis.slew <= 0 or axis.brake <= 0:
+        raise DescriptionError(f"axis {axis.name}: slew and brake must be positive")
+    furthest = max(axis.maximum - axis.rest, axis.rest - axis.minimum)
+    if furthest > axis.brake * hold:
+        raise DescriptionError(
+            f"axis {axis.name}: braking from {furthest:g} {axis.unit} takes {furthest / axis.brake:.3f} s,"
+            f" longer than hold ({hold:g} s); raise brake or lower the limits"
+        )
+
+
+def _check_references(description: RobotDescription) -> None:
+    axes = {axis.name for axis in description.axes}
+    joints = {joint.name for joint in description.joints}
+    bodies = {""} | {body.name for body in description.bodies}
+    for layer in description.layers:
+        for binding in layer.bindings:
+            _check_known("axis", binding.axis, axes, f"layer {layer.name}")
+    for body in description.bodies:
+        _check_known("body", body.parent, bodies, f"body {body.name}")
+        for joint in body.joints:
+            _check_known("joint", joint.joint, joints, f"body {body.name}")
+    for sensor in (description.wrench, description.ranges):
+        if sensor is not None:
+            _check_known("body", sensor.body, bodies, f"sensor {sensor.name}")
+
+
+def _check_known(kind: str, name: str, known: set[str], where: str) -> None:
+    if name not in known:
+        raise DescriptionError(f"{where} names the {kind} {name!r}, which is not described")
+
+
+def _check_unique(kind: str, names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if not name or name in seen:
+            raise DescriptionError(f"{kind} name {name!r} is empty or used twice")
+        seen.add(name)

@@ -1,0 +1,20 @@
+"""What the bridge counts. Read it as attributes; the bridge logs it at intervals."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+__all__ = ["BridgeCounters"]
+
+
+@dataclass
+class BridgeCounters:
+    """Counts since the bridge started."""
+
+    executed: int = 0  # commands
+    issued: int = 0  # feedback, refreshes included
+    media: int = 0  # pictures and segments captured
+    skipped_ticks: int = 0  # the loop was blocked for longer than could be caught up
+    refusals: Counter[str] = field(default_factory=Counter)  # by reason, {"late": 3}
+    bad_input: Counter[str] = field(default_factory=Counter)  # by name, {"malformed": 1}
+    drops: Counter[str] = field(default_factory=Counter)  # by message kind or stream, {"feedback": 2, "overview": 9}
+    endings: Counter[str] = field(default_factory=Counter)  # of links, by goodbye, {"silent": 1}

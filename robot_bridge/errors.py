@@ -1,0 +1,49 @@
+"""What can go wrong in the bridge itself; the link's errors are in `robot_bridge.protocol.errors`.
+
+BridgeError
+├── RobotUnavailable        something that the robot needs is missing on this machine
+├── UnknownRobot            no robot of that name
+├── DescriptionError        the robot's description contradicts itself
+├── ListenError             the bridge cannot listen on the address
+└── RobotFailed             the robot adapter raised while running
+"""
+
+__all__ = ["BridgeError", "DescriptionError", "ListenError", "RobotFailed", "RobotUnavailable", "UnknownRobot"]
+
+
+class BridgeError(Exception):
+    """Base of the bridge's errors.
+
+    Attributes:
+        name: stable, lower-case identifier
+        detail: what is wrong and, where known, how to put it right
+    """
+
+    name = "bridge"
+
+    def __init__(self, detail: str) -> None:
+        super().__init__(detail)
+        self.detail = detail
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.detail}"
+
+
+class RobotUnavailable(BridgeError):
+    name = "robot_unavailable"
+
+
+class UnknownRobot(BridgeError):
+    name = "unknown_robot"
+
+
+class DescriptionError(BridgeError):
+    name = "description"
+
+
+class ListenError(BridgeError):
+    name = "listen"
+
+
+class RobotFailed(BridgeError):
+    name = "robot_failed"

@@ -1,0 +1,63 @@
+"""A file of all that happened to events, one JSON line each: the truth that tests compare against.
+
+Lines are written by a thread of its own from a bounded queue, never on the loop; what does not fit is counted.
+"""
+
+import logging
+import queue
+import threading
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+__all__ = ["EventKind", "EventLog"]
+
+EventKind = Literal["start", "executed", "feedback", "refused", "media", "stop", "reset", "rest"]
+Field = str | int | float | bool | list[float]
+
+MAX_WAITING = 10_000  # lines
+
+_logger = logging.getLogger(__name__)
+
+
+class EventLog:
+    """`record` may be called from the loop at any rate; `close` writes what waits and blocks until it is written."""
+
+    def __init__(self, path: Path) -> None:
+        """Appends to `path`.
+
+        Raises:
+            OSError: it cannot be opened.
+        """
+        self.dropped = 0
+        self._waiting: queue.Queue[dict[str, Field] | None] = queue.Queue(MAX_WAITING)
+        self._file = path.open("ab")
+        self._writer = threading.Thread(target=self._write, name="event-log", daemon=True)
+        self._writer.start()
+
+    def record(self, kind: EventKind, time: float, event: int, **fields: Field) -> None:
+        """`time` is the bridge's monotonic clock, as in feedback and media."""
+        try:
+            self._waiting.put_nowait({"kind": kind, "time": time, "event": event, **fields})
+        except queue.Full:
+            self.dropped += 1
+
+    def close(self) -> None:
+        """Call from a thread, or when blocking does not matter. May be called again."""
+        if self._writer.is_alive():
+            self._waiting.put(None)
+            self._writer.join()
+        self._file.close()
+
+    def _write(self) -> None:
+        encode = msgspec.json.encode
+        try:
+            while (line := self._waiting.get()) is not None:
+                self._file.write(encode(line) + b"\n")
+                if self._waiting.empty():
+                    self._file.flush()
+        except OSError as error:
+            _logger.error("event log stopped: %s", error)
+            while self._waiting.get() is not None:
+                self.dropped += 1

@@ -1,0 +1,218 @@
+"""The bridge's listening side: admits links, hands their messages on, sends to them by role."""
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Callable
+from functools import cache
+from typing import Protocol
+
+from robot_bridge.counters import BridgeCounters
+from robot_bridge.errors import ListenError
+from robot_bridge.link_session import BadInput, BridgeSession
+from robot_bridge.link_transport import TICK_INTERVAL, LinkTransport
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.framing import frame
+from robot_bridge.protocol.messages import (
+    Command,
+    EventNotice,
+    Feedback,
+    Goodbye,
+    Hello,
+    LinkMessage,
+    Media,
+    Reset,
+    Rest,
+    Stop,
+    encode_message,
+)
+
+__all__ = ["LinkHandler", "LinkPeer", "LinkServer"]
+
+CLOSE_TIMEOUT = 1.0  # s for goodbyes to leave when the bridge closes
+
+
+class LinkHandler(Protocol):
+    """What the server needs of the bridge. All methods return at once."""
+
+    def link_opened(self, peer: "LinkPeer") -> None:
+        """A link was admitted; its hello is on the way."""
+
+    def link_message(self, peer: "LinkPeer", message: Command | Rest | Stop | Reset) -> None:
+        """A valid message that the link's role permits."""
+
+    def link_bad_input(self, peer: "LinkPeer", bad: BadInput) -> None:
+        """Something else; already counted."""
+
+    def operator_lost(self) -> None:
+        """The operator link ended, for whatever reason."""
+
+
+class LinkPeer(LinkTransport):
+    """One admitted or applying link."""
+
+    def __init__(self, server: "LinkServer", clock: Callable[[], float]) -> None:
+        super().__init__(BridgeSession(clock(), self._admit), clock)
+        self._server = server
+        self.name = ""  # what the client calls itself, "console"
+
+    def _admit(self, hello: Hello) -> Hello | Goodbye:
+        self.name = hello.name
+        return self._server.admit(self, hello)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        self._server.connected(self)
+
+    def received(self, event: LinkMessage | BadInput) -> None:
+        self._server.received(self, event)
+
+    def lost(self) -> None:
+        self._server.ended(self)
+
+    def connection_lost(self, error: Exception | None) -> None:
+        super().connection_lost(error)
+        self._server.disconnected(self)
+
+
+class LinkServer:
+    """Owns the listening socket and every link. `run` must be running for heartbeats."""
+
+    def __init__(
+        self,
+        handler: LinkHandler,
+        description: RobotDescription,
+        epoch: str,
+        counters: BridgeCounters,
+        *,
+        max_links: int,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._handler = handler
+        self._hello = Hello(role="robot", name=description.name, epoch=epoch, description=description)
+        self._counters = counters
+        self._max_links = max_links
+        self._clock = clock
+        self._connections: set[LinkPeer] = set()  # sockets, those that are closing included
+        self._operator: LinkPeer | None = None
+        self._events: set[LinkPeer] = set()
+        self._media: set[LinkPeer] = set()
+        self._server: asyncio.Server | None = None
+        self._all_gone = asyncio.Event()
+
+    @property
+    def operator(self) -> LinkPeer | None:
+        """The operator link; None when there is none."""
+        return self._operator
+
+    @property
+    def links(self) -> int:
+        """Sockets that are open."""
+        return len(self._connections)
+
+    async def listen(self, host: str, port: int) -> tuple[str, int]:
+        """Listen; returns the address.
+
+        Raises:
+            ListenError: the address cannot be had.
+        """
+        loop = asyncio.get_running_loop()
+        try:
+            self._server = await loop.create_server(lambda: LinkPeer(self, self._clock), host, port)
+        except OSError as error:
+            raise ListenError(f"cannot listen on {host}:{port}: {error}") from error
+        address = self._server.sockets[0].getsockname()
+        return str(address[0]), int(address[1])
+
+    async def run(self) -> None:
+        """Heartbeats, until cancelled."""
+        while True:
+            await asyncio.sleep(TICK_INTERVAL)
+            for peer in list(self._connections):
+                peer.tick()
+
+    async def close(self) -> None:
+        """Stop listening, say goodbye to all, and wait until they are gone."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+        for peer in list(self._connections):
+            peer.end("closing", "the bridge is closing")
+        try:
+            async with asyncio.timeout(CLOSE_TIMEOUT):
+                while self._connections:
+                    self._all_gone.clear()
+                    await self._all_gone.wait()
+        except TimeoutError:
+            for peer in list(self._connections):
+                peer.abort()
+
+    def publish_feedback(self, feedback: Feedback) -> None:
+        """To the operator link; its event to the event links."""
+        if self._operator is not None:
+            self._operator.send(feedback)
+        if self._events:
+            notice = encode_once(EventNotice(event=feedback.event, time=feedback.time))
+            for peer in self._events:
+                peer.send_encoded("eventnotice", notice)
+
+    def publish_media(self, media: Media) -> None:
+        """To every media link, newest wins per stream."""
+        encoded = encode_once(media)
+        for peer in self._media:
+            peer.send_media(media, encoded)
+
+    def drops(self) -> Counter[str]:
+        """What links that did not keep up have missed, those gone included."""
+        return sum((peer.drops for peer in self._connections), self._counters.drops)
+
+    # called by the links
+
+    def admit(self, peer: LinkPeer, hello: Hello) -> Hello | Goodbye:
+        match hello.role:
+            case "operator":
+                if self._operator is not None:
+                    return Goodbye(error="taken", detail="another operator link is open")
+                self._operator = peer
+            case "events":
+                self._events.add(peer)
+                return Hello(role="robot", name=self._hello.name, epoch=self._hello.epoch)
+            case _:
+                self._media.add(peer)
+        return self._hello
+
+    def connected(self, peer: LinkPeer) -> None:
+        self._connections.add(peer)
+        if len(self._connections) > self._max_links or self._server is None:
+            peer.end("full", f"this bridge takes {self._max_links} links")
+
+    def received(self, peer: LinkPeer, event: LinkMessage | BadInput) -> None:
+        match event:
+            case BadInput():
+                self._counters.bad_input[event.name] += 1
+                self._handler.link_bad_input(peer, event)
+            case Hello():
+                self._handler.link_opened(peer)
+            case Command() | Rest() | Stop() | Reset():
+                self._handler.link_message(peer, event)
+            case _:
+                raise AssertionError(f"the session let {type(event).__name__} through")
+
+    def ended(self, peer: LinkPeer) -> None:
+        if peer.session.ended is not None:
+            self._counters.endings[peer.session.ended.error] += 1
+        self._events.discard(peer)
+        self._media.discard(peer)
+        if self._operator is peer:
+            self._operator = None
+            self._handler.operator_lost()
+
+    def disconnected(self, peer: LinkPeer) -> None:
+        self._connections.discard(peer)
+        self._counters.drops.update(peer.drops)
+        self._all_gone.set()
+
+
+def encode_once(message: LinkMessage) -> Callable[[], bytes]:
+    """The message's frame, encoded at the first call and shared by the others."""
+    return cache(lambda: frame(encode_message(message)))

@@ -1,0 +1,232 @@
+"""One connection of the robot link, seen from either side. No I/O, no clock (docs/robot-link.md, "Connections").
+
+Call order: `receive` with bytes as they come, `tick` every 50 ms or so, `end` to say goodbye; after each of them send
+what `take_outgoing` returns and, once `ended` is set, close. An ended session stays ended.
+"""
+
+from collections.abc import Callable
+from enum import Enum
+from typing import Literal, NamedTuple
+
+from robot_bridge.protocol.errors import FramingError, MessageError
+from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_MEDIA_FRAME, FrameReader
+from robot_bridge.protocol.messages import (
+    PROTOCOL_VERSION,
+    Command,
+    EventNotice,
+    Feedback,
+    Goodbye,
+    Hello,
+    LinkMessage,
+    LinkRole,
+    Media,
+    Ping,
+    Pong,
+    Refusal,
+    Reset,
+    Rest,
+    Stop,
+    decode_message,
+)
+
+__all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState"]
+
+PING_INTERVAL = 0.2  # s
+SILENCE = 1.0  # s without a valid message after which the other side is taken for dead
+HELLO_TIMEOUT = 2.0  # s
+OWN_STALL = 0.5  # s between two ticks; more means that we did not look, not that the other side was silent
+
+FROM_CLIENT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
+    "operator": (Command, Rest, Stop, Reset),
+    "events": (Stop,),
+    "media": (Stop,),
+}
+FROM_ROBOT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
+    "operator": (Feedback, Refusal),
+    "events": (EventNotice, Refusal),
+    "media": (Media, Refusal),
+}
+
+
+class LinkState(Enum):
+    HANDSHAKE = "handshake"
+    OPEN = "open"
+    ENDED = "ended"
+
+
+class BadInput(NamedTuple):
+    """Something the other side should not have sent; it counts as nothing but bad input."""
+
+    name: Literal["malformed", "not_allowed", "framing", "handshake"]
+    detail: str
+    event: int = 0  # of a command that was not allowed; 0 otherwise
+
+
+class LinkSession:
+    """What both sides share: frames, permissions, heartbeats, silence."""
+
+    def __init__(self, now: float, *, max_frame: int) -> None:
+        self.state = LinkState.HANDSHAKE
+        self.role: LinkRole | None = None  # the client's role; None before it is known
+        self.ended: Goodbye | None = None  # why it ended, whoever said it; None while it lives
+        self._reader = FrameReader(max_frame)
+        self._allowed: tuple[type[LinkMessage], ...] = ()
+        self._outgoing: list[LinkMessage] = []
+        self._opened = now
+        self._last_valid = now
+        self._last_tick = now
+        self._last_ping = now
+        self._ping_id = 0
+
+    def receive(self, data: bytes, now: float) -> list[LinkMessage | BadInput]:
+        """What these bytes bring, in order; heartbeats are answered here and not returned."""
+        events: list[LinkMessage | BadInput] = []
+        self._reader.feed(data)
+        frames = self._reader.frames()
+        while self.ended is None:
+            try:
+                payload = next(frames, None)
+            except FramingError as error:
+                events.append(BadInput("framing", error.detail))
+                self.end("framing", error.detail)
+                break
+            if payload is None:
+                break
+            event = self._receive_frame(payload, now)
+            if event is not None:
+                events.append(event)
+        return events
+
+    def _receive_frame(self, payload: bytes, now: float) -> LinkMessage | BadInput | None:
+        try:
+            message = decode_message(payload)
+        except MessageError as error:
+            if self.state is LinkState.HANDSHAKE:
+                self.end("handshake", error.detail)
+            return BadInput("malformed", error.detail)
+        if self.state is LinkState.HANDSHAKE:
+            return self._shake_hands(message, now)
+        return self._receive_open(message, now)
+
+    def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        match message:
+            case Ping(id=number):
+                self._last_valid = now
+                self._outgoing.append(Pong(id=number))
+                return None
+            case Pong():
+                self._last_valid = now
+                return None
+            case Goodbye():
+                self._finish(message)
+                return None
+        if isinstance(message, self._allowed):
+            self._last_valid = now
+            return message
+        event = message.event if isinstance(message, Command) else 0
+        return BadInput("not_allowed", f"{type(message).__name__.lower()} on a link of role {self.role}", event)
+
+    def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        raise NotImplementedError
+
+    def _open(self, role: LinkRole, allowed: tuple[type[LinkMessage], ...], now: float) -> None:
+        self.role, self._allowed, self._last_valid = role, allowed, now
+        self.state = LinkState.OPEN
+
+    def tick(self, now: float) -> None:
+        """Send heartbeats that are due; end a silent session."""
+        gap, self._last_tick = now - self._last_tick, now
+        if gap > OWN_STALL:
+            self._last_valid = min(now, self._last_valid + gap)
+            self._opened += gap
+        if self.ended is not None:
+            return
+        if self.state is LinkState.HANDSHAKE:
+            if now - self._opened > HELLO_TIMEOUT:
+                self.end("silent", f"no hello within {HELLO_TIMEOUT:g} s")
+        elif now - self._last_valid > SILENCE:
+            self.end("silent", f"nothing valid received for {SILENCE:g} s")
+        elif now - self._last_ping >= PING_INTERVAL:
+            self._last_ping = now
+            self._ping_id += 1
+            self._outgoing.append(Ping(id=self._ping_id))
+
+    def end(self, error: str, detail: str = "") -> None:
+        """Say goodbye; nothing is received afterwards."""
+        if self.ended is None:
+            goodbye = Goodbye(error=error, detail=detail[:500])
+            self._outgoing.append(goodbye)
+            self._finish(goodbye)
+
+    def lose(self, detail: str) -> None:
+        """The connection ended without a goodbye."""
+        if self.ended is None:
+            self._finish(Goodbye(error="lost", detail=detail[:500]))
+
+    def _finish(self, goodbye: Goodbye) -> None:
+        self.ended = goodbye
+        self.state = LinkState.ENDED
+
+    def take_outgoing(self) -> list[LinkMessage]:
+        """What the session wants sent, in order; each message is returned once."""
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing
+
+
+class BridgeSession(LinkSession):
+    """The bridge's side. `admit` answers a hello of a known version and role: with our hello, or a goodbye."""
+
+    def __init__(self, now: float, admit: Callable[[Hello], Hello | Goodbye]) -> None:
+        super().__init__(now, max_frame=MAX_CONTROL_FRAME)
+        self._admit = admit
+
+    def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        """Returns the hello when it was admitted."""
+        if not isinstance(message, Hello):
+            return self._reject("handshake", f"the first message must be hello, not {type(message).__name__.lower()}")
+        if message.version != PROTOCOL_VERSION:
+            return self._reject("version", f"this bridge speaks version {PROTOCOL_VERSION}, not {message.version}")
+        if message.role not in FROM_CLIENT:
+            return self._reject("role", f"a client cannot have the role {message.role}")
+        answer = self._admit(message)
+        if isinstance(answer, Goodbye):
+            self.end(answer.error, answer.detail)
+            return None
+        self._open(message.role, FROM_CLIENT[message.role], now)
+        self._outgoing.append(answer)
+        return message
+
+    def _reject(self, error: str, detail: str) -> BadInput:
+        self.end(error, detail)
+        return BadInput("handshake", detail)
+
+
+class ClientSession(LinkSession):
+    """The client's side: sends its hello at once and returns the bridge's."""
+
+    def __init__(self, now: float, role: LinkRole, name: str = "") -> None:
+        super().__init__(now, max_frame=MAX_MEDIA_FRAME if role == "media" else MAX_CONTROL_FRAME)
+        if role not in FROM_ROBOT:
+            raise ValueError(f"a client cannot have the role {role}")
+        self.role = role
+        self.hello: Hello | None = None  # the bridge's; None before the handshake
+        self._outgoing.append(Hello(role=role, name=name))
+
+    def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        if isinstance(message, Goodbye):
+            self._finish(message)
+            return None
+        if not isinstance(message, Hello):
+            return self._reject("handshake", f"expected hello, not {type(message).__name__.lower()}")
+        if message.version != PROTOCOL_VERSION or message.role != "robot" or not message.epoch:
+            return self._reject("version", f"not a bridge of version {PROTOCOL_VERSION}")
+        if self.role != "events" and message.description is None:
+            return self._reject("handshake", "the bridge sent no description")
+        assert self.role is not None  # set by __init__
+        self._open(self.role, FROM_ROBOT[self.role], now)
+        self.hello = message
+        return message
+
+    def _reject(self, error: str, detail: str) -> BadInput:
+        self.end(error, detail)
+        return BadInput("handshake", detail)

@@ -1,0 +1,151 @@
+"""What both ends of the robot link share on asyncio: one session on one TCP connection, with bounded output."""
+
+import asyncio
+import socket
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import cast
+
+from robot_bridge.link_session import BadInput, LinkSession
+from robot_bridge.media_outbox import MediaOutbox, NewestOutbox
+from robot_bridge.protocol.framing import frame
+from robot_bridge.protocol.messages import LinkMessage, Media, encode_message
+
+__all__ = ["TICK_INTERVAL", "LinkTransport"]
+
+TICK_INTERVAL = 0.05  # s between calls of `LinkTransport.tick`
+HIGH_WATER = 64 << 10  # bytes the kernel would not take before output waits in the outboxes
+STALLED = 1.0  # s without the other side taking a byte
+CLOSE_TIMEOUT = 1.0  # s for the goodbye to leave
+
+
+class LinkTransport(asyncio.Protocol):
+    """Feeds the session, sends what it wants sent, and drops a peer that does not read.
+
+    While the socket is full, messages wait in outboxes: one per kind, media per stream, newest wins. At most
+    `HIGH_WATER` bytes and one message are buffered besides.
+    """
+
+    def __init__(self, session: LinkSession, clock: Callable[[], float] = time.monotonic) -> None:
+        self.session = session
+        self._clock = clock
+        self._transport: asyncio.Transport | None = None  # None before and after the connection
+        self._control: NewestOutbox[str, bytes] = NewestOutbox()
+        self._media: MediaOutbox[bytes] = MediaOutbox()
+        self._full = False  # the socket takes no more for now
+        self._buffered = 0  # bytes at the last look, to see whether the other side takes any
+        self._moved = 0.0  # s, when it last took some
+        self._closing_since: float | None = None
+        self._lost = False
+
+    @property
+    def drops(self) -> Counter[str]:
+        """What was replaced by something newer, by message kind or stream."""
+        return self._control.drops + self._media.drops
+
+    def received(self, event: LinkMessage | BadInput) -> None:
+        """One event of the session, for the subclass."""
+
+    def lost(self) -> None:
+        """The session is over; called exactly once, for the subclass."""
+
+    def send(self, message: LinkMessage) -> None:
+        """Send, or keep the newest of its kind until there is room. Ignored after the end."""
+        self.send_encoded(type(message).__name__.lower(), lambda: frame(encode_message(message)))
+
+    def send_encoded(self, kind: str, make: Callable[[], bytes]) -> None:
+        """As `send`, with a frame that several peers share."""
+        if self._transport is None or self._closing_since is not None:
+            return
+        if self._full:
+            self._control.put(kind, make())
+        else:
+            self._transport.write(make())
+
+    def send_media(self, media: Media, make: Callable[[], bytes]) -> None:
+        """As `send_encoded`, per stream."""
+        if self._transport is None or self._closing_since is not None:
+            return
+        if self._full:
+            self._media.put(media, make)
+        else:
+            self._transport.write(make())
+
+    def tick(self) -> None:
+        """Heartbeats, silence, peers that do not read, closes that hang."""
+        now = self._clock()
+        self.session.tick(now)
+        self._flush_session(now)
+        if self._transport is None:
+            return
+        if self._closing_since is not None:
+            if now - self._closing_since > CLOSE_TIMEOUT:
+                self._transport.abort()
+            return
+        buffered = self._transport.get_write_buffer_size()
+        if not self._full or buffered < self._buffered:
+            self._moved = now
+        self._buffered = buffered
+        if now - self._moved > STALLED:
+            self.session.lose(f"did not read for {STALLED:g} s")
+            self._transport.abort()
+
+    def end(self, error: str, detail: str = "") -> None:
+        """Say goodbye and close."""
+        self.session.end(error, detail)
+        self._flush_session(self._clock())
+
+    def abort(self) -> None:
+        """Close without waiting for the other side."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    # asyncio.Protocol
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)
+        self._transport.set_write_buffer_limits(high=HIGH_WATER, low=0)
+        tcp = transport.get_extra_info("socket")
+        if tcp is not None:
+            tcp.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        now = self._moved = self._clock()
+        self._flush_session(now)
+
+    def data_received(self, data: bytes) -> None:
+        now = self._clock()
+        for event in self.session.receive(data, now):
+            self.received(event)
+        self._flush_session(now)
+
+    def pause_writing(self) -> None:
+        self._full = True
+        self._moved = self._clock()
+        self._buffered = self._transport.get_write_buffer_size() if self._transport is not None else 0
+
+    def resume_writing(self) -> None:
+        self._full = False
+        while not self._full and self._transport is not None and self._closing_since is None:
+            data = self._control.pop() or self._media.pop()
+            if data is None:
+                break
+            self._transport.write(data)
+
+    def connection_lost(self, error: Exception | None) -> None:
+        self._transport = None
+        self.session.lose(str(error) if error is not None else "the connection was closed")
+        self._report_lost()
+
+    def _flush_session(self, now: float) -> None:
+        for message in self.session.take_outgoing():
+            self.send(message)
+        if self.session.ended is not None and self._transport is not None and self._closing_since is None:
+            self._closing_since = now
+            self._transport.close()
+            self._report_lost()
+
+    def _report_lost(self) -> None:
+        if self._lost:
+            return
+        self._lost = True
+        self.lost()

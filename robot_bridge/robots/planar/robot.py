@@ -1,0 +1,97 @@
+"""The planar robot: a holonomic disc in a walled room, integrated by hand."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.robots.base import Measurement, MediaSource, Robot
+from robot_bridge.robots.planar.cameras import FrontCamera, OverviewCamera
+from robot_bridge.robots.planar.description import DESCRIPTION, RADIUS, RANGES
+from robot_bridge.robots.planar.microphone import PlanarMicrophone
+from robot_bridge.robots.planar.room import contacts, ray_hits
+
+__all__ = ["PlanarRobot", "PlanarState"]
+
+STIFFNESS = 150.0  # N per m/s that a contact blocks: the motors push harder the faster they should go
+ANGLES = RANGES.angle_min + RANGES.angle_increment * np.arange(RANGES.count, dtype=np.float64)
+
+
+class PlanarState(NamedTuple):
+    x: float = 0.0  # m
+    y: float = 0.0  # m
+    yaw: float = 0.0  # rad
+    vx: float = 0.0  # m/s, in the robot's frame
+    vy: float = 0.0  # m/s
+    wz: float = 0.0  # rad/s
+    fx: float = 0.0  # N, what the room does to the robot, in the robot's frame
+    fy: float = 0.0  # N
+
+
+class PlanarRobot(Robot):
+    """A robot for tests and for machines without GL. Moves exactly as commanded unless something is in the way."""
+
+    tick_seconds = 0.004
+
+    def __init__(self, state: PlanarState | None = None) -> None:
+        self._state = state or PlanarState()
+        self._command = (0.0, 0.0, 0.0)
+        self._sources = (
+            OverviewCamera(lambda: self._state),
+            FrontCamera(lambda: self._state),
+            PlanarMicrophone(lambda: self._state),
+        )
+
+    @property
+    def state(self) -> PlanarState:
+        return self._state
+
+    def describe(self) -> RobotDescription:
+        return DESCRIPTION
+
+    def apply(self, values: Sequence[float]) -> None:
+        vx, vy, wz = values
+        self._command = (vx, vy, wz)
+
+    def tick(self) -> None:
+        dt = self.tick_seconds
+        vx, vy, wz = self._command
+        before = self._state
+        if not (vx or vy or wz or before.vx or before.vy or before.wz or before.fx or before.fy):
+            return
+        yaw = math.remainder(before.yaw + wz * dt, math.tau)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        x, y = before.x + (cos * vx - sin * vy) * dt, before.y + (sin * vx + cos * vy) * dt
+        fx = fy = 0.0
+        for contact in contacts(x, y, RADIUS):
+            x, y = x + contact.depth * contact.nx, y + contact.depth * contact.ny
+            force = STIFFNESS * contact.depth / dt
+            fx, fy = fx + force * contact.nx, fy + force * contact.ny
+        moved_x, moved_y = (x - before.x) / dt, (y - before.y) / dt
+        self._state = PlanarState(
+            x=x,
+            y=y,
+            yaw=yaw,
+            vx=cos * moved_x + sin * moved_y,
+            vy=-sin * moved_x + cos * moved_y,
+            wz=wz,
+            fx=cos * fx + sin * fy,
+            fy=-sin * fx + cos * fy,
+        )
+
+    def measure(self) -> Measurement:
+        state = self._state
+        distances, _ = ray_hits(state.x, state.y, state.yaw + ANGLES)
+        return Measurement(
+            axes=[state.vx, state.vy, state.wz],
+            joints=[state.x, state.y, state.yaw],
+            wrench=[state.fx, state.fy, 0.0, 0.0, 0.0, 0.0],
+            ranges=np.clip(distances, RANGES.range_min, RANGES.range_max).tolist(),
+            at_rest=max(abs(state.vx), abs(state.vy), abs(state.wz)) < 1e-3,
+            faults=[],
+        )
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._sources
