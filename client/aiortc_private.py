@@ -1,0 +1,177 @@
+"""The only file of client/ that touches private parts of aiortc and aioice; tests/client/test_aiortc_private.py pins
+each of them.
+
+Why each is needed:
+
+- aiortc neither offers nor reads foreign header extensions, and gives no packet to its user;
+- its receiver decodes in a thread that is no daemon, into queues without bound, and gives out a frame only when
+  the next one begins;
+- aioice never gathers loopback;
+- its SCTP waits at least one second before it repeats a lost message, three while it connects, and then sends one
+  packet at a time.
+"""
+
+import struct
+from collections.abc import Callable, Sequence
+from types import MethodType
+from typing import Any, Protocol
+
+from aiortc import RTCPeerConnection, RTCRtpReceiver
+from aiortc.rtcdtlstransport import RTCDtlsTransport
+from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH
+from aiortc.rtp import HeaderExtensions, HeaderExtensionsMap, RtpPacket
+
+from client.frame_assembler import MediaPacket
+from client.rtp_header import find_extension
+
+__all__ = ["PacketSink", "gather_only_on", "hasten_sctp", "take_packets", "take_raw_rtp"]
+
+RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
+RETRANSMISSION_START = 0.5  # s before the first measured round trip
+WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
+
+
+class PacketSink(Protocol):
+    """Takes the packets of one media section."""
+
+    def packet(self, payload_type: int, packet: MediaPacket) -> bool:
+        """Take one; whether to ask the sender for a keyframe."""
+
+    def missing(self) -> list[int]:
+        """Sequence numbers to ask the sender for again."""
+
+
+def _transport_of(pc: RTCPeerConnection) -> RTCDtlsTransport:
+    """The one transport: all sections are bundled."""
+    transceivers = pc.getTransceivers()
+    if transceivers:
+        return transceivers[0].receiver.transport
+    if pc.sctp is None:
+        raise RuntimeError("add the transceivers and data channels first")
+    return pc.sctp.transport
+
+
+def gather_only_on(pc: RTCPeerConnection, addresses: Sequence[str]) -> None:
+    """Gather host candidates on exactly these addresses, loopback included. Call before setLocalDescription."""
+    connection: Any = _transport_of(pc).transport.iceGatherer._connection
+    gather = connection.get_component_candidates
+
+    chosen = list(addresses)
+
+    async def gather_here(component: int, addresses: list[str]) -> Any:
+        return await gather(component=component, addresses=chosen)
+
+    connection.get_component_candidates = gather_here
+
+
+class _StampMap(HeaderExtensionsMap):
+    """Header extensions with the value that carries the event reference."""
+
+    def __init__(self, extension_id: int | None) -> None:
+        super().__init__()
+        self._stamp_id = extension_id
+
+    def get(self, extension_profile: int, extension_value: bytes) -> HeaderExtensions:
+        try:
+            values = super().get(extension_profile, extension_value)
+        except struct.error as error:
+            # aiortc drops a packet on ValueError only; anything else ends its receive loop.
+            raise ValueError("a header extension has the wrong length") from error
+        stamp: Any = values
+        if self._stamp_id is not None:
+            stamp.event_reference = find_extension(extension_profile, extension_value, self._stamp_id)
+        return values
+
+
+class _PacketTap:
+    """Stands in for a receiver's jitter buffer: every packet leaves here, none is kept."""
+
+    def __init__(self, sink: PacketSink, read_stamp: Callable[[bytes], int | None]) -> None:
+        self._sink = sink
+        self._read_stamp = read_stamp
+        self.ssrc: int | None = None  # of the media, not of the retransmissions
+
+    def add(self, packet: RtpPacket) -> tuple[bool, None]:
+        self.ssrc = packet.ssrc
+        value = getattr(packet.extensions, "event_reference", None)
+        data: bytes = packet._data  # type: ignore[attr-defined]
+        stamp = self._read_stamp(value) if value is not None else None
+        taken = MediaPacket(packet.sequence_number, packet.timestamp, bool(packet.marker), data, stamp)
+        return self._sink.packet(packet.payload_type, taken), None
+
+
+def take_packets(
+    pc: RTCPeerConnection,
+    sinks: dict[str, PacketSink],
+    extension_id: int | None,
+    read_stamp: Callable[[bytes], int | None],
+) -> None:
+    """Give the packets of each media section to the sink of its mid; nothing is decoded or kept by aiortc.
+
+    Call before setRemoteDescription(answer). aiortc goes on sending receiver reports, REMB and the first request
+    for a lost packet.
+    """
+    transport: Any = _transport_of(pc)
+    transport._rtp_header_extensions_map = _StampMap(extension_id)
+    for transceiver in pc.getTransceivers():
+        sink = sinks.get(transceiver.mid or "")
+        if sink is not None:
+            _tap(transceiver.receiver, _PacketTap(sink, read_stamp), sink)
+
+
+def _tap(receiver: Any, tap: _PacketTap, sink: PacketSink) -> None:
+    handle = receiver._handle_rtp_packet
+    begin = receiver.receive
+
+    async def handle_and_ask(packet: RtpPacket, arrival_time_ms: int) -> None:
+        await handle(packet, arrival_time_ms=arrival_time_ms)
+        missing = sink.missing()
+        if missing and tap.ssrc is not None:
+            await receiver._send_rtcp_nack(tap.ssrc, missing)
+
+    async def receive(self: RTCRtpReceiver, parameters: Any) -> None:
+        await begin(parameters)
+        receiver._handle_disconnect()  # ends the decoder thread, which has had nothing to do
+
+    receiver._RTCRtpReceiver__jitter_buffer = tap
+    receiver._handle_rtp_packet = handle_and_ask
+    receiver.receive = MethodType(receive, receiver)
+
+
+def take_raw_rtp(pc: RTCPeerConnection, take: Callable[[bytes], None]) -> None:
+    """Give every decrypted RTP packet to `take` and do nothing else with it: no thread, no buffer, no reports."""
+    transport: Any = _transport_of(pc)
+
+    async def handle(data: bytes, arrival_time_ms: int) -> None:
+        take(data)
+
+    async def receive(parameters: Any) -> None:
+        """Not even registered: the packets do not come this way."""
+
+    transport._handle_rtp_data = handle
+    for transceiver in pc.getTransceivers():
+        receiver: Any = transceiver.receiver
+        receiver.receive = receive
+
+
+def hasten_sctp(pc: RTCPeerConnection) -> None:
+    """Let SCTP find out about a loss sooner, and go on sending after one.
+
+    A console sends some kilobytes a second, so that neither a timeout of less than a second (RFC 9260 16 leaves
+    RTO.Min to the application's needs) nor a window of a few packets after a timeout can congest a path.
+    """
+    sctp: Any = pc.sctp
+    measure, expire = sctp._update_rto, sctp._t3_expired
+
+    def update(round_trip: float) -> None:
+        measure(round_trip)
+        sctp._rto = max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar)
+
+    def expired() -> None:
+        expire()
+        sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
+
+    sctp._rto = RETRANSMISSION_START
+    sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
+    sctp._update_rto = update
+    sctp._t3_expired = expired

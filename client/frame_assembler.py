@@ -1,0 +1,176 @@
+"""From RTP packets to encoded frames, as early as possible and never a broken one. No I/O.
+
+A video frame is complete with its marker packet (RFC 3550 5.1); waiting for the next frame to begin, as a general
+jitter buffer does, would cost one frame time of delay. After a frame that could not be completed nothing is given
+out before the next keyframe: a decoder would draw a picture that the robot never saw.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+__all__ = ["Assembler", "AudioAssembler", "EncodedFrame", "MediaPacket", "VideoAssembler"]
+
+SEQUENCES = 1 << 16
+WINDOW = 1024  # packets that may wait for a missing one
+PATIENCE = 0.3  # s to wait for a missing packet
+RETRY = 0.06  # s between two requests for the same missing packets
+KEYFRAME_RETRY = 0.4  # s between two keyframe requests
+
+
+class MediaPacket(NamedTuple):
+    """One RTP packet, its payload format already taken off."""
+
+    sequence: int
+    timestamp: int
+    marker: bool
+    data: bytes
+    stamp: int | None  # from its header extension; None without one
+
+
+class EncodedFrame(NamedTuple):
+    """One access unit or audio packet."""
+
+    timestamp: int
+    data: bytes
+    stamp: int | None
+
+
+class Assembler(Protocol):
+    """What a stream needs of either kind."""
+
+    lost: int
+
+    def add(self, packet: MediaPacket, now: float) -> list[EncodedFrame]: ...
+
+    def missing(self, now: float) -> list[int]: ...
+
+    def wants_keyframe(self, now: float) -> bool: ...
+
+    def broken(self) -> None: ...
+
+
+class AudioAssembler:
+    """Every packet is a frame, given out at once; a packet that comes late is left out."""
+
+    def __init__(self) -> None:
+        self.lost = 0
+        self._newest: int | None = None
+
+    def add(self, packet: MediaPacket, now: float) -> list[EncodedFrame]:
+        if self._newest is not None:
+            ahead = (packet.sequence - self._newest) % SEQUENCES
+            if ahead == 0:
+                return []
+            if ahead >= SEQUENCES // 2:
+                return []
+            self.lost += ahead - 1
+        self._newest = packet.sequence
+        return [EncodedFrame(packet.timestamp, packet.data, packet.stamp)]
+
+    def missing(self, now: float) -> list[int]:
+        return []
+
+    def wants_keyframe(self, now: float) -> bool:
+        return False
+
+    def broken(self) -> None:
+        """Every audio packet decodes by itself."""
+
+
+class VideoAssembler:
+    """Frames in order. Call `add` with every packet, then `missing` and `wants_keyframe` for what to ask the sender."""
+
+    def __init__(self, is_keyframe: Callable[[bytes], bool]) -> None:
+        self.lost = 0  # packets given up
+        self.undecodable = 0  # complete frames left out for want of a keyframe
+        self._is_keyframe = is_keyframe
+        self._packets: dict[int, MediaPacket] = {}
+        self._start: int | None = None  # sequence number that begins the next frame
+        self._end = 0  # the first one after `_start` that is not there
+        self._highest = 0
+        self._gap_since: float | None = None
+        self._asked_at = float("-inf")
+        self._needs_keyframe = True
+        self._keyframe_due = float("inf")
+
+    def add(self, packet: MediaPacket, now: float) -> list[EncodedFrame]:
+        """The frames that `packet` completes."""
+        if self._start is None:
+            self._begin_at(packet.sequence)
+            self._keyframe_due = now + KEYFRAME_RETRY  # the sender begins with one: it may be on its way
+        elif (packet.sequence - self._start) % SEQUENCES >= SEQUENCES // 2 or packet.sequence in self._packets:
+            return []  # belongs to a frame already given out or given up, or is a copy
+        elif self._offset(packet.sequence) >= WINDOW or self._waited_too_long(now):
+            self._give_up(packet.sequence)
+        self._packets[packet.sequence] = packet
+        if self._offset(packet.sequence) > self._offset(self._highest):
+            self._highest = packet.sequence
+        frames = self._complete()
+        self._note_gap(now)
+        return frames
+
+    def missing(self, now: float) -> list[int]:
+        """Sequence numbers to ask for once more; the first request is made when a gap opens."""
+        if self._start is None or self._gap_since is None or now - max(self._gap_since, self._asked_at) < RETRY:
+            return []
+        self._asked_at = now
+        count = (self._highest - self._end) % SEQUENCES
+        absent = ((self._end + offset) % SEQUENCES for offset in range(count))
+        return [sequence for sequence in absent if sequence not in self._packets]
+
+    def wants_keyframe(self, now: float) -> bool:
+        """Whether to ask for a keyframe now."""
+        if not self._needs_keyframe or now < self._keyframe_due:
+            return False
+        self._keyframe_due = now + KEYFRAME_RETRY
+        return True
+
+    def broken(self) -> None:
+        """A frame that was given out did not reach the decoder, or failed there."""
+        self._needs_keyframe = True
+
+    def _begin_at(self, sequence: int) -> None:
+        self._packets.clear()
+        self._start = self._end = self._highest = sequence
+        self._gap_since = None
+
+    def _give_up(self, sequence: int) -> None:
+        """Start again at `sequence`, with a keyframe."""
+        self.lost += max(1, self._offset(sequence) - len(self._packets))
+        self._needs_keyframe = True
+        self._begin_at(sequence)
+
+    def _offset(self, sequence: int) -> int:
+        return (sequence - (self._start or 0)) % SEQUENCES
+
+    def _waited_too_long(self, now: float) -> bool:
+        return self._gap_since is not None and now - self._gap_since > PATIENCE
+
+    def _note_gap(self, now: float) -> None:
+        waiting = self._offset(self._end) < len(self._packets)
+        if not waiting:
+            self._gap_since = None
+        elif self._gap_since is None:
+            self._gap_since = now
+
+    def _complete(self) -> list[EncodedFrame]:
+        frames: list[EncodedFrame] = []
+        while (packet := self._packets.get(self._end)) is not None:
+            self._end = (self._end + 1) % SEQUENCES
+            if packet.marker and (frame := self._take_frame()) is not None:
+                frames.append(frame)
+        return frames
+
+    def _take_frame(self) -> EncodedFrame | None:
+        """Take the packets from `_start` up to `_end` out as one frame."""
+        count = self._offset(self._end)
+        first = self._start or 0
+        parts = [self._packets.pop((first + offset) % SEQUENCES) for offset in range(count)]
+        self._start = self._end
+        data = b"".join(part.data for part in parts)
+        if self._needs_keyframe:
+            if not self._is_keyframe(data):
+                self.undecodable += 1
+                return None
+            self._needs_keyframe = False
+        return EncodedFrame(parts[0].timestamp, data, parts[0].stamp)

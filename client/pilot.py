@@ -1,0 +1,254 @@
+"""Driving, without I/O: which command or rest to send when, and what became of each intention.
+
+Feed it with `feedback`, `refusal`, `shown`, `intend`, `rest`; after each, and at `wake_at`, send what `due` returns
+and hand out what `outcomes` returns.
+
+- One command is in flight; its repeats carry the newest intention under the same event number, and answer the newest
+  issue of its feedback.
+- Armed and without a new intention for `IDLE`, it sends neutral values at that interval.
+- While the path loses packets every command is sent twice, `ECHO` apart: the copy covers the loss of the command,
+  and, being answered from the stored feedback, the loss of the answer too. On a clean path nothing is doubled.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from enum import Enum
+from typing import NamedTuple
+
+from client.command_gate import CommandGate
+from client.repeat_timer import RepeatTimer
+from client.rest_call import RestCall
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest
+from robot_bridge.protocol.serial import event_gap
+
+__all__ = ["Outcome", "Pilot"]
+
+IDLE = 0.2  # s; 5 Hz
+ECHO = 0.020  # s; longer than the console's own path to the robot and back
+LOSSY_SPELL = 60.0  # s to go on doubling after the last loss that was seen
+PATIENT_REASONS = {"late", "out_of_order", "rested"}  # another try, on fresh feedback, can succeed
+NEVER = float("inf")
+
+
+class Outcome(NamedTuple):
+    """What became of all intentions up to `ticket`: `feedback` or `refusal` is set."""
+
+    ticket: int
+    feedback: Feedback | None
+    refusal: Refusal | None
+
+
+class _Want(Enum):
+    """What the next command is to carry."""
+
+    NOTHING = 0
+    NEUTRAL = 1
+    VALUES = 2
+
+
+class _Flight:
+    """The command that was sent and not answered."""
+
+    def __init__(self, command: Command, want: _Want, ticket: int, now: float) -> None:
+        self.command = command
+        self.want = want
+        self.ticket = ticket  # of the intention it was sent for
+        self.issue = command.issue  # that the last sending answered
+        self.sends = 1
+        self.first_sent_at = now
+        self.last_sent_at = now
+        self.repeat_at = NEVER
+        self.echo_at = NEVER
+
+
+class Pilot:
+    """The operator's side of the command loop."""
+
+    def __init__(self, gate: CommandGate, neutral: Sequence[float]) -> None:
+        self.gate = gate
+        self.timer = RepeatTimer()
+        self.armed = False
+        self.newest: Feedback | None = None
+        self.repeats = 0  # sent because no answer came in time
+        self.echoes = 0  # sent because the path loses packets
+        self.sent_at: deque[tuple[int, float]] = deque(maxlen=256)  # event, first sending; for the picture delay
+        self.samples: deque[float] = deque(maxlen=4096)  # s from first sending to feedback
+        self._neutral = list(neutral)
+        self._values = list(neutral)
+        self._want = _Want.NOTHING
+        self._ticket = 0
+        self._idle_at = NEVER
+        self._flight: _Flight | None = None
+        self._lossy_until = float("-inf")
+        self._void: int | None = None  # an event that only neutral values may use
+        self._used_up: tuple[int, int] | None = None  # a feedback that can no longer be answered
+        self._moved = False  # values were sent since the robot was last proven to be at rest
+        self._rest: RestCall | None = None
+        self._outcomes: deque[Outcome] = deque()
+
+    # What comes in
+
+    def feedback(self, feedback: Feedback, now: float) -> bool:
+        """Take a feedback; whether it is newer than all before."""
+        if not self.gate.feedback(feedback.event, feedback.issue):
+            return False
+        self.newest = feedback
+        if self._void is not None and event_gap(feedback.event, self._void) >= 0:
+            self._void = None
+        if self._flight is not None and event_gap(feedback.event, self._flight.command.event) >= 0:
+            self._landed(self._flight, feedback, now)
+        if self._rest is not None and self._rest.proven_by(feedback, now):
+            self._rest = None
+            self._moved = False
+        return True
+
+    def refusal(self, refusal: Refusal) -> None:
+        """Take a refusal. Those that fresh feedback can cure lead to another try, the others to an outcome."""
+        flight = self._flight
+        if flight is None or not self.gate.refused(refusal.event):
+            return
+        self._flight = None
+        if refusal.reason == "rested":
+            self._void = flight.command.event
+        elif refusal.reason in PATIENT_REASONS and self.newest is not None:
+            self._used_up = (self.newest.event, flight.issue)
+        if refusal.reason not in PATIENT_REASONS:
+            self._want = _Want.NOTHING
+            self.armed = False
+            self._outcomes.append(Outcome(self._ticket, None, refusal))
+        elif self.armed:
+            self._want = max(self._want, flight.want, key=lambda want: want.value)
+        else:
+            self._want = _Want.NEUTRAL
+            self._outcomes.append(Outcome(flight.ticket, None, refusal))
+
+    def shown(self, stamp: int) -> None:
+        """A picture of the main camera is on screen."""
+        self.gate.shown(stamp)
+
+    def loss(self, now: float) -> None:
+        """Some message of this connection was lost."""
+        self._lossy_until = now + LOSSY_SPELL
+
+    # What the operator wants
+
+    def intend(self, values: Sequence[float], now: float) -> int:
+        """Send these values next; a command in flight repeats with them. Arms, and ends a rest. Returns a ticket."""
+        self.armed = True
+        self._rest = None
+        self._values = list(values)
+        self._want = _Want.VALUES
+        self._idle_at = now + IDLE
+        self._ticket += 1
+        return self._ticket
+
+    def rest(self, now: float) -> None:
+        """Let go: rest at once, until it is proven; one neutral command; then silence. Disarms."""
+        self.armed = False
+        self._values = list(self._neutral)
+        if self._rest is not None:
+            return
+        if self._want is _Want.VALUES and self.newest is not None:
+            gone = Refusal(event=self.gate.next().event, reason="rested", current=self.newest.event)
+            self._outcomes.append(Outcome(self._ticket, None, gone))
+        self._want = _Want.NOTHING
+        if self.newest is None:
+            return
+        event = self._flight.command.event if self._flight is not None else self.newest.event
+        self._rest = RestCall(Rest(event=event), once=not self._moved, now=now)
+        self._want = _Want.NEUTRAL if self._moved else _Want.NOTHING
+
+    @property
+    def resting(self) -> bool:
+        """A rest was asked for and is not proven yet."""
+        return self._rest is not None
+
+    # What goes out
+
+    def due(self, now: float) -> list[Command | Rest]:
+        """What to send now."""
+        messages: list[Command | Rest] = []
+        if self._rest is not None and now >= self._rest.due_at:
+            messages.append(self._rest.send(now, self.timer))
+            if self._rest.once:
+                self._rest = None
+        if self.armed and self._want is _Want.NOTHING and self._flight is None and now >= self._idle_at:
+            self._values = list(self._neutral)
+            self._want = _Want.NEUTRAL
+        if self._flight is not None:
+            messages += self._again(self._flight, now)
+        elif self._want is not _Want.NOTHING and self.gate.state(now) == "open" and not self._is_used_up():
+            messages.append(self._next(now))
+        return messages
+
+    def wake_at(self, now: float) -> float:
+        """When to call `due` again if nothing comes in before; infinite when only input can change anything."""
+        moments = [NEVER if self._rest is None else self._rest.due_at]
+        if self._flight is not None:
+            moments += [self._flight.repeat_at, self._flight.echo_at]
+        elif self._want is not _Want.NOTHING:
+            moments.append(self.gate.opens_at() if self.gate.state(now) == "rate" else NEVER)
+        elif self.armed:
+            moments.append(self._idle_at)
+        return min(moments)
+
+    def outcomes(self) -> list[Outcome]:
+        """What became of intentions since the last call, oldest first."""
+        taken = list(self._outcomes)
+        self._outcomes.clear()
+        return taken
+
+    def _next(self, now: float) -> Command:
+        event, issue = self.gate.next()
+        want = _Want.NEUTRAL if event == self._void else self._want
+        command = Command(event=event, issue=issue, values=self._values_for(want))
+        flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now)
+        flight.repeat_at = now + self.timer.wait(1)
+        flight.echo_at = now + ECHO if now < self._lossy_until else NEVER
+        self._flight = flight
+        self.gate.sent(now)
+        self.sent_at.append((event, now))
+        self._idle_at = now + IDLE
+        if want is self._want:
+            self._want = _Want.NOTHING
+        if want is _Want.VALUES:
+            self._moved = True
+        elif self._rest is not None:
+            self._rest.neutral = event
+        return command
+
+    def _again(self, flight: _Flight, now: float) -> list[Command | Rest]:
+        """A repeat or an echo of the command in flight."""
+        if now < min(flight.repeat_at, flight.echo_at):
+            return []
+        if now >= flight.repeat_at:
+            self.repeats += 1
+            flight.sends += 1
+            flight.last_sent_at = now
+            flight.repeat_at = now + self.timer.wait(flight.sends)
+        else:
+            self.echoes += 1
+        flight.echo_at = NEVER
+        flight.issue = self.gate.next().issue
+        want = _Want.NEUTRAL if flight.command.event == self._void else _Want.VALUES
+        return [Command(event=flight.command.event, issue=flight.issue, values=self._values_for(want))]
+
+    def _values_for(self, want: _Want) -> list[float]:
+        return self._values if want is _Want.VALUES else self._neutral
+
+    # What follows
+
+    def _landed(self, flight: _Flight, feedback: Feedback, now: float) -> None:
+        self._flight = None
+        taken = now - flight.first_sent_at
+        self.samples.append(taken)
+        if flight.sends == 1:  # Karn; an echo makes a sample at most ECHO too long, which is the safe side
+            self.timer.sample(taken)
+        elif now - flight.last_sent_at > (self.timer.round_trip or 0.0) / 2:  # sooner: the repeat was needless
+            self.loss(now)
+        if flight.ticket:
+            self._outcomes.append(Outcome(flight.ticket, feedback, None))
+
+    def _is_used_up(self) -> bool:
+        newest = self.newest
+        return newest is not None and self._used_up == (newest.event, newest.issue)

@@ -1,0 +1,169 @@
+"""One received stream: packets → frames → decoder → gate → readers."""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import Generic, NamedTuple, TypeVar
+
+import av
+
+from client.decoding import Decoded, Decoder, is_h264_keyframe, is_vp8_keyframe
+from client.frame_assembler import Assembler, AudioAssembler, EncodedFrame, MediaPacket, VideoAssembler
+from client.media_gate import Gated, MediaGate
+from client.newest_queue import NewestQueue
+from client.statistics import StreamStatistics
+from robot_bridge.protocol.carriers import Carrier, split_trailer
+
+__all__ = ["Picture", "Sound", "Stream"]
+
+ENCODED_BOUND = 12  # frames that may wait for the decoder
+KEYFRAMES = {"VP8": is_vp8_keyframe, "H264": is_h264_keyframe}
+FrameType = TypeVar("FrameType", av.VideoFrame, av.AudioFrame)
+
+
+class _Medium(NamedTuple, Generic[FrameType]):
+    stream: str  # name of the camera or microphone
+    stamp: int | None  # event reference at capture; None only with the gate off
+    gap: int | None  # newest feedback's event minus the stamp
+    frame: FrameType
+
+
+Picture = _Medium[av.VideoFrame]
+Sound = _Medium[av.AudioFrame]
+
+
+class Stream:
+    """Give it packets, run `run`, tell it of feedbacks, read from `open_reader`."""
+
+    def __init__(
+        self,
+        name: str,
+        kind: str,
+        codecs: dict[int, str],
+        carrier: Carrier,
+        gate: MediaGate[Decoded],
+        on_render: Callable[[str, int], None],
+    ) -> None:
+        self.name = name
+        self.kind = kind
+        self.carrier = carrier
+        self.gate = gate
+        self.codec = ""
+        self._codecs = codecs
+        self._on_render = on_render
+        self._assembler: Assembler | None = None
+        self._encoded: NewestQueue[EncodedFrame] = NewestQueue(ENCODED_BOUND)
+        self._readers: list[NewestQueue[Decoded]] = []
+        self._packets = 0
+        self._frames = 0
+        self._unstamped = 0
+        self._unread = 0  # dropped by readers that are gone
+
+    # From the network
+
+    def packet(self, payload_type: int, packet: MediaPacket) -> bool:
+        """Take one packet; whether to ask the sender for a keyframe."""
+        now = asyncio.get_running_loop().time()
+        assembler = self._assembler_for(payload_type)
+        if assembler is None:
+            return False
+        self._packets += 1
+        for frame in assembler.add(packet, now):
+            self._assembled(frame, assembler)
+        return assembler.wants_keyframe(now)
+
+    def missing(self) -> list[int]:
+        """Sequence numbers to ask the sender for again."""
+        return self._assembler.missing(asyncio.get_running_loop().time()) if self._assembler is not None else []
+
+    def _assembler_for(self, payload_type: int) -> Assembler | None:
+        codec = self._codecs.get(payload_type, "")
+        if codec != self.codec and (codec in KEYFRAMES or self.kind == "audio"):
+            self.codec = codec
+            self._assembler = AudioAssembler() if self.kind == "audio" else VideoAssembler(KEYFRAMES[codec])
+        return self._assembler
+
+    def _assembled(self, frame: EncodedFrame, assembler: Assembler) -> None:
+        self._frames += 1
+        if self.carrier == "trailer":
+            data, trailer = split_trailer(frame.data)
+            frame = EncodedFrame(frame.timestamp, data, trailer.event if trailer is not None else None)
+        if frame.stamp is None:
+            self._unstamped += 1
+        if len(self._encoded) >= ENCODED_BOUND:
+            self._start_over(assembler)  # the decoder is too slow, and frames build on each other
+        else:
+            self._encoded.put(frame)
+
+    def _start_over(self, assembler: Assembler) -> None:
+        self._encoded.clear()
+        assembler.broken()
+
+    # Through the decoder
+
+    async def run(self, executor: Executor) -> None:
+        """Decode until cancelled."""
+        loop = asyncio.get_running_loop()
+        decoder: Decoder | None = None
+        codec = ""
+        while True:
+            encoded = await self._encoded.get()
+            if decoder is None or codec != self.codec:
+                codec = self.codec
+                decoder = Decoder(codec)
+            try:
+                frames = await loop.run_in_executor(executor, decoder.decode, encoded)
+            except av.FFmpegError:
+                if self._assembler is not None:
+                    self._start_over(self._assembler)
+                continue
+            for frame in frames:
+                self._render(self.gate.offer(frame, frame.stamp))
+
+    # Through the gate, to the readers
+
+    def feedback(self, event: int) -> None:
+        """The newest feedback is of `event`."""
+        self._render(self.gate.feedback(event))
+
+    def _render(self, gated: Gated[Decoded] | None) -> None:
+        if gated is None:
+            return
+        for reader in self._readers:
+            reader.put(gated.medium)
+        if gated.stamp is not None:
+            self._on_render(self.name, gated.stamp)
+
+    def open_reader(self, bound: int) -> NewestQueue[Decoded]:
+        reader: NewestQueue[Decoded] = NewestQueue(bound)
+        self._readers.append(reader)
+        return reader
+
+    def close_reader(self, reader: NewestQueue[Decoded]) -> None:
+        self._readers.remove(reader)
+        self._unread += reader.dropped
+
+    def close(self) -> None:
+        """Nothing will come any more: readers read what is there, and end."""
+        for reader in self._readers:
+            reader.close()
+
+    def statistics(self) -> StreamStatistics:
+        gate = self.gate
+        return StreamStatistics(
+            stream=self.name,
+            kind=self.kind,
+            codec=self.codec,
+            carrier=self.carrier,
+            stamp=gate.stamp,
+            gap=gate.gap,
+            max_gap=gate.max_gap,
+            rendered=gate.rendered,
+            discarded=gate.discarded,
+            held=gate.held,
+            packets=self._packets,
+            frames=self._frames,
+            lost=self._assembler.lost if self._assembler is not None else 0,
+            unstamped=self._unstamped,
+            dropped=self._unread + self._encoded.dropped + sum(reader.dropped for reader in self._readers),
+        )

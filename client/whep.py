@@ -1,0 +1,90 @@
+"""WHEP signalling and the console's few HTTP calls, over httpx."""
+
+from types import TracebackType
+from typing import NamedTuple, Self
+from urllib.parse import urljoin, urlsplit
+
+import httpx
+import msgspec
+
+from client.errors import ConnectFailed, SignallingRefused
+from client.link import ConsoleLink
+
+__all__ = ["Answer", "Whep"]
+
+TIMEOUT = 10.0  # s for one request
+
+
+class Answer(NamedTuple):
+    sdp: str
+    resource: str  # URL that ends the session
+
+
+class _Problem(msgspec.Struct):
+    error: str = ""
+    detail: str = ""
+
+
+class Whep:
+    """The HTTP side of one connection."""
+
+    def __init__(self, link: ConsoleLink) -> None:
+        self._base = link.base
+        self._client = httpx.AsyncClient(
+            headers={"Authorization": f"Bearer {link.token}"},
+            timeout=TIMEOUT,
+            trust_env=not link.loopback,  # a proxy cannot reach this machine's loopback
+            verify=link.secure,  # without TLS, spares the loading of certificates
+        )
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        await self.aclose()
+
+    async def aclose(self) -> None:
+        await self._client.aclose()
+
+    async def offer(self, sdp: str, *, trailer: bool) -> Answer:
+        """Offer, and get the answer.
+
+        Raises:
+            SignallingRefused: the console answered with an error.
+            ConnectFailed: it did not answer.
+        """
+        url = self._base + "/whep" + ("?stamp=trailer" if trailer else "")
+        response = await self._request("POST", url, content=sdp.encode(), headers={"Content-Type": "application/sdp"})
+        location = response.headers.get("Location", "")
+        resource = urljoin(url, location)
+        if response.status_code != 201 or not location or urlsplit(resource).netloc != urlsplit(url).netloc:
+            raise SignallingRefused(response.status_code, "", "not a WHEP answer: is this link a Lockstep console's?")
+        return Answer(response.text, resource)
+
+    async def end(self, resource: str) -> None:
+        """End the session; raises as `offer`."""
+        await self._request("DELETE", resource)
+
+    async def stop(self, reason: str) -> None:
+        """Latch the stop by HTTP; raises as `offer`."""
+        await self._request("POST", self._base + "/api/stop", json={"reason": reason})
+
+    async def _request(self, method: str, url: str, **arguments: object) -> httpx.Response:
+        try:
+            response = await self._client.request(method, url, **arguments)  # type: ignore[arg-type]
+        except httpx.HTTPError as error:
+            detail = f"no answer from {self._base} ({error or type(error).__name__}); is the console running there?"
+            raise ConnectFailed(detail) from error
+        if response.status_code >= 400:
+            raise _refusal(response)
+        return response
+
+
+def _refusal(response: httpx.Response) -> SignallingRefused:
+    try:
+        problem = msgspec.json.decode(response.content, type=_Problem)
+    except msgspec.DecodeError:
+        problem = _Problem(detail=response.text[:200])
+    return SignallingRefused(response.status_code, problem.error, problem.detail)
