@@ -1,10 +1,310 @@
-"""The only file that touches private parts of aiortc and aioice; tests pin every one of them."""
+"""The only file that touches private parts of aiortc and aioice; tests pin every one of them.
 
-from collections.abc import Sequence
+What is used and why:
 
-__all__ = ["restrict_ice_hosts"]
+- `aioice.ice.get_host_addresses`: aioice never gathers loopback addresses and has no setting for them
+- `RTCRtpTransceiver.__sender`, `._codecs`, `._headerExtensions`, `._offerDirection`: the answer is built from them
+- `RTCRtpSender`'s attributes that `RTCPeerConnection` reads: `_ssrc`, `_rtx_ssrc`, `_stream_id`, `_track_id`
+- `RTCDtlsTransport._tx_srtp`, `._state`, `._register_rtp_sender`: ready packets go out without a coroutine each
+- `RTCDtlsTransport._recv_next`: an exception there would end the connection
+- `aioice.Connection._nominated`, `._queue`: the selected path, and the receive queue, which has no bound
+"""
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, cast
+
+import aioice.ice
+import pylibsrtp
+from aiortc import (
+    RTCBundlePolicy,
+    RTCConfiguration,
+    RTCPeerConnection,
+    RTCRtpSender,
+    RTCRtpTransceiver,
+)
+from aiortc.rtcdtlstransport import RTCDtlsTransport, State
+from aiortc.rtcrtpparameters import RTCRtpHeaderExtensionParameters, RTCRtpSendParameters
+from aiortc.rtp import (
+    RTCP_PSFB_APP,
+    RTCP_PSFB_FIR,
+    RTCP_PSFB_PLI,
+    RTCP_RTPFB_NACK,
+    AnyRtcpPacket,
+    RtcpPsfbPacket,
+    RtcpRrPacket,
+    RtcpRtpfbPacket,
+    RtcpSrPacket,
+    unpack_remb_fci,
+)
+from aiortc.sdp import SessionDescription
+
+from server.media.frame import EncodedFrame
+from server.media.header_extensions import ExtensionWriter
+from server.media.packet_stream import PacketStream, SenderStats, StreamParameters
+
+__all__ = [
+    "MediaSender",
+    "create_peer_connection",
+    "guard_transports",
+    "install_sender",
+    "keep_codec",
+    "keep_extensions",
+    "offered_direction",
+    "offered_extensions",
+    "restrict_ice_hosts",
+]
+
+SOCKET_BACKLOG_BYTES = 64 * 1024  # a peer with more unsent bytes than this gets no more frames for now
+RECEIVE_QUEUE_DATAGRAMS = 1024
+DATAGRAM_MAX = 1500  # bytes, what pylibsrtp takes
 
 
 def restrict_ice_hosts(addresses: Sequence[str]) -> None:
     """Make ICE gather host candidates on exactly these addresses, loopback included. Process-wide."""
-    raise NotImplementedError
+    chosen = list(addresses)
+
+    def get_host_addresses(use_ipv4: bool, use_ipv6: bool) -> list[str]:
+        return [address for address in chosen if (use_ipv6 if ":" in address else use_ipv4)]
+
+    aioice.ice.get_host_addresses = get_host_addresses
+
+
+def create_peer_connection() -> RTCPeerConnection:
+    """A peer connection that contacts no STUN or TURN server.
+
+    Each section of an offer starts with a transport of its own: with a shared one aiortc would keep the candidates
+    of the last section only, and browsers put them all into the first.
+    """
+    return RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_COMPAT))
+
+
+def offered_extensions(offer_sdp: str) -> dict[str, dict[str, int]]:
+    """Header extensions of each media section of an offer: URI to id, by mid."""
+    sections = SessionDescription.parse(offer_sdp).media
+    return {m.rtp.muxId: {extension.uri: extension.id for extension in m.rtp.headerExtensions} for m in sections}
+
+
+def offered_direction(transceiver: RTCRtpTransceiver) -> str | None:
+    """What the offer lets us do in this section: "sendonly", "sendrecv", "recvonly" or "inactive"."""
+    return transceiver._offerDirection
+
+
+def keep_codec(transceiver: RTCRtpTransceiver, names: Sequence[str]) -> str | None:
+    """Answer the first offered codec among `names`, with its retransmission format; None when there is none."""
+    codecs = transceiver._codecs
+    known = {name.lower(): name for name in names}
+    chosen = next((codec for codec in codecs if codec.name.lower() in known), None)
+    if chosen is None:
+        return None
+    transceiver._codecs = [chosen] + [
+        codec for codec in codecs if codec.name.lower() == "rtx" and codec.parameters.get("apt") == chosen.payloadType
+    ]
+    return known[chosen.name.lower()]
+
+
+def keep_extensions(transceiver: RTCRtpTransceiver, ids: Mapping[str, int]) -> None:
+    """Answer exactly these header extensions, with the offer's ids."""
+    transceiver._headerExtensions = [RTCRtpHeaderExtensionParameters(id=x, uri=uri) for uri, x in ids.items()]
+
+
+def install_sender(transceiver: RTCRtpTransceiver, sender: "MediaSender") -> None:
+    """Make `transceiver` answer and send with `sender`."""
+    old = transceiver.sender
+    sender._ssrc, sender._rtx_ssrc = old._ssrc, old._rtx_ssrc
+    # The name is mangled because aiortc has no way to bring a sender of one's own.
+    if not hasattr(transceiver, "_RTCRtpTransceiver__sender"):
+        raise RuntimeError("aiortc moved RTCRtpTransceiver.__sender; see server/media/aiortc_private.py")
+    setattr(transceiver, "_RTCRtpTransceiver__sender", sender)  # noqa: B010
+
+
+class MediaSender(RTCRtpSender):
+    """Sends ready frames. Owns no task: whoever created it pushes frames and asks for reports."""
+
+    def __init__(
+        self,
+        transceiver: RTCRtpTransceiver,
+        stream_id: str,
+        *,
+        trailer: bool,
+        on_ready: Callable[[], None],
+        on_keyframe_request: Callable[[], None],
+        on_stopped: Callable[[], None],
+    ) -> None:
+        super().__init__(transceiver.kind, transceiver.receiver.transport)
+        self._stream_id = stream_id
+        self._trailer = trailer
+        self._on_ready = on_ready
+        self._on_keyframe_request = on_keyframe_request
+        self._on_stopped = on_stopped
+        self._packets: PacketStream | None = None  # None before the transport is connected
+        self._stopped = False
+
+    @property
+    def stats(self) -> SenderStats:
+        return self._packets.stats if self._packets is not None else SenderStats()
+
+    async def send(self, parameters: RTCRtpSendParameters) -> None:
+        """Called by the peer connection when the transport is connected; again on every renegotiation."""
+        if self._packets is not None or self._stopped:
+            return
+        codec = parameters.codecs[0]
+        if codec.payloadType is None:
+            raise RuntimeError("aiortc negotiated a codec without a payload type")
+        rtx = [c.payloadType for c in parameters.codecs[1:] if c.parameters.get("apt") == codec.payloadType]
+        negotiated = StreamParameters(
+            ssrc=self._ssrc,
+            rtx_ssrc=self._rtx_ssrc,
+            payload_type=codec.payloadType,
+            rtx_payload_type=rtx[0] if rtx else None,
+            clock_rate=codec.clockRate,
+            cname=parameters.rtcp.cname or "",
+            trailer=self._trailer,
+        )
+        ids = {extension.uri: extension.id for extension in parameters.headerExtensions}
+        self._packets = PacketStream(negotiated, ExtensionWriter(ids, parameters.muxId))
+        self.transport._register_rtp_sender(self, parameters)
+        self._on_ready()
+
+    async def stop(self) -> None:
+        """Called by the peer connection when it closes. Idempotent."""
+        if self._stopped:
+            return
+        self._stopped = True
+        if self._packets is not None:
+            self.transport._unregister_rtp_sender(self)
+            self._send_control(self._packets.goodbye(time.time()))
+        self._on_stopped()
+
+    def congested(self) -> bool:
+        """Whether the socket still holds so much that another frame would only queue."""
+        path = self._path()
+        if path is None:
+            return False
+        backlog: Callable[[], int] | None = getattr(path[0], "get_write_buffer_size", None)
+        return backlog is not None and backlog() > SOCKET_BACKLOG_BYTES
+
+    def transmit(self, frame: EncodedFrame) -> tuple[int, int]:
+        """Send a frame now. Returns packets and bytes handed to the network; (0, 0) when the transport is gone."""
+        path = self._path()
+        if path is None or self._packets is None:
+            return 0, 0
+        sendto, address = path[0].sendto, path[1]
+        protect = self.transport._tx_srtp.protect
+        packets = self._packets.packets(frame, time.time())
+        octets = 0
+        try:
+            for packet in packets:
+                protected = protect(packet)
+                octets += len(protected)
+                sendto(protected, address)
+        except (pylibsrtp.Error, ValueError, OSError):
+            self._packets.stats.failed += 1
+            return 0, 0
+        return len(packets), octets
+
+    def report(self) -> None:
+        """Send a sender report, if anything was sent yet."""
+        if self._packets is not None and not self._stopped:
+            self._send_control(self._packets.report(time.time()))
+
+    def _path(self) -> tuple[Any, tuple[str, int]] | None:
+        """The selected pair's datagram transport and remote address; None unless connected (RFC 8445 12.1)."""
+        dtls = self.transport
+        if dtls._state is not State.CONNECTED:
+            return None
+        pair = dtls.transport._connection._nominated.get(1)
+        return None if pair is None else (pair.protocol.transport, pair.remote_addr)
+
+    def _send_control(self, packet: bytes | None) -> None:
+        path = self._path()
+        if packet is None or path is None:
+            return
+        try:
+            path[0].sendto(self.transport._tx_srtp.protect_rtcp(packet), path[1])
+        except (pylibsrtp.Error, OSError):
+            self.stats.failed += 1
+
+    async def _handle_rtcp_packet(self, packet: AnyRtcpPacket) -> None:
+        if self._packets is None:
+            return
+        if isinstance(packet, RtcpRrPacket | RtcpSrPacket):
+            self._take_reports(packet)
+        elif isinstance(packet, RtcpRtpfbPacket) and packet.fmt == RTCP_RTPFB_NACK:
+            self._retransmit_all(packet.lost)
+        elif isinstance(packet, RtcpPsfbPacket) and packet.fmt in (RTCP_PSFB_PLI, RTCP_PSFB_FIR):
+            self._packets.stats.keyframe_requests += 1
+            self._on_keyframe_request()
+        elif isinstance(packet, RtcpPsfbPacket) and packet.fmt == RTCP_PSFB_APP:
+            bitrate, ssrcs = unpack_remb_fci(packet.fci)
+            if self._ssrc in ssrcs:
+                self._packets.stats.remb_bps = bitrate
+
+    def _take_reports(self, packet: RtcpRrPacket | RtcpSrPacket) -> None:
+        for block in packet.reports:
+            if block.ssrc == self._ssrc and self._packets is not None:
+                self._packets.reported(
+                    fraction_lost=block.fraction_lost,
+                    packets_lost=block.packets_lost,
+                    jitter=block.jitter,
+                    last_report=block.lsr,
+                    delay=block.dlsr,
+                    now=time.time(),
+                )
+
+    def _retransmit_all(self, lost: Sequence[int]) -> None:
+        path = self._path()
+        if path is None or self._packets is None:
+            return
+        now = time.monotonic()
+        for sequence_number in lost:
+            packet = self._packets.retransmission(sequence_number, now)
+            if packet is not None:
+                path[0].sendto(self.transport._tx_srtp.protect(packet), path[1])
+
+
+class _BoundedReceiveQueue(asyncio.Queue[Any]):
+    """Drops what the connection could not use: datagrams beyond the bound, and those that would raise further on."""
+
+    def __init__(self, on_error: Callable[[str], None]) -> None:
+        super().__init__()
+        self._on_error = on_error
+
+    def put_nowait(self, item: tuple[bytes, int] | None) -> None:
+        if item is not None and not 0 < len(item[0]) <= DATAGRAM_MAX:
+            self._on_error("datagram_size")
+        elif item is not None and self.qsize() >= RECEIVE_QUEUE_DATAGRAMS:
+            self._on_error("receive_overflow")
+        else:
+            super().put_nowait(item)
+
+
+def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None]) -> None:
+    """Keep what a peer sends from ending its connection or filling memory; `on_error` gets a stable name to count.
+
+    Call after setRemoteDescription, when the transports exist. Calling it again changes nothing.
+    """
+    transports = {transceiver.receiver.transport for transceiver in pc.getTransceivers()}
+    if pc.sctp is not None:
+        transports.add(pc.sctp.transport)
+    for transport in transports:
+        _guard_transport(transport, on_error)
+
+
+def _guard_transport(dtls: RTCDtlsTransport, on_error: Callable[[str], None]) -> None:
+    connection = dtls.transport._connection
+    if isinstance(connection._queue, _BoundedReceiveQueue):
+        return
+    connection._queue = _BoundedReceiveQueue(on_error)
+    receive = dtls._recv_next
+
+    async def guarded() -> None:
+        try:
+            await receive()
+        except ConnectionError:
+            raise
+        except Exception:  # what a parser of aiortc did not expect; CancelledError is no Exception
+            on_error("malformed")
+
+    cast(Any, dtls)._recv_next = guarded

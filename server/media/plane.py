@@ -1,48 +1,199 @@
-"""The media plane: streams of one robot, fanned out to every peer."""
+"""The media plane: the streams of one robot, encoded once and sent to every peer."""
 
-from aiortc import RTCPeerConnection
+import asyncio
+import random
+import re
+import time
+from collections.abc import Callable, Iterator
+
+from aiortc import RTCPeerConnection, RTCRtpTransceiver
 from prometheus_client import CollectorRegistry
 
+from robot_bridge.protocol.carriers import Carrier
 from robot_bridge.protocol.console import StreamInfo
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Media
+from server.media.aiortc_private import (
+    MediaSender,
+    guard_transports,
+    install_sender,
+    keep_codec,
+    keep_extensions,
+    offered_direction,
+    offered_extensions,
+)
+from server.media.audio_stream import AudioStream
+from server.media.capture_clock import CaptureClock
+from server.media.fanout import FanOut
+from server.media.header_extensions import choose_carrier, wanted_uris
+from server.media.metrics import MediaMetrics
+from server.media.outbox import Outbox
+from server.media.peer_media import Delivery, PeerMedia
+from server.media.peer_stream import PeerStream
 from server.media.settings import MediaSettings
+from server.media.video_stream import VideoStream
 
 __all__ = ["MediaPlane", "MediaSettings", "PeerMedia"]
 
+REPORT_SECONDS = 1.0  # between sender reports of a peer, on average
 
-class PeerMedia:
-    """What one peer gets."""
-
-    streams: list[StreamInfo]  # valid after setLocalDescription(answer)
-    stats: dict[str, int]
-
-    async def close(self) -> None:
-        """Stop sending to this peer. Idempotent; also safe after the peer connection closed."""
-        raise NotImplementedError
+AnyStream = VideoStream | AudioStream
 
 
 class MediaPlane:
-    """Encodes each stream once per codec and sends it to every attached peer."""
+    """Encodes each stream once per codec and sends it to every attached peer.
 
-    def __init__(self, settings: MediaSettings, metrics_registry: CollectorRegistry) -> None:
-        raise NotImplementedError
+    Create it and call everything on one event loop. `close` ends all tasks and threads.
+    """
+
+    def __init__(
+        self,
+        settings: MediaSettings,
+        metrics_registry: CollectorRegistry,
+        *,
+        wall_clock: Callable[[], float] = time.time,
+    ) -> None:
+        self._settings = settings
+        self._metrics = MediaMetrics(metrics_registry)
+        self._wall_clock = wall_clock
+        self._capture_clock = CaptureClock()
+        self._fan_out = FanOut(settings.slice_seconds, time.perf_counter)
+        self._streams: dict[str, AnyStream] = {}
+        self._peers: dict[PeerMedia, None] = {}  # an ordered set
+        self._stream_tasks: list[asyncio.Task[None]] = []
+        self._service_tasks: list[asyncio.Task[None]] = []
+        self._ending: set[asyncio.Task[None]] = set()
+        self._closed = False
 
     def configure(self, description: RobotDescription) -> None:
-        """Create the streams of a robot; once per epoch, when no peer is attached."""
-        raise NotImplementedError
+        """Create the streams of a robot; once per epoch. Peers that are still attached get nothing more."""
+        self._end_streams()
+        settings, fan_out, metrics = self._settings, self._fan_out, self._metrics
+        self._capture_clock = CaptureClock()
+        self._streams = {camera.name: VideoStream(camera, settings, fan_out, metrics) for camera in description.cameras}
+        for microphone in description.microphones:
+            self._streams[microphone.name] = AudioStream(microphone, settings, fan_out, metrics)
+        loop = asyncio.get_running_loop()
+        self._stream_tasks = [loop.create_task(stream.run()) for stream in self._streams.values()]
+        if not self._service_tasks:
+            self._service_tasks = [loop.create_task(fan_out.run()), loop.create_task(self._report())]
 
     def feed(self, media: Media, now: float) -> None:
-        """Take a picture or sound from the robot link. Called on the loop, never blocks; newest wins."""
-        raise NotImplementedError
+        """Take a picture or sound from the robot link. Called on the loop, never blocks; newest wins.
+
+        `now` is on a monotonic clock, the same for all calls.
+        """
+        stream = self._streams.get(media.stream)
+        if stream is None:
+            self._metrics.dropped.labels("", "unknown_stream").inc()
+            return
+        self._capture_clock.observe(media.time, self._wall_clock())
+        stream.feed(media, now, self._capture_clock.wall_time(media.time))
 
     def attach(self, pc: RTCPeerConnection, offer_sdp: str, *, priority: bool, trailer: bool) -> PeerMedia:
         """Give a peer its streams. Call after setRemoteDescription(offer), before createAnswer.
 
-        `priority` is for the operator: served first and at once.
+        The i-th video section gets the i-th camera, the i-th audio section the i-th microphone; sections without
+        one, or without a codec in common, are answered inactive. `priority` is for the operator: served first and at
+        once. `trailer` asks for the trailer carrier; otherwise the offer's header extensions decide.
         """
-        raise NotImplementedError
+        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc())
+        extensions = offered_extensions(offer_sdp)
+        sources: dict[str, Iterator[AnyStream]] = {
+            kind: iter([stream for stream in self._streams.values() if stream.kind == kind])
+            for kind in ("video", "audio")
+        }
+        deliveries: list[Delivery] = []
+        peer = PeerMedia(deliveries, lambda peer: self._peers.pop(peer, None))
+        for transceiver in pc.getTransceivers():
+            stream = next(sources[transceiver.kind], None)
+            codec = None
+            if stream is not None and offered_direction(transceiver) in ("sendonly", "sendrecv"):
+                codec = keep_codec(transceiver, stream.codecs)
+            if stream is None or codec is None:
+                transceiver.direction = "inactive"
+                continue
+            offered = extensions.get(transceiver.mid or "", {})
+            carrier = choose_carrier(offered, trailer)
+            ids = {uri: offered[uri] for uri in wanted_uris(stream.kind, carrier) if uri in offered}
+            keep_extensions(transceiver, ids)
+            transceiver.direction = "sendonly"
+            deliveries.append(self._deliver(peer, transceiver, stream, codec, carrier, priority))
+        self._peers[peer] = None
+        return peer
+
+    def _deliver(
+        self,
+        peer: PeerMedia,
+        transceiver: RTCRtpTransceiver,
+        stream: AnyStream,
+        codec: str,
+        carrier: Carrier,
+        priority: bool,
+    ) -> Delivery:
+        video = stream.kind == "video"
+        output = stream.outputs[codec]
+        target = PeerStream(
+            Outbox(self._settings.video_queue_frames if video else self._settings.audio_queue_frames, video=video),
+            priority=priority,
+            stream=stream.name,
+            carrier=carrier,
+            metrics=self._metrics,
+            on_dropped=lambda: output.request_keyframe("drop"),
+        )
+
+        def ready() -> None:
+            target.sender = sender
+            stream.join(codec, target)
+
+        sender = MediaSender(
+            transceiver,
+            _msid(stream.name),
+            trailer=carrier == "trailer",
+            on_ready=ready,
+            on_keyframe_request=lambda: output.request_keyframe("pli"),
+            on_stopped=peer.detach,
+        )
+        install_sender(transceiver, sender)
+        info = StreamInfo(
+            mid=transceiver.mid or "",
+            stream=stream.name,
+            label=stream.label,
+            kind=stream.kind,
+            codec=codec,
+            carrier=carrier,
+        )
+        return Delivery(info, stream, target, sender)
+
+    async def _report(self) -> None:
+        """Sender reports of all peers, spread over the interval and varied (RFC 3550 6.2)."""
+        while True:
+            await asyncio.sleep(REPORT_SECONDS * random.uniform(0.5, 1.5))
+            for peer in list(self._peers):
+                peer.report()
+                await asyncio.sleep(0)
+
+    def _end_streams(self) -> None:
+        for peer in list(self._peers):
+            peer.detach()
+        for task in self._stream_tasks:
+            task.cancel()
+            self._ending.add(task)
+            task.add_done_callback(self._ending.discard)
+        self._stream_tasks = []
+        self._streams = {}
 
     async def close(self) -> None:
-        """Stop all streams and workers. Idempotent."""
-        raise NotImplementedError
+        """Stop all streams and workers; peers get nothing more. Idempotent."""
+        if self._closed:
+            return
+        self._closed = True
+        self._end_streams()
+        for task in self._service_tasks:
+            task.cancel()
+        await asyncio.gather(*self._ending, *self._service_tasks, return_exceptions=True)
+
+
+def _msid(name: str) -> str:
+    """`name` as a media stream id: only the characters of RFC 8830 2 (token-char), at most 64."""
+    return re.sub(r"[^0-9A-Za-z!#$%&'*+.^_`{|}~-]", "_", name)[:64] or "_"

@@ -14,4 +14,5 @@ class MediaSettings(BaseModel):
     opus_bitrate_bps: int = Field(default=32_000, ge=6_000, le=256_000)
     opus_packet_loss_percent: int = Field(default=10, ge=0, le=100)  # what in-band FEC is sized for
     slice_seconds: float = Field(default=0.001, gt=0.0, le=0.05)  # of one loop turn that observers may use
-    observer_queue_frames: int = Field(default=3, ge=1, le=100)  # frames that wait for one observer
+    video_queue_frames: int = Field(default=3, ge=1, le=100)  # pictures that may wait for one peer
+    audio_queue_frames: int = Field(default=10, ge=1, le=100)  # sound packets that may wait for one peer

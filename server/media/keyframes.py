@@ -1,0 +1,54 @@
+"""When the next picture is encoded as a keyframe: requests of all peers, merged. No clock is read here."""
+
+__all__ = ["KeyframeScheduler"]
+
+JOIN_BURST = 3
+
+
+class KeyframeScheduler:
+    """One per encoder. Order of calls: `join` and `request` at any time, `take` before each picture is encoded.
+
+    A joining peer is served with the next picture. Many at once would make every picture a keyframe, which the
+    operator would pay for, so joins beyond a burst of three wait for the spacing, as requests do.
+    """
+
+    def __init__(self, interval_seconds: float, spacing_seconds: float) -> None:
+        self._interval = interval_seconds
+        self._spacing = spacing_seconds
+        self._joined = False
+        self._requested = False
+        self._last: float | None = None  # when the last keyframe was taken
+        self._tokens = float(JOIN_BURST)
+        self._tokens_at: float | None = None
+
+    def join(self) -> None:
+        """A peer joined and shows nothing until it gets a keyframe."""
+        self._joined = True
+
+    def request(self) -> None:
+        """A peer lost the picture (PLI, FIR) or had frames dropped."""
+        self._requested = True
+
+    def take(self, now: float) -> bool:
+        """Whether the picture about to be encoded must be a keyframe; if so all waiting requests are served by it."""
+        if not self._wanted(now):
+            return False
+        self._joined = self._requested = False
+        self._last = now
+        return True
+
+    def _wanted(self, now: float) -> bool:
+        if self._last is None or now - self._last >= self._interval:
+            return True
+        if (self._joined or self._requested) and now - self._last >= self._spacing:
+            return True
+        return self._joined and self._spend_token(now)
+
+    def _spend_token(self, now: float) -> bool:
+        if self._tokens_at is not None and self._spacing > 0:
+            self._tokens = min(JOIN_BURST, self._tokens + (now - self._tokens_at) / self._spacing)
+        self._tokens_at = now
+        if self._tokens < 1:
+            return False
+        self._tokens -= 1
+        return True

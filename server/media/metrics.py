@@ -1,0 +1,35 @@
+"""Counters of the media plane, under `lockstep_media_` at /metrics."""
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
+
+__all__ = ["MediaMetrics"]
+
+ENCODE_BUCKETS = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.13, 0.5)  # s
+
+
+class MediaMetrics:
+    """One set per plane. Stages of `dropped`, in the order of the path:
+
+    unknown_stream, stale_stamp, unsupported_codec, bad_payload, encoder_busy, encode_failed, peer_busy
+    """
+
+    def __init__(self, registry: CollectorRegistry) -> None:
+        def counter(name: str, text: str, *labels: str) -> Counter:
+            return Counter(f"lockstep_media_{name}", text, labels, registry=registry)
+
+        self.frames_in = counter("frames_in", "Pictures and sound segments from the robot", "stream")
+        self.encoded = counter("frames_encoded", "Frames that an encoder put out", "stream", "codec")
+        self.dropped = counter("frames_dropped", "Frames that went no further than a stage", "stream", "stage")
+        self.packets = counter("packets_sent", "RTP packets sent", "stream", "carrier")
+        self.octets = counter("bytes_sent", "Bytes of SRTP packets sent", "stream", "carrier")
+        self.keyframe_requests = counter("keyframe_requests", "Asked by peers", "stream", "cause")
+        self.keyframes = counter("keyframes", "Keyframes encoded", "stream", "codec")
+        self.malformed = counter("malformed_from_peers", "Datagrams of peers that were not used", "kind")
+        self.encode_seconds = Histogram(
+            "lockstep_media_encode_seconds",
+            "Time to encode one frame",
+            ["stream", "codec"],
+            buckets=ENCODE_BUCKETS,
+            registry=registry,
+        )
+        self.peers = Gauge("lockstep_media_peers", "Peers that get a stream", ["stream"], registry=registry)

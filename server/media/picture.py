@@ -1,0 +1,61 @@
+"""Pictures from the robot link, as what encoders take."""
+
+import av
+import numpy as np
+from av.error import FFmpegError
+from av.video.codeccontext import VideoCodecContext
+
+from robot_bridge.protocol.messages import Media
+from server.media.errors import PayloadError, UnsupportedCodecError
+
+__all__ = ["PictureDecoder"]
+
+MIN_SIDE = 16  # pixels
+
+
+class PictureDecoder:
+    """Turns `yuv420p` and `mjpeg` payloads into yuv420p frames. Used from one thread."""
+
+    def __init__(self) -> None:
+        self._mjpeg: VideoCodecContext | None = None
+
+    def decode(self, media: Media) -> av.VideoFrame:
+        """The picture.
+
+        Raises:
+            PayloadError: the payload is not a picture of the size that `media` names.
+            UnsupportedCodecError: neither yuv420p nor mjpeg.
+        """
+        if media.codec == "yuv420p":
+            return _from_yuv420p(media)
+        if media.codec == "mjpeg":
+            return self._from_mjpeg(media)
+        raise UnsupportedCodecError(f"{media.codec} cannot be encoded again")
+
+    def _from_mjpeg(self, media: Media) -> av.VideoFrame:
+        if self._mjpeg is None:
+            self._mjpeg = av.CodecContext.create("mjpeg", "r")
+            self._mjpeg.thread_count = 1
+        try:
+            frames = self._mjpeg.decode(av.Packet(media.payload))
+        except (FFmpegError, ValueError) as error:
+            raise PayloadError(f"not a JPEG picture: {error}") from error
+        if not frames:
+            raise PayloadError("not a whole JPEG picture")
+        frame = frames[-1]
+        _check_size(frame.width, frame.height)
+        return frame.reformat(format="yuv420p", dst_color_range="MPEG")
+
+
+def _from_yuv420p(media: Media) -> av.VideoFrame:
+    width, height = media.width, media.height
+    _check_size(width, height)
+    if len(media.payload) != width * height * 3 // 2:
+        raise PayloadError(f"{len(media.payload)} bytes are not a yuv420p picture of {width}x{height}")
+    planes = np.frombuffer(media.payload, np.uint8).reshape(height * 3 // 2, width)
+    return av.VideoFrame.from_ndarray(planes, format="yuv420p")
+
+
+def _check_size(width: int, height: int) -> None:
+    if width < MIN_SIDE or height < MIN_SIDE or width % 2 or height % 2:
+        raise PayloadError(f"{width}x{height}: sides must be even and at least {MIN_SIDE} pixels")

@@ -1,0 +1,128 @@
+"""One camera or microphone: what is common to both."""
+
+import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Generic, Literal, TypeVar
+
+from robot_bridge.protocol.messages import Media
+from robot_bridge.protocol.serial import event_gap
+from server.media.errors import MediaError
+from server.media.fanout import FanOut
+from server.media.frame import EncodedFrame
+from server.media.keyframes import KeyframeScheduler
+from server.media.metrics import MediaMetrics
+from server.media.output import Output
+from server.media.peer_stream import PeerStream
+from server.media.settings import MediaSettings
+
+__all__ = ["Encoded", "Stream"]
+
+Job = TypeVar("Job")
+
+
+class Encoded:
+    """What the worker made for one output."""
+
+    __slots__ = ("error", "frames", "output", "seconds")
+
+    def __init__(
+        self, output: Output, frames: Sequence[EncodedFrame], seconds: float, error: MediaError | None = None
+    ) -> None:
+        self.output = output
+        self.frames = frames
+        self.seconds = seconds
+        self.error = error
+
+
+class Stream(ABC, Generic[Job]):
+    """Feeds one worker thread and hands what it encodes to the fan-out.
+
+    `feed` and everything but `_work` run on the event loop; `_work` alone touches decoders and encoders.
+    """
+
+    kind: Literal["video", "audio"]
+    codecs: tuple[str, ...]
+
+    def __init__(self, name: str, label: str, settings: MediaSettings, fan_out: FanOut, metrics: MediaMetrics) -> None:
+        self.name = name
+        self.label = label
+        self._settings = settings
+        self._fan_out = fan_out
+        self._metrics = metrics
+        self._last_stamp: int | None = None
+        self._wake = asyncio.Event()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"media-{name}")
+        self._peers = metrics.peers.labels(name)
+        self._frames_in = metrics.frames_in.labels(name)
+        self.outputs = {
+            codec: Output(
+                name,
+                codec,
+                KeyframeScheduler(settings.keyframe_interval_seconds, settings.keyframe_spacing_seconds),
+                metrics,
+            )
+            for codec in self.codecs
+        }
+
+    def join(self, codec: str, target: PeerStream) -> None:
+        self.outputs[codec].join(target)
+        self._peers.inc()
+
+    def leave(self, codec: str, target: PeerStream) -> None:
+        """Idempotent."""
+        if target in self.outputs[codec].targets:
+            self.outputs[codec].leave(target)
+            self._peers.dec()
+        self._fan_out.forget(target)
+
+    def feed(self, media: Media, now: float, capture_time: float) -> None:
+        """Take a medium. `capture_time` is in s since 1970."""
+        self._frames_in.inc()
+        if self._last_stamp is not None and event_gap(media.stamp, self._last_stamp) < 0:
+            self._drop("stale_stamp")
+            return
+        self._last_stamp = media.stamp
+        if any(output.targets for output in self.outputs.values()):
+            self._enqueue(media, now, capture_time)
+
+    def _drop(self, stage: str, count: int = 1) -> None:
+        self._metrics.dropped.labels(self.name, stage).inc(count)
+
+    def _publish(self, output: Output, frame: EncodedFrame) -> None:
+        output.count(frame)
+        self._fan_out.publish(frame, output.targets)
+
+    async def run(self) -> None:
+        """Encode until cancelled."""
+        loop = asyncio.get_running_loop()
+        try:
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                while (job := self._next_job()) is not None:
+                    for encoded in await loop.run_in_executor(self._thread, self._work, job):
+                        self._finish(encoded)
+        finally:
+            await asyncio.to_thread(self._thread.shutdown)
+
+    def _finish(self, encoded: Encoded) -> None:
+        if encoded.error is not None:
+            self._drop(encoded.error.name)
+        else:
+            encoded.output.encode_seconds.observe(encoded.seconds)
+        for frame in encoded.frames:
+            self._publish(encoded.output, frame)
+
+    @abstractmethod
+    def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
+        """Keep a medium for the worker; never blocks."""
+
+    @abstractmethod
+    def _next_job(self) -> Job | None:
+        """What the worker does next, decided now; None when there is nothing."""
+
+    @abstractmethod
+    def _work(self, job: Job) -> list[Encoded]:
+        """Runs in the stream's thread. Raises nothing: errors of media come back as results."""
