@@ -1,0 +1,42 @@
+"""Drives the holonomic base: velocities in the base frame in, wheel motors and a parking brake out."""
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from robot_bridge.robots.mobile_manipulator.simulation import BASE, base_from_world
+
+__all__ = ["BaseDrive"]
+
+Array = npt.NDArray[np.float64]
+
+PARKING_SPEED: Final = 0.02  # m/s and rad/s below which a base that is told to rest is parked
+PARKING_SLIP: Final = np.array((0.01, 0.01, 0.02))  # m, m, rad: pushed farther, a parked base gives way
+PARKING_STIFFNESS: Final = np.array((30000.0, 30000.0, 2500.0))  # N/m, N/m, N m/rad
+
+
+class BaseDrive:
+    """Velocity motors while driving. At rest a brake holds the place, else what the arm pushes would push it away."""
+
+    def __init__(self) -> None:
+        self._parked: Array | None = None  # pose that the brake holds; None while driving
+
+    def release(self) -> None:
+        """Forget the held place."""
+        self._parked = None
+
+    def drive(self, data: Any, velocity: Array) -> None:
+        """Use `velocity` (vx, vy, wz in the base frame) for the coming step."""
+        data.ctrl[BASE] = base_from_world(data.qpos[2]).T @ velocity
+        data.qfrc_applied[BASE] = self._brake(data.qpos[BASE], data.qvel[BASE]) if not velocity.any() else 0.0
+        if velocity.any():
+            self._parked = None
+
+    def _brake(self, pose: Array, speed: Array) -> Array:
+        if self._parked is None:
+            if np.abs(speed).max() > PARKING_SPEED:
+                return np.zeros(3)
+            self._parked = pose.copy()
+        self._parked = np.clip(self._parked, pose - PARKING_SLIP, pose + PARKING_SLIP)
+        return PARKING_STIFFNESS * (self._parked - pose)

@@ -1,0 +1,61 @@
+"""What the robot's skin feels: the forces of all outside contacts on base and arm, as one wrench.
+
+The wrench is the sum over every contact between a body of the robot (base, arm, tool) and anything else, expressed in
+the frame of the arm's mount on the base (x forward, y left, z up, origin on top of the drum). So pushing an object
+with the tool and bumping the base into a wall are both felt, against the direction that the stick drives to. Contacts
+of the robot with itself and its own weight and inertia are no part of it.
+"""
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from robot_bridge.robots.mobile_manipulator.simulation import MOUNT
+
+__all__ = ["ContactReading", "ContactSense"]
+
+Array = npt.NDArray[np.float64]
+
+TIME_CONSTANT: Final = 0.03  # s of the wrench's low-pass
+
+
+class ContactReading(NamedTuple):
+    wrench: Array  # fx fy fz (N), tx ty tz (N m) on the robot in the mount's frame, unfiltered
+    normal: float  # N, sum of the normal forces of all contacts in the room
+    rubbing: float  # N, sum of the friction forces on the robot
+
+
+class ContactSense:
+    """Reads MuJoCo's contacts; `wrench` is low-passed."""
+
+    def __init__(self, model: Any) -> None:
+        base = model.body("base").id
+        self._is_robot = model.body_rootid[model.geom_bodyid] == base  # per geom
+        self._mount = model.body(MOUNT).id
+        self.wrench: Array = np.zeros(6)
+
+    def clear(self) -> None:
+        self.wrench = np.zeros(6)
+
+    def update(self, data: Any, seconds: float) -> ContactReading:
+        """Read the contacts of the last step, `seconds` after the reading before."""
+        reading = self.read(data)
+        self.wrench = self.wrench + (reading.wrench - self.wrench) * -np.expm1(-seconds / TIME_CONSTANT)
+        return reading
+
+    def read(self, data: Any) -> ContactReading:
+        contact = data.contact
+        active = np.flatnonzero(contact.efc_address >= 0)
+        if not active.size:
+            return ContactReading(np.zeros(6), 0.0, 0.0)
+        # With elliptic cones a contact's rows are its force along the contact frame: normal, then two tangents.
+        local = data.efc_force[contact.efc_address[active][:, None] + np.arange(3)]
+        robot = self._is_robot[contact.geom[active]]
+        sign = robot[:, 1].astype(float) - robot[:, 0]  # the force acts on the second geom; 0 inside the robot
+        world = np.einsum("nij,ni->nj", contact.frame[active].reshape(-1, 3, 3), local) * sign[:, None]
+        lever = contact.pos[active] - data.xpos[self._mount]
+        rotation = data.xmat[self._mount].reshape(3, 3)
+        force, torque = world.sum(axis=0) @ rotation, np.cross(lever, world).sum(axis=0) @ rotation
+        rubbing = float(np.hypot(local[:, 1], local[:, 2]) @ np.abs(sign))
+        return ContactReading(np.concatenate((force, torque)), float(local[:, 0].sum()), rubbing)

@@ -1,0 +1,40 @@
+"""What the mobile manipulator tells a console about itself."""
+
+from typing import Any, Final
+
+from robot_bridge.protocol.description import Camera, Microphone, RobotDescription, WrenchSensor
+from robot_bridge.robots.mobile_manipulator.controls import AXES, LAYERS
+from robot_bridge.robots.mobile_manipulator.kinematics import describe_bodies, describe_joints
+from robot_bridge.robots.mobile_manipulator.range_ring import RING
+from robot_bridge.robots.mobile_manipulator.simulation import MOUNT
+
+__all__ = ["CAMERAS", "MICROPHONE", "describe"]
+
+CAMERAS: Final = (  # names are those of the model's cameras
+    Camera(name="overview", label="Overview", width=640, height=480, frame_rate=30.0),
+    Camera(name="wrist", label="Wrist", width=320, height=240, frame_rate=15.0),
+)
+MICROPHONE: Final = Microphone(name="microphone", label="Microphone", sample_rate=48_000)
+
+WRENCH: Final = WrenchSensor(
+    name="contact", body=MOUNT, threshold_force=1.0, full_scale_force=150.0, full_scale_torque=80.0
+)
+
+
+def describe(model: Any) -> RobotDescription:
+    """The description that belongs to the compiled model."""
+    return RobotDescription(
+        name="mobile-manipulator",
+        label="Mobile manipulator (MuJoCo)",
+        axes=AXES,
+        joints=describe_joints(model),
+        layers=LAYERS,
+        cameras=CAMERAS,
+        microphones=(MICROPHONE,),
+        wrench=WRENCH,
+        ranges=RING,
+        bodies=describe_bodies(model),
+        hold=0.3,
+        max_event_age=2.0,
+        max_event_rate=25.0,
+    )

@@ -1,0 +1,28 @@
+"""How OpenGL is reached, and what to say when it is not there. Imports nothing of MuJoCo."""
+
+import os
+
+from robot_bridge.errors import RobotUnavailable
+
+__all__ = ["choose_graphics", "graphics_unavailable"]
+
+ADVICE = (
+    "Its cameras need OpenGL through EGL: on Debian or Ubuntu install libegl1 and libgl1-mesa-dri. "
+    "`--robot planar` runs without OpenGL."
+)
+
+
+def choose_graphics() -> None:
+    """Render off screen through EGL unless the environment says otherwise; no effect after mujoco was imported."""
+    os.environ.setdefault("MUJOCO_GL", "egl")
+    # Without a GPU Mesa rasterises on the CPU. More threads than one make a picture no sooner at this size and
+    # cost a third more processor time.
+    os.environ.setdefault("LP_NUM_THREADS", "1")
+
+
+def graphics_unavailable(cause: BaseException) -> RobotUnavailable:
+    """The error for an OpenGL that failed with `cause`."""
+    choice = os.environ.get("MUJOCO_GL", "")
+    return RobotUnavailable(
+        f"mobile-manipulator: OpenGL is not available (MUJOCO_GL={choice}: {type(cause).__name__}: {cause}). {ADVICE}"
+    )

@@ -1,0 +1,57 @@
+"""What of the physics can be heard, gathered tick by tick until a segment of sound is made of it."""
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from robot_bridge.robots.mobile_manipulator.contact_sense import ContactReading
+from robot_bridge.robots.mobile_manipulator.simulation import ARM, BASE, JOINTS
+
+__all__ = ["Heard", "Hearing"]
+
+DRUM_RADIUS: Final = 0.31  # m, turns the base's turning into the speed of its wheels
+KNOCK: Final = 6.0  # N, smaller jumps of contact force make no sound
+MASS_PER_OBJECT: Final = 1.0  # kg, movable objects are heard sliding alike
+
+
+class Heard(NamedTuple):
+    """Over one segment: means of the speeds and of the rubbing, the sum of the knocks."""
+
+    wheels: float = 0.0  # m/s
+    arm: float = 0.0  # rad/s, the three large joints
+    wrist: float = 0.0  # rad/s, the three small joints
+    rubbing: float = 0.0  # W, roughly
+    knocks: float = 0.0  # N, sum of sudden rises of contact force
+
+
+class Hearing:
+    """`listen` after each tick, `take` once per segment."""
+
+    def __init__(self, model: Any) -> None:
+        free = [index for index in range(model.njnt) if index >= JOINTS]
+        self._objects = model.jnt_dofadr[free][:, None] + np.arange(3)  # the linear velocity of each movable object
+        self._sums = np.zeros(4)
+        self._knocks = 0.0
+        self._ticks = 0
+        self._pressure: float | None = None  # N, of all contacts at the last tick
+
+    def listen(self, data: Any, contacts: ContactReading) -> None:
+        base, arm = data.qvel[BASE], np.abs(data.qvel[ARM])
+        wheels = float(np.hypot(base[0], base[1]) + DRUM_RADIUS * abs(base[2]))
+        objects = float(np.linalg.norm(data.qvel[self._objects], axis=1).sum())
+        rubbing = contacts.rubbing * (wheels + 0.3 * arm.sum()) + objects * MASS_PER_OBJECT * 3.0
+        self._sums += (wheels, arm[:3].sum(), arm[3:].sum(), rubbing)
+        self._ticks += 1
+        if self._pressure is not None:
+            rise = contacts.normal - self._pressure
+            self._knocks += max(0.0, rise - KNOCK - 0.2 * self._pressure)
+        self._pressure = contacts.normal
+
+    def take(self) -> Heard:
+        """What was heard since the last call; the speeds stay when there was no tick in between."""
+        if not self._ticks:
+            return Heard()
+        wheels, arm, wrist, rubbing = (self._sums / self._ticks).tolist()
+        heard = Heard(wheels, arm, wrist, rubbing, self._knocks)
+        self._sums, self._knocks, self._ticks = np.zeros(4), 0.0, 0
+        return heard

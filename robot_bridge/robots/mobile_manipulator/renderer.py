@@ -1,0 +1,55 @@
+"""The render thread: OpenGL contexts belong to a thread, so all pictures are drawn and converted in this one."""
+
+import asyncio
+import concurrent.futures
+from typing import Any
+
+import av
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from robot_bridge.protocol.description import Camera
+from robot_bridge.robots.mobile_manipulator.canvas import Canvas
+from robot_bridge.robots.mobile_manipulator.graphics import graphics_unavailable
+
+__all__ = ["Renderer", "yuv420p"]
+
+
+class Renderer:
+    """Draws one picture at a time. It releases the interpreter while it draws, so that the loop runs on."""
+
+    def __init__(self, model: Any, width: int, height: int) -> None:
+        """Returns when the context is there.
+
+        Raises:
+            RobotUnavailable: OpenGL cannot be used here.
+        """
+        self._thread = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="render")
+        try:
+            self._canvas: Canvas | None = self._thread.submit(Canvas, model, width, height).result()
+        except (ImportError, RuntimeError, AttributeError, OSError, mujoco.FatalError) as error:
+            self._thread.shutdown()
+            raise graphics_unavailable(error) from error
+
+    async def picture(self, camera: Camera, positions: npt.NDArray[np.float64]) -> bytes:
+        """`camera`'s view of the state as yuv420p."""
+        return await asyncio.get_running_loop().run_in_executor(self._thread, self._draw, camera, positions)
+
+    def close(self) -> None:
+        """Waits for the picture being drawn. May be called again."""
+        if self._canvas is not None:
+            self._thread.submit(self._canvas.close)
+            self._canvas = None
+            self._thread.shutdown()
+
+    def _draw(self, camera: Camera, positions: npt.NDArray[np.float64]) -> bytes:
+        if self._canvas is None:
+            raise RuntimeError("the renderer is closed")
+        return yuv420p(self._canvas.draw(camera.name, camera.width, camera.height, positions))
+
+
+def yuv420p(rgb: npt.NDArray[np.uint8]) -> bytes:
+    """Planes Y, U, V without padding, BT.601 limited range."""
+    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(rgb), format="rgb24").reformat(format="yuv420p")
+    return frame.to_ndarray().tobytes()

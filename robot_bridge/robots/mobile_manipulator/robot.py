@@ -1,0 +1,93 @@
+"""The mobile manipulator: its drives, senses, cameras and microphone around one simulation."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.robots.base import Measurement, MediaSource, Robot
+from robot_bridge.robots.mobile_manipulator.arm_drive import ArmDrive
+from robot_bridge.robots.mobile_manipulator.base_drive import BaseDrive
+from robot_bridge.robots.mobile_manipulator.camera import CameraSource
+from robot_bridge.robots.mobile_manipulator.contact_sense import ContactSense
+from robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE, describe
+from robot_bridge.robots.mobile_manipulator.hearing import Hearing
+from robot_bridge.robots.mobile_manipulator.microphone import MicrophoneSource
+from robot_bridge.robots.mobile_manipulator.range_ring import RangeSensors
+from robot_bridge.robots.mobile_manipulator.renderer import Renderer
+from robot_bridge.robots.mobile_manipulator.simulation import BASE, Simulation
+
+__all__ = ["MobileManipulator"]
+
+STEPS_PER_TICK: Final = 2
+DIGITS: Final = 5  # of measured values on the wire
+REST_SPEED: Final = 0.02  # m/s and rad/s, of every joint
+
+
+class MobileManipulator(Robot):
+    """Axes: the base's velocity in its own frame, then the tool's twist against the base, in the base frame."""
+
+    def __init__(self) -> None:
+        """Raises:
+        RobotUnavailable: OpenGL cannot be used here.
+        """
+        self.simulation = Simulation()
+        model = self.simulation.model
+        self.tick_seconds = STEPS_PER_TICK * float(model.opt.timestep)
+        self._description = describe(model)
+        self._base = BaseDrive()
+        self._arm = ArmDrive(self.simulation)
+        self._contacts = ContactSense(model)
+        self._ranges = RangeSensors(model)
+        self._hearing = Hearing(model)
+        self._values = np.zeros(len(self._description.axes))
+        self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)
+        self._sources: tuple[MediaSource, ...] = (
+            *(CameraSource(camera, self._renderer, self.simulation.snapshot) for camera in CAMERAS),
+            MicrophoneSource(MICROPHONE, self._hearing.take),
+        )
+
+    def describe(self) -> RobotDescription:
+        return self._description
+
+    def apply(self, values: Sequence[float]) -> None:
+        self._values[:] = values
+
+    def tick(self) -> None:
+        data = self.simulation.data
+        self._base.drive(data, self._values[BASE])
+        self._arm.drive(self._values[BASE.stop :], self.tick_seconds)
+        if not self.simulation.step(STEPS_PER_TICK):
+            self._base.release()
+            self._arm.release()
+            self._contacts.clear()
+        self._hearing.listen(data, self._contacts.update(data, self.tick_seconds))
+
+    def measure(self) -> Measurement:
+        simulation = self.simulation
+        axes = np.concatenate((simulation.base_velocity(), simulation.tool_twist()))
+        return Measurement(
+            axes=on_wire(axes),
+            joints=on_wire(simulation.joints),
+            wrench=on_wire(self._contacts.wrench),
+            ranges=on_wire(self._ranges.read(simulation.data)),
+            at_rest=bool(np.abs(simulation.joint_velocities).max() < REST_SPEED),
+            faults=self._faults(),
+        )
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._sources
+
+    def close(self) -> None:
+        self._renderer.close()
+
+    def _faults(self) -> list[str]:
+        restarts = self.simulation.restarts
+        diverged = [f"the simulation diverged and was restarted ({restarts} times)"] if restarts else []
+        return [*diverged, *self._arm.faults]
+
+
+def on_wire(values: np.typing.NDArray[np.float64]) -> list[float]:
+    """Rounded to keep messages small; never -0."""
+    return [value + 0.0 for value in np.round(values, DIGITS).tolist()]

@@ -1,0 +1,87 @@
+"""The physics: the model, its state, and where the robot's parts are in MuJoCo's arrays."""
+
+from importlib.resources import files
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["ARM", "BASE", "MOUNT", "TOOL_TIP", "Simulation", "load_model"]
+
+Array = npt.NDArray[np.float64]
+
+# The robot's joints come first in the model, and its actuators have the joints' order: these index qpos, qvel and ctrl.
+BASE: Final = slice(0, 3)  # x, y (m, world frame), yaw (rad)
+ARM: Final = slice(3, 9)  # waist, shoulder, elbow, roll, bend, twist (rad)
+JOINTS: Final = 9
+MOUNT: Final = "mount"  # where the arm stands on the base; axes as the base's
+TOOL_TIP: Final = "tool_tip"
+
+
+def load_model() -> Any:
+    """The compiled MjModel."""
+    return mujoco.MjModel.from_xml_string(files(__package__).joinpath("model.xml").read_text())
+
+
+class Simulation:
+    """Steps the physics. `restarts` counts how often a diverged state had to be put back to its beginning."""
+
+    def __init__(self) -> None:
+        self.model = load_model()
+        self.data = mujoco.MjData(self.model)
+        self.restarts = 0
+        self._home = self.model.key("home").id
+        self._tip = self.model.site(TOOL_TIP).id
+        self._jacobian = np.zeros((6, self.model.nv))
+        self.restart()
+
+    def restart(self) -> None:
+        """Everything where it was at the beginning, at rest."""
+        mujoco.mj_resetDataKeyframe(self.model, self.data, self._home)
+        self.data.ctrl[ARM] = self.data.qpos[ARM]
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self, count: int) -> bool:
+        """Let `count` timesteps pass. False if the state diverged and was put back to its beginning."""
+        before = self.data.time
+        mujoco.mj_step(self.model, self.data, count)
+        if self.data.time > before and np.isfinite(self.data.qvel).all():
+            return True
+        self.restarts += 1  # MuJoCo resets the state, and with it the time, when it finds a value that is not finite
+        self.restart()
+        return False
+
+    @property
+    def joints(self) -> Array:
+        """Positions of the robot's joints, base first (a view)."""
+        return self.data.qpos[:JOINTS]  # type: ignore[no-any-return]
+
+    @property
+    def joint_velocities(self) -> Array:
+        return self.data.qvel[:JOINTS]  # type: ignore[no-any-return]
+
+    def snapshot(self) -> Array:
+        """Everything a picture needs of the state now."""
+        return self.data.qpos.copy()  # type: ignore[no-any-return]
+
+    def base_velocity(self) -> Array:
+        """vx, vy, wz of the base in its own frame."""
+        return base_from_world(self.data.qpos[2]) @ self.data.qvel[BASE]  # type: ignore[no-any-return]
+
+    def tool_jacobian(self) -> Array:
+        """Twist of the tool tip against the base, in the base frame, per velocity of each arm joint (6 x 6)."""
+        mujoco.mj_jacSite(self.model, self.data, self._jacobian[:3], self._jacobian[3:], self._tip)
+        rotation = base_from_world(self.data.qpos[2])
+        arm = self._jacobian[:, ARM]
+        return np.vstack((rotation @ arm[:3], rotation @ arm[3:]))
+
+    def tool_twist(self) -> Array:
+        """The tool's measured twist against the base, in the base frame."""
+        return self.tool_jacobian() @ self.data.qvel[ARM]  # type: ignore[no-any-return]
+
+
+def base_from_world(yaw: float) -> Array:
+    """Rotation that expresses a world vector in the base frame."""
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    return np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)))
