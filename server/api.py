@@ -1,0 +1,134 @@
+"""The HTTP API besides WHEP: what is going on, stop, reset, health, metrics (docs/console-api.md)."""
+
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Depends, Request, Response
+
+from robot_bridge.protocol.console import Participant, Seat, StreamInfo
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Feedback, StopState, Text
+from server.access import Identity, require_role
+from server.body import read_json
+from server.errors import LinkDown
+from server.services import authorized, services
+
+__all__ = ["Health", "ScenePath", "SessionInfo", "router"]
+
+router = APIRouter()
+Caller = Annotated[Identity, Depends(authorized)]
+
+
+class LinkInfo(msgspec.Struct, frozen=True, kw_only=True):
+    up: bool
+    detail: str  # why it is down
+
+
+class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /api/session."""
+
+    epoch: str  # "" before the robot was reached
+    event: int
+    stopped: bool
+    stop: StopState
+    seat: Seat
+    participants: list[Participant]
+    link: LinkInfo
+    you: dict[str, str]  # role and name of the token
+    peers: dict[str, list[StreamInfo]]  # streams of each peer
+    description: RobotDescription | None
+    feedback: Feedback | None
+
+
+class StopRequest(msgspec.Struct, frozen=True):
+    """Body of POST /api/stop."""
+
+    reason: Text = ""
+
+
+class Health(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /healthz. `degraded`: the console runs, the robot cannot be reached."""
+
+    status: str
+    robot_link: str
+    detail: str = ""
+
+
+class ScenePath(msgspec.Struct, frozen=True):
+    """Answer of POST /api/scene."""
+
+    path: str
+
+
+class Delivered(msgspec.Struct, frozen=True):
+    """Answer of POST /api/stop and /api/reset."""
+
+    delivered: bool
+    event: int
+
+
+@router.get("/api/session")
+async def session(request: Request, caller: Caller) -> Response:
+    console = services(request).console
+    return _json(
+        SessionInfo(
+            epoch=console.clock.epoch,
+            event=console.clock.event,
+            stopped=console.clock.stop.stopped,
+            stop=console.clock.stop,
+            seat=console.seat.seat,
+            participants=console.peers.participants().participants,
+            link=LinkInfo(up=console.robot.up, detail=console.robot.detail),
+            you={"role": caller.role, "name": caller.name},
+            peers={peer.id: peer.streams for peer in console.peers},
+            description=console.robot.description,
+            feedback=console.clock.feedback,
+        )
+    )
+
+
+@router.post("/api/stop")
+async def stop(request: Request, caller: Caller) -> Response:
+    """Anyone with a token."""
+    console = services(request).console
+    wanted = await read_json(request, StopRequest)
+    if not console.stop(caller.name, "http", wanted.reason):
+        raise LinkDown("the robot cannot be told now; the stop is kept and sent first when the link is back")
+    return _json(Delivered(True, console.clock.event))
+
+
+@router.post("/api/reset")
+async def reset(request: Request, caller: Caller) -> Response:
+    require_role(caller, "operator")
+    console = services(request).console
+    console.reset(caller.name, "http")
+    return _json(Delivered(True, console.clock.event))
+
+
+@router.post("/api/scene")
+async def scene(request: Request, caller: Caller) -> Response:
+    """A path for an iframe that shows the 3D scene; its ticket is good for a few minutes."""
+    here = services(request)
+    here.scene_or_error()
+    base = str(request.base_url).replace("http", "ws", 1)
+    ticket = here.access.issue_ticket()
+    return _json(ScenePath(f"/scene/?websocket={base}scene/ws/{ticket}&darkMode&hideViserLogo"))
+
+
+@router.get("/healthz")
+async def healthz(request: Request) -> Response:
+    robot = services(request).console.robot
+    health = Health(
+        status="ok" if robot.up else "degraded", robot_link="up" if robot.up else "down", detail=robot.detail
+    )
+    return _json(health)
+
+
+@router.get("/metrics")
+async def metrics(request: Request) -> Response:
+    text = services(request).metrics.text()
+    return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})
+
+
+def _json(answer: msgspec.Struct) -> Response:
+    return Response(msgspec.json.encode(answer), media_type="application/json", headers={"Cache-Control": "no-store"})

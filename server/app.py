@@ -1,0 +1,140 @@
+"""The console's app, put together in one place: routes, middleware, error map, lifespan."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import msgspec
+import structlog
+from fastapi import Depends, FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.middleware.cors import CORSMiddleware
+from starlette.requests import HTTPConnection
+
+from server import api, scene_proxy, whep
+from server.access import Access
+from server.console import Console
+from server.errors import ConsoleError, http_error
+from server.media.aiortc_private import restrict_ice_hosts
+from server.media.plane import MediaPlane
+from server.metrics import Metrics
+from server.page import page_router
+from server.scene import SceneView
+from server.security import SAFE_METHODS, SecurityHeaders, check_origin
+from server.services import Services, services
+from server.settings import Settings
+
+__all__ = ["create_app", "make_access"]
+
+log = structlog.get_logger(__name__)
+
+LOOPBACK = "127.0.0.1"
+
+
+def create_app(settings: Settings, access: Access | None = None) -> FastAPI:
+    """The app. It connects to the robot while its lifespan runs; `access` stands in for one made from the settings."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        _restrict_ice(settings)
+        metrics = Metrics()
+        media = MediaPlane(settings.media, metrics.registry)
+        scene = await _start_scene(settings, metrics)
+        console = Console(settings, metrics, media, scene)
+        app.state.services = Services(settings, access or make_access(settings), metrics, console, media, scene)
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                running = [tasks.create_task(console.run(), name="console")]
+                if scene is not None:
+                    running.append(tasks.create_task(scene.run(), name="scene"))
+                yield
+                for task in running:
+                    task.cancel()
+        finally:
+            await media.close()
+            if scene is not None:
+                await scene.close()
+
+    app = FastAPI(
+        title="Lockstep",
+        lifespan=lifespan,
+        dependencies=[Depends(_same_origin)],
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+    )
+    app.include_router(whep.router)
+    app.include_router(api.router)
+    app.include_router(scene_proxy.router)
+    app.include_router(page_router())
+    app.add_exception_handler(ConsoleError, _answer_console_error)
+    app.add_exception_handler(HTTPException, _answer_http_exception)
+    app.add_exception_handler(RequestValidationError, _answer_validation_error)
+    if settings.allowed_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=list(settings.allowed_origins),
+            allow_methods=["GET", "POST", "PATCH", "DELETE"],
+            allow_headers=["Authorization", "Content-Type"],
+            expose_headers=["Location"],
+        )
+    app.add_middleware(SecurityHeaders)
+    return app
+
+
+def make_access(settings: Settings) -> Access:
+    return Access(settings.secret.get_secret_value(), settings.token_seconds, settings.scene_ticket_seconds)
+
+
+def _restrict_ice(settings: Settings) -> None:
+    """A console that only this machine can reach offers only loopback to its peers."""
+    if settings.ice_hosts:
+        restrict_ice_hosts(settings.ice_hosts)
+    elif settings.bound_to_loopback:
+        restrict_ice_hosts([settings.host if settings.host != "localhost" else LOOPBACK])
+
+
+async def _start_scene(settings: Settings, metrics: Metrics) -> SceneView | None:
+    if not settings.scene:
+        return None
+    scene = SceneView(settings.scene_hz, settings.max_scene_viewers, metrics)
+    await scene.start()
+    return scene
+
+
+def _same_origin(connection: HTTPConnection) -> None:
+    """WebSockets check for themselves: a refusal is another thing there."""
+    if connection.scope["type"] == "http" and connection.scope["method"] not in SAFE_METHODS:
+        check_origin(connection.headers, services(connection).settings.allowed_origins)
+
+
+async def _answer_console_error(request: Request, error: Exception) -> Response:
+    if not isinstance(error, ConsoleError):
+        raise error
+    return _answer(request, error)
+
+
+def _answer(request: Request, error: ConsoleError) -> Response:
+    entry = http_error(error)
+    services(request).metrics.bad_input.labels("http", entry.name).inc()
+    return _error_response(entry.status, entry.name, error.detail, entry.headers)
+
+
+async def _answer_http_exception(request: Request, error: Exception) -> Response:
+    """Routes that do not exist, methods that are not allowed."""
+    if not isinstance(error, HTTPException):
+        raise error
+    name = {404: "not_found", 405: "method_not_allowed"}.get(error.status_code, "http_error")
+    services(request).metrics.bad_input.labels("http", name).inc()
+    return _error_response(error.status_code, name, error.detail, dict(error.headers or {}))
+
+
+async def _answer_validation_error(request: Request, error: Exception) -> Response:
+    services(request).metrics.bad_input.labels("http", "bad_parameter").inc()
+    return _error_response(422, "bad_parameter", "a parameter has a value that is not allowed", {})
+
+
+def _error_response(status: int, name: str, detail: str, headers: dict[str, str]) -> Response:
+    body = msgspec.json.encode({"error": name, "detail": detail})
+    return Response(body, status, {**headers, "Cache-Control": "no-store"}, media_type="application/json")

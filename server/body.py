@@ -1,0 +1,56 @@
+"""Reads request bodies with a bound, before anything else looks at them."""
+
+from typing import TypeVar
+
+import msgspec
+from fastapi import Request
+
+from server.errors import BadJson, BodyTooLarge, WrongMediaType
+
+__all__ = ["media_type", "read_json", "read_text"]
+
+MAX_JSON = 4096  # bytes
+
+Body = TypeVar("Body", bound=msgspec.Struct)
+
+
+def media_type(request: Request) -> str:
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+async def read_text(request: Request, expected: str, bound: int) -> str:
+    """The body as text.
+
+    Raises:
+        WrongMediaType: it is not declared as `expected`, or it is not UTF-8.
+        BodyTooLarge: longer than `bound` bytes; reading stops there.
+    """
+    if media_type(request) != expected:
+        raise WrongMediaType(f"the Content-Type has to be {expected}")
+    try:
+        return (await _read(request, bound)).decode()
+    except UnicodeDecodeError as error:
+        raise WrongMediaType("the body is not UTF-8") from error
+
+
+async def read_json(request: Request, kind: type[Body]) -> Body:
+    """The body as `kind`; an empty body is `kind()`.
+
+    Raises:
+        BadJson: not JSON, or a field of the wrong type.
+        BodyTooLarge: longer than MAX_JSON.
+    """
+    body = await _read(request, MAX_JSON)
+    try:
+        return msgspec.json.decode(body, type=kind) if body else kind()
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise BadJson(str(error)) from error
+
+
+async def _read(request: Request, bound: int) -> bytes:
+    body = bytearray()
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > bound:
+            raise BodyTooLarge(f"more than {bound} bytes")
+    return bytes(body)

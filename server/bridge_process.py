@@ -1,0 +1,118 @@
+"""Runs a robot bridge as a process of its own, beside the console: what a robot renders never holds up a command."""
+
+import asyncio
+import json
+import shutil
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+from server.backoff import Backoff
+
+__all__ = ["BridgeFailed", "BridgeProcess"]
+
+START_TIMEOUT = 60.0  # s; a physics engine and a GL context may have to be loaded
+STOP_TIMEOUT = 5.0  # s to bring the robot to rest and go
+MAX_LINE = 4096
+
+
+class BridgeFailed(Exception):
+    """The bridge could not be started; its own output says why."""
+
+    def __init__(self, code: int | None) -> None:
+        super().__init__(code)
+        self.code = code
+
+    def __str__(self) -> str:
+        return "the robot bridge did not start in time" if self.code is None else f"the robot bridge ended: {self.code}"
+
+
+class BridgeProcess:
+    """`start` returns its address; then await `watch`, which starts it again when it dies. `close` ends it.
+
+    It keeps the port of its first run, so that the robot link finds it again.
+    """
+
+    def __init__(self, robot: str, host: str, port: int, options: list[str], say: Callable[[str], None]) -> None:
+        self._robot = robot
+        self._host = host
+        self._port = port
+        self._options = options
+        self._say = say
+        self._process: asyncio.subprocess.Process | None = None
+        self._backoff = Backoff(0.5, 10.0)
+
+    async def start(self) -> str:
+        """Its address, "tcp://host:port".
+
+        Raises:
+            BridgeFailed: it ended, or said nothing in time.
+        """
+        command = [
+            *(sys.executable, "-m", "robot_bridge", self._robot, "--json"),
+            *("--host", self._host, "--port", str(self._port), *self._options),
+        ]
+        if (setpriv := shutil.which("setpriv")) is not None:
+            command = [setpriv, "--pdeathsig", "TERM", *command]  # also when the console is killed
+        self._process = await asyncio.create_subprocess_exec(
+            *command,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            limit=MAX_LINE,
+            start_new_session=True,
+        )
+        try:
+            address = await self._read_address(self._process)
+        except BaseException:
+            await self.close()
+            raise
+        self._port = int(address.rpartition(":")[2])
+        return address
+
+    async def watch(self) -> None:
+        """Until cancelled."""
+        loop = asyncio.get_running_loop()
+        while True:
+            if self._process is not None:
+                since = loop.time()
+                code = await self._process.wait()
+                self._say(f"the robot bridge ended ({_meaning(code)}); starting it again")
+                if loop.time() - since > START_TIMEOUT:
+                    self._backoff.healthy()
+            await asyncio.sleep(self._backoff.next())
+            try:
+                self._say(f"the robot bridge runs again at {await self.start()}")
+            except BridgeFailed as error:
+                self._say(f"{error}; trying again")
+
+    async def close(self) -> None:
+        """Ends it, gently first. Idempotent."""
+        process, self._process = self._process, None
+        if process is None or process.returncode is not None:
+            return
+        with suppress(ProcessLookupError):
+            process.terminate()
+        try:
+            async with asyncio.timeout(STOP_TIMEOUT):
+                await process.wait()
+        except TimeoutError:
+            with suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+
+    async def _read_address(self, process: asyncio.subprocess.Process) -> str:
+        if process.stdout is None:
+            raise BridgeFailed(None)
+        try:
+            async with asyncio.timeout(START_TIMEOUT):
+                line = await process.stdout.readline()
+                if not line:
+                    raise BridgeFailed(await process.wait())
+        except TimeoutError as error:
+            raise BridgeFailed(None) from error
+        address: str = json.loads(line)["robot"]
+        return address
+
+
+def _meaning(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"

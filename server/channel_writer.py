@@ -1,0 +1,39 @@
+"""Writes to one data channel without ever filling it: what the channel does not take at once waits in an outbox."""
+
+from aiortc import RTCDataChannel
+
+from server.outbox import ChannelOutbox
+
+__all__ = ["ChannelWriter"]
+
+
+class ChannelWriter:
+    """Bytes are handed to the channel only while it has nothing buffered, so feedback is never queued behind feedback.
+
+    Attributes:
+        too_large: messages that the remote's max-message-size (RFC 8841 6) forbids
+    """
+
+    def __init__(self, channel: RTCDataChannel) -> None:
+        self._channel = channel
+        self.outbox = ChannelOutbox()
+        self.too_large = 0
+        channel.on("bufferedamountlow", self._flush)
+
+    def send(self, text: str) -> None:
+        self.outbox.put(text)
+        self._flush()
+
+    def send_newest(self, text: str) -> None:
+        self.outbox.put_newest(text)
+        self._flush()
+
+    def _flush(self) -> None:
+        while self._channel.readyState == "open" and self._channel.bufferedAmount == 0:
+            text = self.outbox.take()
+            if text is None:
+                return
+            try:
+                self._channel.send(text)
+            except ValueError:
+                self.too_large += 1

@@ -1,0 +1,78 @@
+"""Parses what clients send on data channels. Every failure is a named ChannelError; nothing else comes out."""
+
+from typing import Literal
+
+from robot_bridge.protocol.console import (
+    ClientMessage,
+    Rename,
+    Report,
+    SeatRelease,
+    SeatRequest,
+    decode_client_message,
+)
+from robot_bridge.protocol.errors import MessageError
+from robot_bridge.protocol.messages import Command, Ping, Reset, Rest, Stop
+from server.errors import BinaryMessage, Flood, MalformedMessage, MessageTooLarge, UnknownChannel, WrongChannel
+
+__all__ = ["CHANNELS", "MAX_MESSAGE", "ChannelName", "MessageBudget", "channel_name", "parse_message"]
+
+ChannelName = Literal["control", "session", "stop"]
+
+CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
+    "control": (Command, Rest, Report, Ping, Stop),  # a stop is never turned away for the channel it took
+    "session": (SeatRequest, SeatRelease, Rename, Stop),
+    "stop": (Stop, Reset),
+}
+
+MAX_MESSAGE = 16 * 1024  # bytes; a report of 32 streams is the largest, about 7 kB
+
+
+def channel_name(label: str) -> ChannelName:
+    """The channel with this label.
+
+    Raises:
+        UnknownChannel: we have no such channel.
+    """
+    for name in CHANNELS:
+        if label == name:
+            return name
+    raise UnknownChannel(f"the channels are {', '.join(CHANNELS)}")
+
+
+def parse_message(channel: ChannelName, data: object) -> ClientMessage:
+    """What a client sent on `channel`.
+
+    Raises:
+        BinaryMessage: not text.
+        MessageTooLarge: longer than MAX_MESSAGE.
+        MalformedMessage: not JSON, an unknown kind, or a field of the wrong type or range.
+        WrongChannel: this kind is not for this channel.
+    """
+    if not isinstance(data, str):
+        raise BinaryMessage("messages are text")
+    if len(data) > MAX_MESSAGE:
+        raise MessageTooLarge(f"{len(data)} characters, the bound is {MAX_MESSAGE}")
+    try:
+        message = decode_client_message(data)
+    except MessageError as error:
+        raise MalformedMessage(error.detail) from error
+    if not isinstance(message, CHANNELS[channel]):
+        raise WrongChannel(f"{type(message).__name__.lower()} does not belong on {channel}")
+    return message
+
+
+class MessageBudget:
+    """Token bucket: how many messages one peer may send. Stop messages do not ask."""
+
+    def __init__(self, rate: float, now: float) -> None:
+        self._rate = rate
+        self._level = rate
+        self._at = now
+
+    def spend(self, now: float) -> None:
+        """Raises Flood when more than `rate` messages a second come, after a burst of as many."""
+        self._level = min(self._rate, self._level + (now - self._at) * self._rate)
+        self._at = now
+        if self._level < 1:
+            raise Flood(f"more than {self._rate:g} messages a second")
+        self._level -= 1

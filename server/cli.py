@@ -1,0 +1,165 @@
+"""The command `lockstep`: `up` runs a robot and a console, `serve` only the console, `robot` only the robot."""
+
+import asyncio
+import json
+import logging
+import socket
+import sys
+from collections.abc import Coroutine
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvloop
+from pydantic import ValidationError
+
+from robot_bridge.cli import robot_app
+from robot_bridge.robots.registry import robot_names
+from server.app import create_app, make_access
+from server.bridge_process import BridgeFailed, BridgeProcess
+from server.links import ConsoleLinks, console_links
+from server.logs import configure_logs
+from server.serve import PortTaken, bind, running, wait_for_signal
+from server.services import Services
+from server.settings import Settings
+
+__all__ = ["app", "main"]
+
+EXIT_USAGE = 2
+EXIT_PORT_TAKEN = 3
+EXIT_BRIDGE = 4
+PATIENCE = 2.0  # s until somebody who waits for a robot is told so
+# A worker thread of ours (encoders, the 3D scene) may hold the interpreter this long while a command waits.
+SWITCH_INTERVAL = 0.0005  # s; Python's own is ten times that
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
+app.add_typer(robot_app, name="robot")
+
+Host = Annotated[str | None, typer.Option(help="Address to listen on; 127.0.0.1 unless set.")]
+Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the console; 0 takes any free one.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the links as one JSON line, once ready.")]
+IceHosts = Annotated[
+    list[str] | None, typer.Option("--ice-host", help="Address offered to browsers for media; may be given again.")
+]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings.")]
+
+
+@app.command()
+def up(
+    robot: Annotated[str, typer.Option(help=f"The robot: {', '.join(robot_names())}.")] = "mobile-manipulator",
+    robot_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the bridge; 0 takes any free one.")] = 5600,
+    event_log: Annotated[Path | None, typer.Option(help="The bridge appends what happens to events here.")] = None,
+    host: Host = None,
+    port: Port = None,
+    ice_host: IceHosts = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a simulated robot and the console, and print the links that open it."""
+    settings = _settings(host=host, port=port, ice_hosts=ice_host)
+    options = [] if event_log is None else ["--event-log", str(event_log)]
+    bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, _say)
+    _run(settings, bridge, as_json, quiet)
+
+
+@app.command()
+def serve(
+    robot: Annotated[str | None, typer.Option(help="Where the robot bridge is, tcp://host:port.")] = None,
+    host: Host = None,
+    port: Port = None,
+    ice_host: IceHosts = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run the console for a robot bridge that runs elsewhere."""
+    _run(_settings(robot=robot, host=host, port=port, ice_hosts=ice_host), None, as_json, quiet)
+
+
+def _settings(**flags: object) -> Settings:
+    """What the environment says, overridden by the flags that were given."""
+    given = {name: value for name, value in flags.items() if value is not None and value != []}
+    if isinstance(hosts := given.get("ice_hosts"), list):
+        given["ice_hosts"] = ",".join(hosts)
+    try:
+        return Settings(**given)  # type: ignore[arg-type]
+    except ValidationError as error:
+        for each in error.errors():
+            typer.echo(f"lockstep: {'.'.join(map(str, each['loc'])) or 'robot'}: {each['msg']}", err=True)
+        raise typer.Exit(EXIT_USAGE) from error
+
+
+def _run(settings: Settings, bridge: BridgeProcess | None, as_json: bool, quiet: bool) -> None:
+    configure_logs(logging.WARNING if quiet else logging.INFO)
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    try:
+        listener = bind(settings.host, settings.port)
+        uvloop.run(_serve(settings, listener, bridge, as_json))
+    except PortTaken as error:
+        _say(f"{error}; choose another with --port")
+        raise typer.Exit(EXIT_PORT_TAKEN) from error
+    except BridgeFailed as error:
+        _say(str(error))
+        raise typer.Exit(EXIT_BRIDGE) from error
+
+
+async def _serve(settings: Settings, listener: socket.socket, bridge: BridgeProcess | None, as_json: bool) -> None:
+    """Until a signal: the bridge first, then the console; the console ends first."""
+    stopping = asyncio.get_running_loop().create_task(wait_for_signal())
+    try:
+        if bridge is not None:
+            address = await _unless(stopping, bridge.start())
+            if address is None:
+                return
+            settings = settings.model_copy(update={"robot": address})
+        access = make_access(settings)
+        application = create_app(settings, access)
+        async with running(application, listener), asyncio.TaskGroup() as tasks:
+            watching = None if bridge is None else tasks.create_task(bridge.watch())
+            links = console_links(settings, listener, access)
+            announcing = tasks.create_task(_announce(application.state.services, links, as_json))
+            await stopping
+            for task in (watching, announcing):
+                if task is not None:
+                    task.cancel()
+    finally:
+        listener.close()
+        stopping.cancel()
+        with suppress(asyncio.CancelledError):
+            await stopping
+        if bridge is not None:
+            await bridge.close()
+
+
+async def _unless(stopping: asyncio.Task[None], starting: Coroutine[None, None, str]) -> str | None:
+    """What `starting` returns; None when we are asked to stop first."""
+    task = asyncio.get_running_loop().create_task(starting)
+    await asyncio.wait((task, stopping), return_when=asyncio.FIRST_COMPLETED)
+    if task.done():
+        return task.result()
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
+    return None
+
+
+async def _announce(here: Services, links: ConsoleLinks, as_json: bool) -> None:
+    """The links, once they lead to a robot. For people at once when the robot is not there yet."""
+    robot = here.console.robot
+    if not as_json and not robot.up:
+        with suppress(TimeoutError):
+            async with asyncio.timeout(PATIENCE):
+                await robot.reached.wait()
+        if not robot.up:
+            _say(f"waiting for the robot at {links.robot}: {robot.detail}")
+    await robot.reached.wait()
+    sys.stdout.write(json.dumps(links._asdict()) + "\n" if as_json else links.for_people())
+    sys.stdout.flush()
+
+
+def _say(text: str) -> None:
+    typer.echo(f"lockstep: {text}", err=True)
+
+
+def main() -> None:
+    app()

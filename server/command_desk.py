@@ -1,0 +1,177 @@
+"""The command desk: what may pass to the robot. No I/O, no clock.
+
+Every verb returns what to do; the shell does it. The desk never lets a second command pass while one is in flight
+on the robot link: a repeat of it is absorbed, and a repeat of the event already executed is answered from the
+feedback at hand. So the link's TCP never holds more than one command, and nothing is replayed after a stall.
+
+What happens to a command, in this order:
+
+| condition | outcome |
+|---|---|
+| the sender does not hold the seat | refused `no_seat` |
+| the robot link is down, or no feedback has come yet | refused `link_down` |
+| not one value per axis | refused `wrong_size` |
+| a value is NaN or infinite | refused `not_a_number` |
+| stopped, or a stop is on its way to the bridge | refused `stopped` |
+| its event is the current one | answered with the current feedback |
+| its event is the one in flight | absorbed |
+| its event is the next one, nothing is in flight | clamped, forwarded |
+| else | refused `out_of_order` |
+"""
+
+import math
+from typing import NamedTuple
+
+import msgspec
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, RefusalReason, Reset, Rest, Stop
+from robot_bridge.protocol.serial import event_after, is_newer
+from server.event_clock import EventClock
+from server.seat import ControlSeat
+
+__all__ = ["Absorbed", "Answer", "CommandDesk", "Forward", "Outcome", "Refuse"]
+
+STOP_REPEAT = 0.05  # s within which a further stop, with no reset between, says nothing new
+
+
+class Forward(NamedTuple):
+    """Send to the robot, now."""
+
+    message: Command | Rest | Stop | Reset
+
+
+class Answer(NamedTuple):
+    """Send to the peer that asked."""
+
+    feedback: Feedback
+
+
+class Refuse(NamedTuple):
+    """Tell the peer that asked."""
+
+    refusal: Refusal
+
+
+class Absorbed(NamedTuple):
+    """Nothing to do: the same is already on its way."""
+
+
+Outcome = Forward | Answer | Refuse | Absorbed
+
+
+class CommandDesk:
+    """Call `link_up` before anything is forwarded, `link_down` when the link ends, and show it all the bridge says."""
+
+    def __init__(self, clock: EventClock, seat: ControlSeat) -> None:
+        self._clock = clock
+        self._seat = seat
+        self._description: RobotDescription | None = None
+        self._link_is_up = False
+        self._in_flight: Command | None = None
+        self._sender = ""  # peer whose command is in flight
+        self._resting: Rest | None = None  # forwarded and not yet followed by a feedback
+        self._stop_pending = False  # a stop was forwarded, no feedback has shown it yet
+        self._last_stop_at = -math.inf
+
+    @property
+    def in_flight(self) -> Command | None:
+        return self._in_flight
+
+    def link_up(self, description: RobotDescription) -> None:
+        self._description = description
+        self._link_is_up = True
+        self._forget()
+
+    def link_down(self) -> None:
+        self._link_is_up = False
+        self._forget()
+
+    def command(self, peer: str, command: Command) -> Outcome:
+        description, feedback = self._description, self._clock.feedback
+        if not self._seat.holds(peer):
+            return self._refuse(command, "no_seat")
+        if not self._link_is_up or description is None or feedback is None:
+            return self._refuse(command, "link_down")
+        if len(command.values) != len(description.axes):
+            return self._refuse(command, "wrong_size", f"{len(description.axes)} values are needed")
+        if not all(map(math.isfinite, command.values)):
+            return self._refuse(command, "not_a_number")
+        if self._stop_pending or feedback.stop.stopped:
+            return self._refuse(command, "stopped")
+        if command.event == feedback.event:
+            return Answer(feedback)
+        if self._in_flight is not None and command.event == self._in_flight.event:
+            return Absorbed()
+        if self._in_flight is not None or command.event != event_after(feedback.event):
+            return self._refuse(command, "out_of_order")
+        self._in_flight = self._clamped(command, description)
+        self._sender = peer
+        return Forward(self._in_flight)
+
+    def rest(self, peer: str, rest: Rest) -> Outcome:
+        """A rest of the holder always passes. One that names an event that is far ahead names the next instead."""
+        if not self._seat.holds(peer):
+            return self._refuse(rest, "no_seat")
+        latest = event_after(self._clock.event)
+        return self._forward_rest(Rest(event=latest) if is_newer(rest.event, latest) else rest)
+
+    def abandon(self) -> Outcome:
+        """The holder is gone or gave up the seat: what it has under way is void too."""
+        return self._forward_rest(Rest(event=event_after(self._clock.event)))
+
+    def stop(self, by: str, reason: str, now: float) -> Forward | Absorbed:
+        """Anyone's, past every gate, also when the link is down: the shell keeps it until it can be said."""
+        repeated = self._stop_pending or self._clock.stop.stopped
+        if repeated and now - self._last_stop_at < STOP_REPEAT:
+            return Absorbed()
+        self._stop_pending = self._stop_pending or not self._clock.stop.stopped
+        self._last_stop_at = now
+        return Forward(Stop(by=by, reason=reason))
+
+    def reset(self, by: str) -> Outcome:
+        """The caller has checked the role."""
+        if not self._link_is_up:
+            return self._refuse(None, "link_down")
+        self._last_stop_at = -math.inf
+        return Forward(Reset(by=by))
+
+    def feedback(self, feedback: Feedback) -> None:
+        """A feedback that the event clock accepted."""
+        if self._in_flight is not None and not is_newer(self._in_flight.event, feedback.event):
+            self._in_flight = None
+        self._resting = None
+        if feedback.stop.stopped:
+            self._stop_pending = False
+
+    def refused(self, refusal: Refusal) -> str:
+        """The bridge refused something; returns the peer to tell, or "" for none."""
+        if self._in_flight is not None and refusal.event in (0, self._in_flight.event):
+            self._in_flight = None
+            return self._sender
+        return self._seat.seat.holder
+
+    def _forget(self) -> None:
+        self._in_flight = None
+        self._resting = None
+        self._stop_pending = False
+        self._last_stop_at = -math.inf
+
+    def _forward_rest(self, rest: Rest) -> Outcome:
+        if not self._link_is_up:
+            return self._refuse(rest, "link_down")
+        if rest == self._resting:
+            return Absorbed()
+        self._resting = rest
+        return Forward(rest)
+
+    def _clamped(self, command: Command, description: RobotDescription) -> Command:
+        values = [
+            min(max(value, axis.minimum), axis.maximum)
+            for value, axis in zip(command.values, description.axes, strict=True)
+        ]
+        return msgspec.structs.replace(command, values=values)
+
+    def _refuse(self, message: Command | Rest | None, reason: RefusalReason, detail: str = "") -> Refuse:
+        event = 0 if message is None else message.event
+        return Refuse(Refusal(event=event, reason=reason, current=self._clock.event, detail=detail))

@@ -1,0 +1,309 @@
+"""The console: the one owner of its state. Hears the robot and the peers, decides by the cores, tells everyone."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Protocol
+
+import structlog
+
+from robot_bridge.protocol.console import (
+    ClientMessage,
+    Participants,
+    Rename,
+    RobotState,
+    Seat,
+    SeatRelease,
+    SeatRequest,
+    StopStateNotice,
+    Welcome,
+    encode_console_message,
+)
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Command, Feedback, Media, Ping, Pong, Refusal, Reset, Rest, Stop, StopState
+from server.channels import ChannelName
+from server.command_desk import Absorbed, Answer, CommandDesk, Forward, Outcome, Refuse
+from server.errors import ChannelError, Flood, LinkDown
+from server.event_clock import EventClock
+from server.feedback_fanout import FeedbackFanout
+from server.metrics import Metrics
+from server.peer import Peer
+from server.peers import Peers
+from server.robot_connection import RobotConnection
+from server.seat import ControlSeat, SeatOutcome
+from server.settings import Settings
+
+__all__ = ["Console", "FeedbackViewer", "MediaFeed"]
+
+log = structlog.get_logger(__name__)
+audit = structlog.get_logger("lockstep.audit")
+
+SEAT_CHECKS = 12  # within one seat timeout
+CROWD = 10  # peers; the list of participants goes out at most once a second, ten times more rarely to 100
+RESTART_AFTER = 1.0  # s until a background task that failed runs again
+
+
+class MediaFeed(Protocol):
+    """What the console needs of the media plane."""
+
+    def configure(self, description: RobotDescription) -> None: ...
+    def feed(self, media: Media, now: float) -> None: ...
+
+
+class FeedbackViewer(Protocol):
+    """What the console needs of the 3D scene."""
+
+    def configure(self, description: RobotDescription) -> None: ...
+    def feedback(self, feedback: Feedback) -> None: ...
+
+
+class Console:
+    """Enter `run` once; it returns when cancelled, with all peers and links closed."""
+
+    def __init__(self, settings: Settings, metrics: Metrics, media: MediaFeed, viewer: FeedbackViewer | None) -> None:
+        self.clock = EventClock()
+        self.seat = ControlSeat(settings.seat_timeout)
+        self.robot = RobotConnection(settings, self)
+        self.peers = Peers(settings.max_peers, metrics)
+        self._settings = settings
+        self._metrics = metrics
+        self._media = media
+        self._viewer = viewer
+        self._desk = CommandDesk(self.clock, self.seat)
+        self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.operators, self.peers.observers)
+        self._loop = asyncio.get_running_loop()
+        self._undelivered_stop: Stop | None = None  # asked for while no link lived
+        self._forwarded_at = 0.0  # when the command in flight left
+        self._shown_stop = StopState()  # what everyone was told last
+        self._link_was_up = False
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._guard("feedback", self._fanout.run))
+                tasks.create_task(self._guard("seat", self._watch_seat))
+                tasks.create_task(self._guard("participants", self._share_participants))
+                tasks.create_task(self._guard("robot", self.robot.run))
+        finally:
+            await self.peers.close()
+
+    def state_of_robot(self, description: RobotDescription) -> RobotState:
+        return RobotState(
+            link="up" if self.robot.up else "down",
+            epoch=self.robot.epoch,
+            description=description,
+            detail=self.robot.detail,
+        )
+
+    # what peers and HTTP ask for
+
+    def stop(self, by: str, where: str, reason: str) -> bool:
+        """Latch the stop. False when no link lives: then it is sent as soon as one does, before all else."""
+        self._metrics.stops.labels(where).inc()
+        outcome = self._desk.stop(by, reason, self._loop.time())
+        if isinstance(outcome, Absorbed):
+            return True
+        stop = outcome.message
+        if not isinstance(stop, Stop):
+            raise TypeError(stop)
+        delivered = self.robot.send_stop(stop)
+        self._undelivered_stop = None if delivered else stop
+        audit.warning("stop", by=by, where=where, reason=reason, event=self.clock.event, delivered=delivered)
+        return delivered
+
+    def reset(self, by: str, where: str) -> None:
+        """Release the latched stop; the caller has checked the role.
+
+        Raises:
+            LinkDown: the robot cannot be told.
+        """
+        outcome = self._desk.reset(by)
+        if not isinstance(outcome, Forward) or not self._forward(outcome):
+            raise LinkDown(self.robot.detail)
+        self._metrics.resets.inc()
+        audit.warning("reset", by=by, where=where, event=self.clock.event)
+
+    # PeerHost
+
+    def channel_opened(self, peer: Peer, channel: ChannelName) -> None:
+        """A newcomer is told all there is to know on this channel."""
+        if channel == "control" and self.clock.feedback is not None:
+            peer.send_feedback(encode_console_message(self.clock.feedback))
+        elif channel == "stop":
+            peer.send("stop", StopStateNotice(stop=self.clock.stop, event=self.clock.event))
+        elif channel == "session":
+            peer.send("session", Welcome(peer=peer.id, role=peer.role, name=peer.name, streams=peer.streams))
+            if self.robot.description is not None:
+                peer.send("session", self.state_of_robot(self.robot.description))
+            peer.send("session", self.seat.seat)
+            peer.send("session", self.peers.participants())
+
+    def message_received(self, peer: Peer, channel: ChannelName, message: ClientMessage) -> None:
+        self.seat.heard(peer.id, self._loop.time())
+        match message:
+            case Command():
+                self._settle(peer, "control", self._desk.command(peer.id, message), command=True)
+            case Rest():
+                self._settle(peer, "control", self._desk.rest(peer.id, message))
+            case Ping():
+                peer.send("control", Pong(id=message.id))
+            case Stop():
+                self.stop(peer.name, channel, message.reason)
+            case Reset():
+                self._reset_by(peer)
+            case SeatRequest():
+                self._seat_step(peer, self.seat.request(peer.id, peer.name, peer.role, self._loop.time()))
+            case SeatRelease():
+                self._seat_step(peer, self.seat.release(peer.id))
+            case Rename():
+                self._rename(peer, message.name)
+            case _:
+                pass  # a report: the peer keeps it
+
+    def input_refused(self, peer: Peer, channel: str, error: ChannelError) -> None:
+        self._metrics.bad_input.labels(channel, error.name).inc()
+        if channel == "other" or isinstance(error, Flood):
+            return  # no answer: there is no channel for it, or it would feed the flood
+        answer = Refusal(
+            event=0, reason="malformed", current=self.clock.event, detail=f"{error.name}: {error.detail}"[:500]
+        )
+        peer.send("control" if channel == "control" else "session", answer)
+
+    def peer_ended(self, peer: Peer) -> None:
+        self._seat_step(None, self.seat.gone(peer.id))
+
+    # RobotHost
+
+    def epoch_began(self, epoch: str, description: RobotDescription) -> None:
+        """References of different epochs are never compared: every peer starts anew."""
+        self.clock.begin(epoch)
+        self._shown_stop = StopState()
+        self.peers.end_all("new epoch")
+        self._media.configure(description)
+        if self._viewer is not None:
+            self._viewer.configure(description)
+
+    def link_up(self) -> None:
+        if self.robot.description is None:
+            raise TypeError("a link is up only after its hello")
+        self._link_was_up = True
+        self._metrics.link_up.set(1)
+        self._desk.link_up(self.robot.description)
+        if self._undelivered_stop is not None:
+            stop, self._undelivered_stop = self._undelivered_stop, None
+            self.stop(stop.by, "kept", stop.reason)
+        self.peers.tell("session", self.state_of_robot(self.robot.description))
+
+    def link_down(self, detail: str) -> None:
+        if self._link_was_up:
+            self._metrics.link_losses.inc()
+        self._link_was_up = False
+        self._metrics.link_up.set(0)
+        self._desk.link_down()
+        if self.robot.description is not None:
+            self.peers.tell("session", self.state_of_robot(self.robot.description))
+
+    def feedback_received(self, feedback: Feedback) -> None:
+        now = self._loop.time()
+        if not self.clock.observe(feedback, now):
+            return
+        answered = self._desk.in_flight
+        self._desk.feedback(feedback)
+        self._fanout.publish(encode_console_message(feedback))
+        if answered is not None and self._desk.in_flight is None:
+            self._metrics.robot_turnaround.observe(now - self._forwarded_at)
+        self._metrics.feedback.inc()
+        self._metrics.event.set(feedback.event)
+        self._metrics.stopped.set(feedback.stop.stopped)
+        if feedback.stop != self._shown_stop:
+            self._shown_stop = feedback.stop
+            self.peers.tell("stop", StopStateNotice(stop=feedback.stop, event=feedback.event))
+        if self._viewer is not None:
+            self._viewer.feedback(feedback)
+
+    def refusal_received(self, refusal: Refusal) -> None:
+        self._metrics.refusals.labels(refusal.reason).inc()
+        peer = self.peers.by_id(self._desk.refused(refusal))
+        if peer is not None:
+            peer.send("control", refusal)
+
+    def media_received(self, media: Media) -> None:
+        self._media.feed(media, self._loop.time())
+
+    # what follows from the cores' outcomes
+
+    def _settle(self, peer: Peer, channel: ChannelName, outcome: Outcome, *, command: bool = False) -> None:
+        if isinstance(outcome, Forward) and not self._forward(outcome):
+            outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
+        match outcome:
+            case Answer(feedback):
+                peer.send_feedback(encode_console_message(feedback))
+            case Refuse(refusal):
+                self._metrics.refusals.labels(refusal.reason).inc()
+                peer.send(channel, refusal)
+        if command:
+            self._metrics.commands.labels(type(outcome).__name__.lower()).inc()
+
+    def _forward(self, outcome: Forward) -> bool:
+        message = outcome.message
+        if isinstance(message, Stop):
+            return self.robot.send_stop(message)
+        if isinstance(message, Command):
+            self._forwarded_at = self._loop.time()
+        return self.robot.send(message)
+
+    def _reset_by(self, peer: Peer) -> None:
+        refusal = Refusal(event=0, reason="not_allowed", current=self.clock.event, detail="only an operator resets")
+        if peer.role == "operator":
+            try:
+                self.reset(peer.name, "stop")
+                return
+            except LinkDown as error:
+                refusal = Refusal(event=0, reason="link_down", current=self.clock.event, detail=error.detail[:500])
+        self._metrics.refusals.labels(refusal.reason).inc()
+        peer.send("stop", refusal)
+
+    def _seat_step(self, peer: Peer | None, outcome: SeatOutcome) -> None:
+        if outcome.refusal is not None and peer is not None:
+            self._metrics.refusals.labels(outcome.refusal).inc()
+            peer.send("session", Refusal(event=0, reason=outcome.refusal, current=self.clock.event))
+        if outcome.rest:
+            rest = self._desk.abandon()
+            if isinstance(rest, Forward) and self._forward(rest):
+                self._metrics.rests.labels(self.seat.seat.why).inc()
+        if outcome.changed:
+            seat = self.seat.seat
+            audit.info("seat", holder=seat.holder, name=seat.name, why=seat.why, event=self.clock.event)
+            self.peers.tell("session", seat)
+
+    def _rename(self, peer: Peer, name: str) -> None:
+        peer.rename(name)
+        if self.seat.holds(peer.id):
+            self.seat.seat = Seat(holder=peer.id, name=peer.name, why=self.seat.seat.why)
+            self.peers.tell("session", self.seat.seat)
+
+    # background tasks
+
+    async def _guard(self, name: str, task: Callable[[], Awaitable[None]]) -> None:
+        """Runs `task` again when it fails: a fault of ours in one place must not take the seat's watchdog with it."""
+        while True:
+            try:
+                await task()
+            except Exception:
+                self._metrics.internal_errors.labels(name).inc()
+                log.exception("background task failed", task=name)
+            await asyncio.sleep(RESTART_AFTER)
+
+    async def _watch_seat(self) -> None:
+        while True:
+            await asyncio.sleep(self._settings.seat_timeout / SEAT_CHECKS)
+            self._seat_step(None, self.seat.expire(self._loop.time()))
+
+    async def _share_participants(self) -> None:
+        shown = Participants(participants=[])
+        while True:
+            await asyncio.sleep(max(1.0, len(self.peers) / CROWD))
+            current = self.peers.participants()
+            if current != shown:
+                shown = current
+                self.peers.tell("session", current)

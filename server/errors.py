@@ -1,0 +1,222 @@
+"""What can go wrong between the console and those who use it.
+
+ConsoleError
+├── AccessError             who are you
+│   ├── TokenMissing
+│   ├── TokenInvalid        wrong signature, expired, malformed: never said which
+│   ├── NotAllowed          the role does not permit it
+│   └── OriginRefused       a page of another site
+├── RequestError            the request is not understood
+│   ├── BadJson
+│   ├── BadSdp
+│   ├── BadSdpFragment
+│   ├── BodyTooLarge
+│   ├── IceRestartUnsupported
+│   ├── NotFound
+│   └── WrongMediaType
+├── ChannelError            a data channel message that is not understood
+│   ├── BinaryMessage
+│   ├── DuplicateChannel
+│   ├── Flood
+│   ├── MalformedMessage
+│   ├── MessageTooLarge
+│   ├── UnknownChannel
+│   └── WrongChannel
+└── Unavailable             right now it cannot be done
+    ├── LinkDown
+    ├── RobotUnreachable
+    ├── SceneUnavailable
+    ├── ShuttingDown
+    └── TooManyPeers
+"""
+
+from typing import NamedTuple
+
+__all__ = [
+    "HTTP_ERRORS",
+    "AccessError",
+    "BadJson",
+    "BadSdp",
+    "BadSdpFragment",
+    "BinaryMessage",
+    "BodyTooLarge",
+    "ChannelError",
+    "ConsoleError",
+    "DuplicateChannel",
+    "Flood",
+    "HttpError",
+    "IceRestartUnsupported",
+    "LinkDown",
+    "MalformedMessage",
+    "MessageTooLarge",
+    "NotAllowed",
+    "NotFound",
+    "OriginRefused",
+    "RequestError",
+    "RobotUnreachable",
+    "SceneUnavailable",
+    "ShuttingDown",
+    "TokenInvalid",
+    "TokenMissing",
+    "TooManyPeers",
+    "Unavailable",
+    "UnknownChannel",
+    "WrongChannel",
+    "WrongMediaType",
+    "http_error",
+]
+
+
+class ConsoleError(Exception):
+    """Base of all named errors of the console.
+
+    Attributes:
+        detail: what exactly was wrong, for a person; the name is in `HTTP_ERRORS`, or `ChannelError.name`
+    """
+
+    def __init__(self, detail: str = "") -> None:
+        super().__init__(detail)
+        self.detail = detail
+
+
+class AccessError(ConsoleError):
+    pass
+
+
+class TokenMissing(AccessError):
+    pass
+
+
+class TokenInvalid(AccessError):
+    pass
+
+
+class NotAllowed(AccessError):
+    pass
+
+
+class OriginRefused(AccessError):
+    pass
+
+
+class RequestError(ConsoleError):
+    pass
+
+
+class BadJson(RequestError):
+    pass
+
+
+class BadSdp(RequestError):
+    pass
+
+
+class BadSdpFragment(RequestError):
+    pass
+
+
+class BodyTooLarge(RequestError):
+    pass
+
+
+class IceRestartUnsupported(RequestError):
+    pass
+
+
+class NotFound(RequestError):
+    pass
+
+
+class WrongMediaType(RequestError):
+    pass
+
+
+class ChannelError(ConsoleError):
+    """`name` is what /metrics counts."""
+
+    name = "channel"
+
+
+class BinaryMessage(ChannelError):
+    name = "binary"
+
+
+class DuplicateChannel(ChannelError):
+    name = "duplicate_channel"
+
+
+class Flood(ChannelError):
+    name = "flood"
+
+
+class MalformedMessage(ChannelError):
+    name = "malformed"
+
+
+class MessageTooLarge(ChannelError):
+    name = "too_large"
+
+
+class UnknownChannel(ChannelError):
+    name = "unknown_channel"
+
+
+class WrongChannel(ChannelError):
+    name = "wrong_channel"
+
+
+class Unavailable(ConsoleError):
+    pass
+
+
+class LinkDown(Unavailable):
+    pass
+
+
+class RobotUnreachable(Unavailable):
+    pass
+
+
+class SceneUnavailable(Unavailable):
+    pass
+
+
+class ShuttingDown(Unavailable):
+    pass
+
+
+class TooManyPeers(Unavailable):
+    pass
+
+
+class HttpError(NamedTuple):
+    """How an error looks over HTTP."""
+
+    status: int
+    name: str
+    headers: dict[str, str] = {}
+
+
+HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
+    TokenMissing: HttpError(401, "unauthorized", {"WWW-Authenticate": "Bearer"}),
+    TokenInvalid: HttpError(401, "unauthorized", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
+    NotAllowed: HttpError(403, "not_allowed"),
+    OriginRefused: HttpError(403, "origin_refused"),
+    BadJson: HttpError(400, "bad_json"),
+    BadSdp: HttpError(400, "bad_sdp"),
+    BadSdpFragment: HttpError(400, "bad_sdp_fragment"),
+    NotFound: HttpError(404, "not_found"),
+    BodyTooLarge: HttpError(413, "too_large"),
+    WrongMediaType: HttpError(415, "wrong_media_type"),
+    IceRestartUnsupported: HttpError(422, "ice_restart_unsupported"),
+    LinkDown: HttpError(503, "link_down", {"Retry-After": "1"}),
+    RobotUnreachable: HttpError(503, "robot_unreachable", {"Retry-After": "1"}),
+    SceneUnavailable: HttpError(503, "scene_unavailable", {"Retry-After": "5"}),
+    ShuttingDown: HttpError(503, "shutting_down", {"Retry-After": "5"}),
+    TooManyPeers: HttpError(503, "too_many_peers", {"Retry-After": "5"}),
+}
+
+
+def http_error(error: ConsoleError) -> HttpError:
+    """The entry for `error`; every error that HTTP can raise has one."""
+    return HTTP_ERRORS[type(error)]

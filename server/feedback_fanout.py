@@ -1,0 +1,84 @@
+"""Feedback to everyone: operators at once, observers at a bounded rate, the newest only.
+
+`FeedbackPace` says when; `FeedbackFanout` sends. Sending to a peer costs a fraction of a millisecond in Python, so a
+hundred observers are served in small slices, and the operator's commands are handled between them.
+"""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+__all__ = ["FeedbackFanout", "FeedbackPace", "FeedbackReceiver"]
+
+SLICE = 4  # observers served in one turn of the loop
+
+
+class FeedbackReceiver(Protocol):
+    """What the fan-out needs of a peer."""
+
+    def send_feedback(self, text: str) -> None: ...
+
+
+class FeedbackPace:
+    """When the observers get the newest feedback: at most `rate` times a second. No I/O."""
+
+    def __init__(self, rate: float) -> None:
+        self._interval = 1 / rate
+        self._next_at = 0.0
+        self._newest: str | None = None
+
+    def offer(self, text: str) -> None:
+        self._newest = text
+
+    def wait(self, now: float) -> float | None:
+        """Seconds until something is due; None when nothing waits."""
+        return None if self._newest is None else max(0.0, self._next_at - now)
+
+    def take(self, now: float) -> str | None:
+        """The newest feedback if it is due, else None."""
+        if self._newest is None or now < self._next_at:
+            return None
+        text, self._newest = self._newest, None
+        # Counted from when it was due, so that late timers do not lower the rate; after a pause, from now.
+        due = self._next_at if now - self._next_at < self._interval else now
+        self._next_at = due + self._interval
+        return text
+
+
+class FeedbackFanout:
+    """Run `run` as a task; call `publish` for every feedback."""
+
+    def __init__(
+        self,
+        rate: float,
+        operators: Callable[[], Sequence[FeedbackReceiver]],
+        observers: Callable[[], Sequence[FeedbackReceiver]],
+    ) -> None:
+        self._pace = FeedbackPace(rate)
+        self._operators = operators
+        self._observers = observers
+        self._offered = asyncio.Event()
+
+    def publish(self, text: str) -> None:
+        for peer in self._operators():
+            peer.send_feedback(text)
+        self._pace.offer(text)
+        self._offered.set()
+
+    async def run(self) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            await self._offered.wait()
+            self._offered.clear()
+            while (wait := self._pace.wait(loop.time())) is not None:
+                if wait > 0:
+                    await asyncio.sleep(wait)
+                text = self._pace.take(loop.time())
+                if text is not None:
+                    await self._serve(text)
+
+    async def _serve(self, text: str) -> None:
+        for count, peer in enumerate(self._observers(), start=1):
+            peer.send_feedback(text)
+            if count % SLICE == 0:
+                await asyncio.sleep(0)

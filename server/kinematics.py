@@ -1,0 +1,88 @@
+"""Poses of a robot's bodies from its joint values, by its description. No I/O."""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from robot_bridge.protocol.description import Body, BodyJoint, RobotDescription
+
+__all__ = ["Pose", "body_pose", "scene_paths", "world_positions"]
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]  # w, x, y, z
+
+
+class Pose(NamedTuple):
+    """Of a body in its parent."""
+
+    position: Vector
+    orientation: Quaternion
+
+
+def body_pose(body: Body, joints: Mapping[str, float]) -> Pose:
+    """The body's joints act in list order, in its own frame, after its fixed position and orientation."""
+    pose = Pose(body.position, body.orientation)
+    for joint in body.joints:
+        pose = _moved(pose, joint, joints.get(joint.joint, 0.0))
+    return pose
+
+
+def scene_paths(description: RobotDescription) -> dict[str, str]:
+    """The path of every body in the scene tree, "/robot/base/arm": parents first, no orphans."""
+    bodies = {body.name: body for body in description.bodies}
+    paths: dict[str, str] = {}
+    for body in description.bodies:
+        chain = [body.name]
+        while (parent := bodies[chain[-1]].parent) in bodies and len(chain) <= len(bodies):
+            chain.append(parent)
+        if parent == "":
+            paths[body.name] = "/robot/" + "/".join(name.replace("/", "_") for name in reversed(chain))
+    return dict(sorted(paths.items(), key=lambda item: item[1].count("/")))
+
+
+def world_positions(description: RobotDescription, joints: Mapping[str, float]) -> list[Vector]:
+    """Where the bodies are in the world, in the order of `scene_paths`."""
+    bodies = {body.name: body for body in description.bodies}
+    poses: dict[str, Pose] = {"": Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))}
+    for name in scene_paths(description):
+        parent, own = poses[bodies[name].parent], body_pose(bodies[name], joints)
+        position = _added(parent.position, rotate(parent.orientation, own.position))
+        poses[name] = Pose(position, product(parent.orientation, own.orientation))
+    return [pose.position for name, pose in poses.items() if name]
+
+
+def _moved(pose: Pose, joint: BodyJoint, value: float) -> Pose:
+    if joint.kind == "prismatic":
+        x, y, z = joint.axis
+        return Pose(
+            _added(pose.position, rotate(pose.orientation, (x * value, y * value, z * value))), pose.orientation
+        )
+    return Pose(pose.position, product(pose.orientation, about(joint.axis, value)))
+
+
+def about(axis: Vector, angle: float) -> Quaternion:
+    """A turn about `axis`, which need not be of length 1; about no axis it is no turn."""
+    length = math.sqrt(sum(each * each for each in axis))
+    if length == 0:
+        return (1.0, 0.0, 0.0, 0.0)
+    sine = math.sin(angle / 2) / length
+    return (math.cos(angle / 2), axis[0] * sine, axis[1] * sine, axis[2] * sine)
+
+
+def product(a: Quaternion, b: Quaternion) -> Quaternion:
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
+
+
+def rotate(quaternion: Quaternion, vector: Vector) -> Vector:
+    w, x, y, z = quaternion
+    _, rx, ry, rz = product(product(quaternion, (0.0, *vector)), (w, -x, -y, -z))
+    return (rx, ry, rz)
+
+
+def _added(a: Vector, b: Vector) -> Vector:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

@@ -1,0 +1,73 @@
+"""Keeps one robot link: connects, reads, and connects again when it breaks."""
+
+import asyncio
+from typing import Protocol
+
+import structlog
+
+from robot_bridge.link_client import RobotLink
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.errors import LinkError, LinkLost
+from robot_bridge.protocol.messages import LinkMessage, LinkRole
+from server.backoff import Backoff
+
+__all__ = ["LinkKeeper", "LinkSink"]
+
+log = structlog.get_logger(__name__)
+
+HEALTHY_AFTER = 5.0  # s up, then the next loss is retried soon again
+
+
+class LinkSink(Protocol):
+    """Who is told. `link_closed` also follows a try that failed, with what was wrong."""
+
+    def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None: ...
+    def link_closed(self, role: LinkRole, detail: str) -> None: ...
+    def link_received(self, role: LinkRole, message: LinkMessage) -> None: ...
+
+
+class LinkKeeper:
+    def __init__(self, host: str, port: int, role: LinkRole, sink: LinkSink, backoff: Backoff) -> None:
+        self._host = host
+        self._port = port
+        self._role: LinkRole = role
+        self._sink = sink
+        self._backoff = backoff
+        self._link: RobotLink | None = None  # None while down
+
+    def send(self, message: LinkMessage) -> bool:
+        """Whether it was handed to a link that lives."""
+        if self._link is None:
+            return False
+        try:
+            self._link.send(message)
+        except LinkError:
+            return False
+        return True
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            try:
+                await self._once()
+            except LinkError as error:
+                self._sink.link_closed(self._role, error.detail)
+            await asyncio.sleep(self._backoff.next())
+
+    async def _once(self) -> None:
+        loop = asyncio.get_running_loop()
+        async with RobotLink(self._host, self._port, self._role, name="console") as link:
+            hello, since = link.hello, loop.time()
+            if hello.description is None:
+                raise LinkLost("the bridge sent no description")
+            log.info("robot link up", role=self._role, epoch=hello.epoch)
+            self._link = link
+            try:
+                self._sink.link_opened(self._role, hello.epoch, hello.description)
+                async for message in link:
+                    self._sink.link_received(self._role, message)
+            finally:
+                self._link = None
+                if loop.time() - since > HEALTHY_AFTER:
+                    self._backoff.healthy()
+        raise LinkLost("the link was closed")

@@ -1,0 +1,42 @@
+"""Counters and gauges of the console, in a registry of their own. Names: docs/console-api.md."""
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+
+__all__ = ["Metrics"]
+
+
+class Metrics:
+    """Everything that /metrics shows besides the media plane's, which shares the registry."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        registry = self.registry
+        self.bad_input = Counter(
+            "lockstep_bad_input", "Input refused, by where and why", ["where", "reason"], registry=registry
+        )
+        self.refusals = Counter("lockstep_refusals", "Commands and requests refused", ["reason"], registry=registry)
+        self.commands = Counter("lockstep_commands", "Commands from peers, by outcome", ["outcome"], registry=registry)
+        self.rests = Counter("lockstep_rests", "Rests forwarded, by why", ["why"], registry=registry)
+        self.stops = Counter("lockstep_stops", "Stops asked for, by where", ["where"], registry=registry)
+        self.resets = Counter("lockstep_resets", "Resets forwarded", registry=registry)
+        self.feedback = Counter("lockstep_feedback", "Feedback from the robot", registry=registry)
+        self.feedback_sent = Counter("lockstep_feedback_sent", "Feedback sent to peers", ["role"], registry=registry)
+        self.dropped = Counter("lockstep_dropped", "Messages dropped by a full queue", ["queue"], registry=registry)
+        self.peers = Gauge("lockstep_peers", "Peers connected", ["role"], registry=registry)
+        self.peers_ended = Counter("lockstep_peers_ended", "Peers gone, by why", ["why"], registry=registry)
+        self.scene_viewers = Gauge("lockstep_scene_viewers", "Viewers of the 3D scene", registry=registry)
+        self.link_up = Gauge("lockstep_robot_link_up", "1 while the robot link is up", registry=registry)
+        self.link_losses = Counter("lockstep_robot_link_losses", "Times the robot link went down", registry=registry)
+        self.event = Gauge("lockstep_event", "Event reference", registry=registry)
+        self.stopped = Gauge("lockstep_stopped", "1 while the robot is stopped", registry=registry)
+        self.internal_errors = Counter("lockstep_internal_errors", "Our own faults", ["where"], registry=registry)
+        self.robot_turnaround = Histogram(
+            "lockstep_robot_turnaround_seconds",
+            "Command forwarded to its feedback received",
+            buckets=(0.001, 0.002, 0.004, 0.006, 0.008, 0.012, 0.02, 0.05, 0.1, 0.5, 1.0),
+            registry=registry,
+        )
+
+    def text(self) -> bytes:
+        """The exposition format, version 0.0.4."""
+        return generate_latest(self.registry)

@@ -1,0 +1,119 @@
+"""Checks a WHEP offer before anything is built on it, and takes out what aiortc should not see. No I/O."""
+
+from aiortc import sdp
+
+from server.errors import BadSdp, BadSdpFragment, IceRestartUnsupported
+
+__all__ = ["MAX_CANDIDATES", "MAX_SECTIONS", "Fragment", "FragmentCandidate", "parse_fragment", "prepare_offer"]
+
+MAX_SECTIONS = 40  # media sections
+MAX_CANDIDATES = 100
+DEFAULT_MESSAGE_SIZE = "a=max-message-size:65536"
+
+
+def prepare_offer(text: str) -> str:
+    """`text` without mDNS candidates, and with the default for what aiortc needs and RFC 8841 6.1 leaves out.
+
+    The browser connects to us, so we learn its address from its checks (RFC 8445 7.3.1.3); to resolve its `.local`
+    names would cost a second of multicast. When all that is left says "that was all", that is taken out too, or
+    ICE would give up at once.
+
+    Raises:
+        BadSdp: not an offer that can be answered.
+    """
+    lines = text.splitlines()
+    kept = [line for line in lines if not (line.startswith("a=candidate:") and ".local " in line)]
+    if len(kept) != len(lines):
+        kept = [line for line in kept if line != "a=end-of-candidates"]
+    if not any(line.startswith("a=max-message-size:") for line in kept):
+        kept = [
+            each
+            for line in kept
+            for each in ([line, DEFAULT_MESSAGE_SIZE] if line.startswith("a=sctp-port:") else [line])
+        ]
+    prepared = "\r\n".join(kept) + "\r\n"
+    _check(prepared)
+    return prepared
+
+
+def _check(text: str) -> None:
+    description = _parsed(text)
+    if not description.media:
+        raise BadSdp("the offer has no media section")
+    if len(description.media) > MAX_SECTIONS:
+        raise BadSdp(f"more than {MAX_SECTIONS} media sections")
+    if sum(media.kind == "application" for media in description.media) > 1:
+        raise BadSdp("more than one data channel section")
+    mids = [media.rtp.muxId for media in description.media]
+    if not all(mids) or len(set(mids)) != len(mids):
+        raise BadSdp("every media section needs a mid of its own (RFC 9143 7.2.1)")
+    bundles = [group.items for group in description.group if group.semantic == "BUNDLE"]
+    if not set(mids) <= {mid for items in bundles for mid in items}:
+        raise BadSdp("all media sections have to be in one BUNDLE group")
+    for media in description.media:
+        _check_media(media)
+
+
+def _check_media(media: sdp.MediaDescription) -> None:
+    if media.kind not in ("audio", "video", "application"):
+        raise BadSdp(f"a media section of kind {media.kind!r}"[:80])
+    if media.ice is None or not media.ice.usernameFragment or not media.ice.password:
+        raise BadSdp("a media section without ice-ufrag and ice-pwd")
+    if media.dtls is None or not media.dtls.fingerprints:
+        raise BadSdp("a media section without a certificate fingerprint")
+    if media.kind == "application" and media.sctp_port is None:
+        raise BadSdp("a data channel section without sctp-port")
+    if len(media.ice_candidates) > MAX_CANDIDATES:
+        raise BadSdp(f"more than {MAX_CANDIDATES} candidates")
+
+
+def _parsed(text: str) -> sdp.SessionDescription:
+    try:
+        return sdp.SessionDescription.parse(text)
+    except Exception as error:
+        # aiortc's parser has no error of its own: it fails with whatever the text made it trip over.
+        raise BadSdp("the offer is not valid SDP") from error
+
+
+class FragmentCandidate:
+    """One candidate of a fragment, and the media section it is for."""
+
+    def __init__(self, mid: str, line: str) -> None:
+        self.mid = mid
+        self.line = line  # "candidate:..." without the "a="
+
+
+class Fragment:
+    """An application/trickle-ice-sdpfrag (RFC 8840 9): candidates, and whether they were the last."""
+
+    def __init__(self) -> None:
+        self.candidates: list[FragmentCandidate] = []
+        self.ended = False
+
+
+def parse_fragment(text: str, username: str, first_mid: str) -> Fragment:
+    """The candidates in `text`.
+
+    Args:
+        username: the ice-ufrag of the peer's offer
+        first_mid: for lines before the first media section; with BUNDLE all candidates are for it
+
+    Raises:
+        IceRestartUnsupported: the fragment brings another ice-ufrag.
+        BadSdpFragment: not a fragment.
+    """
+    fragment, mid = Fragment(), first_mid
+    for line in text.splitlines():
+        if line.startswith("a=mid:"):
+            mid = line[6:].strip()
+        elif line.startswith("a=ice-ufrag:") and line[12:].strip() != username:
+            raise IceRestartUnsupported("ICE restart is not supported: DELETE this resource and POST a new offer")
+        elif line.startswith("a=candidate:"):
+            if len(fragment.candidates) == MAX_CANDIDATES:
+                raise BadSdpFragment(f"more than {MAX_CANDIDATES} candidates")
+            fragment.candidates.append(FragmentCandidate(mid, line[2:]))
+        elif line == "a=end-of-candidates":
+            fragment.ended = True
+        elif line and line[1:2] != "=":
+            raise BadSdpFragment("a line that is not SDP")
+    return fragment

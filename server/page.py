@@ -1,0 +1,43 @@
+"""Serves the page that Vite built, and says how to build it when it is not there."""
+
+from pathlib import Path
+
+from fastapi import APIRouter, Request
+from fastapi.responses import FileResponse, HTMLResponse, Response
+
+from server.errors import NotFound
+
+__all__ = ["WEB_DIST", "page_router"]
+
+WEB_DIST = Path(__file__).parent / "web_dist"
+
+NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Lockstep</title>
+<body style="font: 18px/1.5 system-ui; background: #10141a; color: #d7dde5; max-width: 40em; margin: 4em auto">
+<h1>The page is not built yet</h1>
+<p>The console runs, but the browser page is missing. Build it with</p>
+<pre>make setup</pre><p>or by hand with</p><pre>cd web &amp;&amp; npm ci &amp;&amp; npm run build</pre>
+<p>and load this page again. The headless client and any WHEP player work without it.</p>
+"""
+
+
+def page_router(directory: Path = WEB_DIST) -> APIRouter:
+    """Routes for `/`, the hashed assets (cached for good) and the few files beside them."""
+    router = APIRouter()
+    root = directory.resolve()
+
+    @router.get("/")
+    async def index() -> Response:
+        if not (root / "index.html").is_file():
+            return HTMLResponse(NOT_BUILT, headers={"Cache-Control": "no-store"})
+        return FileResponse(root / "index.html", headers={"Cache-Control": "no-store"})
+
+    @router.get("/{path:path}")
+    async def asset(request: Request, path: str) -> Response:
+        found = (root / path).resolve()
+        if not found.is_relative_to(root) or not found.is_file():
+            raise NotFound("no such page")
+        hashed = path.startswith("assets/")
+        caching = "public, max-age=31536000, immutable" if hashed else "no-cache"
+        return FileResponse(found, headers={"Cache-Control": caching})
+
+    return router

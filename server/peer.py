@@ -1,0 +1,227 @@
+"""One WebRTC peer: its data channels, its heartbeat, its end."""
+
+import asyncio
+import secrets
+from typing import Protocol
+
+import structlog
+from aiortc import RTCDataChannel, RTCPeerConnection
+
+from robot_bridge.protocol.console import (
+    ClientMessage,
+    Participant,
+    Report,
+    Role,
+    ServerMessage,
+    StreamInfo,
+    encode_console_message,
+)
+from robot_bridge.protocol.messages import Stop
+from server.access import Identity
+from server.channel_writer import ChannelWriter
+from server.channels import ChannelName, MessageBudget, channel_name, parse_message
+from server.errors import ChannelError, DuplicateChannel
+
+__all__ = ["Peer", "PeerHost", "PeerLimits", "PeerStreams"]
+
+log = structlog.get_logger(__name__)
+
+CLOSE_TIMEOUT = 5.0  # s; aiortc says goodbye to the remote, which may not answer
+MAX_NAME = 60
+
+
+class PeerLimits(Protocol):
+    """The settings that a peer needs."""
+
+    @property
+    def peer_silence(self) -> float: ...
+    @property
+    def peer_connect_timeout(self) -> float: ...
+    @property
+    def max_message_rate(self) -> float: ...
+
+
+class PeerStreams(Protocol):
+    """The media that a peer gets."""
+
+    @property
+    def streams(self) -> list[StreamInfo]: ...
+
+    async def close(self) -> None: ...
+
+
+class PeerHost(Protocol):
+    """Whom a peer reports to. All are called on the loop and return at once."""
+
+    def channel_opened(self, peer: "Peer", channel: ChannelName) -> None: ...
+    def message_received(self, peer: "Peer", channel: ChannelName, message: ClientMessage) -> None: ...
+    def input_refused(self, peer: "Peer", channel: str, error: ChannelError) -> None: ...
+    def peer_ended(self, peer: "Peer") -> None: ...
+
+
+class Peer:
+    """A session: await `run`; it returns when the peer has ended and everything of it is closed.
+
+    `end` asks for the end from outside, with the reason that logs and metrics show.
+    """
+
+    def __init__(
+        self,
+        pc: RTCPeerConnection,
+        media: PeerStreams,
+        identity: Identity,
+        host: PeerHost,
+        limits: PeerLimits,
+    ) -> None:
+        self.id = secrets.token_hex(4)  # public: the others see it
+        self.resource = secrets.token_urlsafe(16)  # secret: the path of the WHEP resource
+        self.pc = pc
+        self.identity = identity
+        self.name = identity.name
+        self.report = Report()  # newest
+        self.ended = ""  # why; "" while it lives
+        self._media = media
+        self._host = host
+        self._limits = limits
+        self._loop = asyncio.get_running_loop()
+        self._writers: dict[ChannelName, ChannelWriter] = {}
+        self._budget = MessageBudget(limits.max_message_rate, self._loop.time())
+        self._heard_at = self._loop.time()
+        self._connected = asyncio.Event()
+        self._end = asyncio.Event()
+        pc.on("datachannel", self._channel_offered)
+        pc.on("connectionstatechange", self._connection_changed)
+
+    @property
+    def role(self) -> Role:
+        return self.identity.role
+
+    @property
+    def streams(self) -> list[StreamInfo]:
+        return self._media.streams
+
+    async def run(self) -> None:
+        try:
+            await self._wait_until_connected()
+            await self._wait_until_ended()
+        finally:
+            self.end("closed")
+            await self._close()
+
+    def end(self, why: str) -> None:
+        """Only the first reason counts."""
+        if not self.ended:
+            self.ended = why
+            self._end.set()
+            self._connected.set()
+            self._host.peer_ended(self)
+
+    def rename(self, name: str) -> None:
+        printable = "".join(character for character in name if character.isprintable()).strip()
+        self.name = printable[:MAX_NAME] or self.identity.name
+
+    def send(self, channel: ChannelName, message: ServerMessage) -> None:
+        self.send_text(channel, encode_console_message(message))
+
+    def send_text(self, channel: ChannelName, text: str) -> None:
+        """Ignored while the channel is not open: a newcomer is told everything when it opens."""
+        if channel in self._writers:
+            self._writers[channel].send(text)
+
+    def send_feedback(self, text: str) -> None:
+        if "control" in self._writers:
+            self._writers["control"].send_newest(text)
+
+    def participant(self) -> Participant:
+        carriers = [stream.carrier for stream in self.streams]
+        return Participant(
+            peer=self.id,
+            name=self.name,
+            role=self.role,
+            carrier=carriers[0] if carriers else "none",
+            gap=max((stream.gap for stream in self.report.streams), key=abs, default=0),
+            picture_delay_ms=self.report.picture_delay_ms,
+        )
+
+    def dropped(self) -> int:
+        """Messages that did not fit."""
+        return sum(writer.outbox.dropped + writer.too_large for writer in self._writers.values())
+
+    async def _wait_until_connected(self) -> None:
+        try:
+            async with asyncio.timeout(self._limits.peer_connect_timeout):
+                await self._connected.wait()
+        except TimeoutError:
+            self.end("never connected")
+
+    async def _wait_until_ended(self) -> None:
+        while not self.ended:
+            try:
+                async with asyncio.timeout_at(self._heard_at + self._limits.peer_silence):
+                    await self._end.wait()
+            except TimeoutError:
+                self._check_silence()
+
+    def _check_silence(self) -> None:
+        now = self._loop.time()
+        if not self._writers:
+            self._heard_at = now  # a plain WHEP player has no channel to speak on; ICE consent watches it
+        elif now - self._heard_at >= self._limits.peer_silence:
+            self.end("silent")
+
+    async def _close(self) -> None:
+        try:
+            async with asyncio.timeout(CLOSE_TIMEOUT):
+                await self._media.close()
+                await self.pc.close()
+        except TimeoutError:
+            log.warning("peer did not close in time", peer=self.id)
+
+    # aiortc's events
+
+    def _connection_changed(self) -> None:
+        state = self.pc.connectionState
+        if state == "connected":
+            self._heard_at = self._loop.time()
+            self._connected.set()
+        elif state in ("failed", "closed"):
+            self.end(f"connection {state}")
+
+    def _channel_offered(self, channel: RTCDataChannel) -> None:
+        try:
+            name = channel_name(channel.label)
+            if name in self._writers:
+                raise DuplicateChannel(name)
+        except ChannelError as error:
+            self._host.input_refused(self, "other", error)
+            channel.close()
+            return
+        self._writers[name] = ChannelWriter(channel)
+        channel.on("message", lambda data: self._received(name, data))
+        channel.on("close", lambda: self.end("channel closed"))
+        self._host.channel_opened(self, name)
+
+    def _received(self, channel: ChannelName, data: object) -> None:
+        """Only a valid message counts as life."""
+        if self.ended:
+            return
+        now = self._loop.time()
+        try:
+            message = self._parse(channel, data, now)
+        except ChannelError as error:
+            self._host.input_refused(self, channel, error)
+            return
+        self._heard_at = now
+        if isinstance(message, Report):
+            self.report = message
+        self._host.message_received(self, channel, message)
+
+    def _parse(self, channel: ChannelName, data: object, now: float) -> ClientMessage:
+        try:
+            message = parse_message(channel, data)
+        except ChannelError:
+            self._budget.spend(now)
+            raise
+        if not isinstance(message, Stop):
+            self._budget.spend(now)
+        return message

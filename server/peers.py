@@ -1,0 +1,124 @@
+"""The peers that are connected: admitted, told, seen off."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import structlog
+
+from robot_bridge.protocol.console import Participant, Participants, ServerMessage, encode_console_message
+from server.channels import ChannelName
+from server.errors import NotFound, ShuttingDown, TooManyPeers
+from server.metrics import Metrics
+from server.peer import Peer
+
+__all__ = ["Peers"]
+
+log = structlog.get_logger(__name__)
+
+FEW = 10  # participants up to which everybody's measured values are shared
+CLOSE_TIMEOUT = 8.0  # s for all peers together
+
+
+class Peers:
+    """At most `bound` peers. Each runs in a task that this object owns; `close` waits for all of them."""
+
+    def __init__(self, bound: int, metrics: Metrics) -> None:
+        self._bound = bound
+        self._metrics = metrics
+        self._sessions: dict[Peer, asyncio.Task[None]] = {}
+        self._reserved = 0
+        self._closing = False
+
+    def __iter__(self) -> Iterator[Peer]:
+        return iter(list(self._sessions))
+
+    def __len__(self) -> int:
+        return len(self._sessions)
+
+    def operators(self) -> list[Peer]:
+        return [peer for peer in self._sessions if peer.role == "operator"]
+
+    def observers(self) -> list[Peer]:
+        return [peer for peer in self._sessions if peer.role == "observer"]
+
+    @contextmanager
+    def place(self) -> Iterator[None]:
+        """Keeps a place while a peer is being negotiated.
+
+        Raises:
+            TooManyPeers: all places are taken.
+            ShuttingDown: the console ends.
+        """
+        if self._closing:
+            raise ShuttingDown("the console is shutting down")
+        if len(self._sessions) + self._reserved >= self._bound:
+            raise TooManyPeers(f"all {self._bound} places are taken")
+        self._reserved += 1
+        try:
+            yield
+        finally:
+            self._reserved -= 1
+
+    def admit(self, peer: Peer) -> None:
+        task = asyncio.get_running_loop().create_task(self._run(peer), name=f"peer {peer.id}")
+        self._sessions[peer] = task
+        self._metrics.peers.labels(peer.role).inc()
+        log.info("peer joined", peer=peer.id, role=peer.role, name=peer.name)
+
+    def by_id(self, peer_id: str) -> Peer | None:
+        return next((peer for peer in self._sessions if peer.id == peer_id), None)
+
+    def by_resource(self, resource: str) -> Peer:
+        """Raises NotFound when no peer has this WHEP resource."""
+        for peer in self._sessions:
+            if peer.resource == resource:
+                return peer
+        raise NotFound("no such WHEP resource")
+
+    def tell(self, channel: ChannelName, message: ServerMessage) -> None:
+        """Everyone."""
+        text = encode_console_message(message)
+        for peer in self._sessions:
+            peer.send_text(channel, text)
+
+    def participants(self) -> Participants:
+        """Operators first. In a crowd only operators come with measured values: the list changes less often."""
+        everyone = sorted((peer.participant() for peer in self._sessions), key=lambda each: each.role != "operator")
+        return Participants(
+            participants=[
+                each if len(everyone) <= FEW or each.role == "operator" else _without_values(each) for each in everyone
+            ]
+        )
+
+    def end_all(self, why: str) -> None:
+        for peer in self._sessions:
+            peer.end(why)
+
+    async def close(self) -> None:
+        """No more peers; the ones here end. Idempotent."""
+        self._closing = True
+        self.end_all("shutdown")
+        if self._sessions:
+            _, late = await asyncio.wait(self._sessions.values(), timeout=CLOSE_TIMEOUT)
+            for task in late:
+                task.cancel()
+            await asyncio.gather(*late, return_exceptions=True)
+
+    async def _run(self, peer: Peer) -> None:
+        try:
+            await peer.run()
+        except Exception:
+            # A fault with one peer must not end the others.
+            self._metrics.internal_errors.labels("peer").inc()
+            log.exception("peer failed", peer=peer.id)
+        finally:
+            del self._sessions[peer]
+            self._metrics.peers.labels(peer.role).dec()
+            self._metrics.peers_ended.labels(peer.ended).inc()
+            self._metrics.dropped.labels("channel").inc(peer.dropped())
+            log.info("peer left", peer=peer.id, role=peer.role, name=peer.name, why=peer.ended)
+
+
+def _without_values(participant: Participant) -> Participant:
+    return Participant(peer=participant.peer, name=participant.name, role=participant.role, carrier=participant.carrier)

@@ -1,0 +1,115 @@
+"""The console's connection to the robot: a link for commands and one for media, so that pictures delay no command."""
+
+import asyncio
+import random
+from typing import Protocol
+
+import structlog
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Command, Feedback, LinkMessage, LinkRole, Media, Refusal, Reset, Rest, Stop
+from server.backoff import Backoff
+from server.link_keeper import LinkKeeper
+
+__all__ = ["RobotConnection", "RobotHost", "RobotSettings"]
+
+log = structlog.get_logger(__name__)
+
+_ROLES: tuple[LinkRole, ...] = ("operator", "media")
+
+
+class RobotSettings(Protocol):
+    @property
+    def robot_host(self) -> str: ...
+    @property
+    def robot_port(self) -> int: ...
+    @property
+    def link_backoff(self) -> float: ...
+    @property
+    def link_backoff_cap(self) -> float: ...
+
+
+class RobotHost(Protocol):
+    """Whom the connection reports to. All are called on the loop and return at once."""
+
+    def epoch_began(self, epoch: str, description: RobotDescription) -> None: ...
+    def link_up(self) -> None: ...
+    def link_down(self, detail: str) -> None: ...
+    def feedback_received(self, feedback: Feedback) -> None: ...
+    def refusal_received(self, refusal: Refusal) -> None: ...
+    def media_received(self, media: Media) -> None: ...
+
+
+class RobotConnection:
+    """`epoch_began` comes before `link_up`, and again whenever the bridge was restarted, whichever link sees it first.
+
+    Attributes:
+        epoch, description: of the bridge reached last; "" and None before the first
+        up: whether the operator link is up
+        reached: set while it is up
+        detail: why it is down
+    """
+
+    def __init__(self, settings: RobotSettings, host: RobotHost) -> None:
+        self.epoch = ""
+        self.description: RobotDescription | None = None
+        self.reached = asyncio.Event()
+        self.detail = "not connected yet"
+        self._host = host
+        self._keepers = {
+            role: LinkKeeper(
+                settings.robot_host,
+                settings.robot_port,
+                role,
+                self,
+                Backoff(settings.link_backoff, settings.link_backoff_cap, random.Random()),
+            )
+            for role in _ROLES
+        }
+
+    @property
+    def up(self) -> bool:
+        return self.reached.is_set()
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            for role, keeper in self._keepers.items():
+                tasks.create_task(keeper.run(), name=f"robot link {role}")
+
+    def send(self, message: Command | Rest | Reset) -> bool:
+        """Whether it was handed to the link."""
+        return self._keepers["operator"].send(message)
+
+    def send_stop(self, stop: Stop) -> bool:
+        """As `send`, over whichever link lives: the bridge takes a stop from both."""
+        return self._keepers["operator"].send(stop) or self._keepers["media"].send(stop)
+
+    # the keepers' events
+
+    def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None:
+        if epoch != self.epoch:
+            self.epoch, self.description = epoch, description
+            self._host.epoch_began(epoch, description)
+        if role == "operator":
+            self.reached.set()
+            self.detail = ""
+            self._host.link_up()
+
+    def link_closed(self, role: LinkRole, detail: str) -> None:
+        if role != "operator":
+            return
+        changed = self.up or detail != self.detail
+        self.reached.clear()
+        self.detail = detail
+        if changed:
+            log.warning("robot link down", detail=detail)
+            self._host.link_down(detail)
+
+    def link_received(self, role: LinkRole, message: LinkMessage) -> None:
+        if isinstance(message, Media):
+            self._host.media_received(message)
+        elif isinstance(message, Feedback):
+            self._host.feedback_received(message)
+        elif isinstance(message, Refusal):
+            self._host.refusal_received(message)

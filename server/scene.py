@@ -1,0 +1,109 @@
+"""The 3D scene: viser on a loopback port, posed from feedback while somebody watches."""
+
+import asyncio
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import rich
+import structlog
+import viser
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Feedback
+from server.errors import SceneUnavailable
+from server.metrics import Metrics
+from server.scene_model import SceneModel
+
+__all__ = ["SceneView"]
+
+log = structlog.get_logger(__name__)
+
+STOP_TIMEOUT = 5.0  # s
+
+
+class SceneView:
+    """Enter `run` as a task. Building and posing happen in threads, the newest feedback wins.
+
+    Attributes:
+        port: where viser listens, on loopback; 0 before `start`
+    """
+
+    def __init__(self, rate: float, max_viewers: int, metrics: Metrics) -> None:
+        self.port = 0
+        self._interval = 1 / rate
+        self._max_viewers = max_viewers
+        self._metrics = metrics
+        self._server: viser.ViserServer | None = None
+        self._model: SceneModel | None = None
+        self._description: RobotDescription | None = None  # not built yet
+        self._feedback: Feedback | None = None  # not shown yet
+        self._viewers = 0
+        self._news = asyncio.Event()
+
+    def configure(self, description: RobotDescription) -> None:
+        self._description = description
+        self._news.set()
+
+    def feedback(self, feedback: Feedback) -> None:
+        self._feedback = feedback
+        if self._viewers:
+            self._news.set()
+
+    @contextmanager
+    def viewer(self) -> Iterator[None]:
+        """While entered, somebody watches.
+
+        Raises:
+            SceneUnavailable: too many do.
+        """
+        if self._viewers >= self._max_viewers:
+            raise SceneUnavailable(f"all {self._max_viewers} places are taken")
+        self._viewers += 1
+        self._metrics.scene_viewers.set(self._viewers)
+        self._news.set()
+        try:
+            yield
+        finally:
+            self._viewers -= 1
+            self._metrics.scene_viewers.set(self._viewers)
+
+    async def start(self) -> None:
+        """Returns when viser listens."""
+        # viser announces itself and every refusal on standard output, which belongs to the console's own links.
+        rich.get_console().quiet = True
+        logging.getLogger("websockets.server").setLevel(logging.ERROR)
+        self._server = await asyncio.to_thread(_start_viser)
+        self.port = self._server.get_port()
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            if self._description is not None and self._server is not None:
+                description, self._description = self._description, None
+                self._model = await asyncio.to_thread(_build, self._server, description)
+            if self._viewers and self._feedback is not None and self._model is not None:
+                feedback, self._feedback = self._feedback, None
+                await asyncio.to_thread(self._model.pose, feedback)
+                await asyncio.sleep(self._interval)
+
+    async def close(self) -> None:
+        """Idempotent."""
+        server, self._server = self._server, None
+        if server is not None:
+            async with asyncio.timeout(STOP_TIMEOUT):
+                await asyncio.to_thread(server.stop)
+
+
+def _start_viser() -> viser.ViserServer:
+    server = viser.ViserServer(host="127.0.0.1", port=0, label="Lockstep", verbose=False)
+    server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+    return server
+
+
+def _build(server: viser.ViserServer, description: RobotDescription) -> SceneModel:
+    with server.atomic():
+        server.scene.reset()
+        return SceneModel(server, description)

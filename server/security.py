@@ -1,0 +1,69 @@
+"""Security headers, and the check where a request comes from."""
+
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.errors import OriginRefused
+
+__all__ = ["PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "check_origin"]
+
+SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
+
+# The page loads only its own files; its workers may also come from blobs. Styles may be set on elements.
+PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; worker-src 'self' blob:; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; media-src 'self' blob:; font-src 'self' data:; connect-src 'self'; "
+    "frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+# viser's client is one HTML file: inline script, WebAssembly, workers and fonts from data and blob URLs.
+SCENE_POLICY = (
+    "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; worker-src 'self' blob: data:; "
+    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
+    "connect-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+
+HEADERS = {
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=(), gamepad=(self)",
+}
+
+
+class SecurityHeaders:
+    """Adds the headers to every HTTP answer."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        policy = SCENE_POLICY if scope["path"].startswith("/scene/") else PAGE_POLICY
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers["Content-Security-Policy"] = policy
+                for name, value in HEADERS.items():
+                    headers[name] = value
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
+
+
+def check_origin(headers: Headers, allowed: tuple[str, ...]) -> None:
+    """A browser says which page a request comes from; only our own pages and the allowed ones may change anything.
+
+    Raises:
+        OriginRefused: another site's page.
+    """
+    origin = headers.get("origin")
+    if origin is None or origin in allowed:
+        return  # not a browser, or a friend
+    if urlsplit(origin).netloc != headers.get("host"):
+        raise OriginRefused("requests from pages of other sites are refused")

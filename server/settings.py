@@ -1,0 +1,91 @@
+"""Settings of the console: environment variables LOCKSTEP_*, overridden by flags."""
+
+import ipaddress
+import secrets
+from typing import Annotated, Self
+from urllib.parse import urlsplit
+
+from pydantic import Field, SecretStr, field_validator, model_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+from server.media.settings import MediaSettings
+
+__all__ = ["Settings"]
+
+MIN_SECRET_BYTES = 32  # RFC 7518 3.2: an HS256 key is at least as long as the hash
+
+Addresses = Annotated[tuple[str, ...], NoDecode]  # "10.0.0.1,192.168.0.7" in the environment
+
+
+class Settings(BaseSettings):
+    """All that can be set. Times in seconds."""
+
+    model_config = SettingsConfigDict(env_prefix="LOCKSTEP_", env_nested_delimiter="__", frozen=True, extra="ignore")
+
+    host: str = "127.0.0.1"  # address that HTTP listens on
+    port: Annotated[int, Field(ge=0, le=65535)] = 8000  # 0: any free port
+    robot: str = "tcp://127.0.0.1:5600"  # the robot bridge
+    ice_hosts: Addresses = ()  # addresses offered to peers; empty: loopback when bound to it, else all interfaces
+    allowed_origins: Addresses = ()  # other origins whose pages may use the HTTP API, "https://example.org"
+    secret: SecretStr = Field(default_factory=lambda: SecretStr(secrets.token_urlsafe(MIN_SECRET_BYTES)))
+    token_seconds: Annotated[float, Field(gt=0)] = 7 * 24 * 3600.0
+
+    observer_feedback_hz: Annotated[float, Field(gt=0, le=100)] = 12.5
+    seat_timeout: Annotated[float, Field(gt=0)] = 3.0  # of silence, then the seat is free and the robot rests
+    peer_silence: Annotated[float, Field(gt=0)] = 20.0  # a peer with data channels that says nothing is closed
+    peer_connect_timeout: Annotated[float, Field(gt=0)] = 15.0  # from the answer to the connection
+    max_peers: Annotated[int, Field(ge=1)] = 200
+    max_message_rate: Annotated[float, Field(gt=0)] = 200.0  # Hz a peer; stop is never limited
+    max_sdp_bytes: Annotated[int, Field(ge=1024)] = 64 * 1024
+    link_backoff: Annotated[float, Field(gt=0)] = 0.1  # first wait before the robot link is tried again
+    link_backoff_cap: Annotated[float, Field(gt=0)] = 2.0
+
+    scene: bool = True  # serve the 3D view
+    scene_hz: Annotated[float, Field(gt=0, le=60)] = 15.0
+    scene_ticket_seconds: Annotated[float, Field(gt=0)] = 600.0
+    max_scene_viewers: Annotated[int, Field(ge=1)] = 20
+
+    media: MediaSettings = MediaSettings()
+
+    @field_validator("ice_hosts", "allowed_origins", mode="before")
+    @classmethod
+    def _split_list(cls, value: object) -> object:
+        return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
+
+    @field_validator("ice_hosts")
+    @classmethod
+    def _check_addresses(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        for address in value:
+            ipaddress.ip_address(address)
+        return value
+
+    @field_validator("secret")
+    @classmethod
+    def _check_secret(cls, value: SecretStr) -> SecretStr:
+        if len(value.get_secret_value().encode()) < MIN_SECRET_BYTES:
+            raise ValueError(f"at least {MIN_SECRET_BYTES} bytes are needed")
+        return value
+
+    @model_validator(mode="after")
+    def _check_robot(self) -> Self:
+        parts = urlsplit(self.robot)
+        if parts.scheme != "tcp" or not parts.hostname or not parts.port:
+            raise ValueError(f"{self.robot!r} is not tcp://host:port")
+        return self
+
+    @property
+    def robot_host(self) -> str:
+        return urlsplit(self.robot).hostname or ""
+
+    @property
+    def robot_port(self) -> int:
+        return urlsplit(self.robot).port or 0
+
+    @property
+    def bound_to_loopback(self) -> bool:
+        if self.host == "localhost":
+            return True
+        try:
+            return ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return False
