@@ -108,7 +108,7 @@ class Console:
             raise TypeError(stop)
         delivered = self.robot.send_stop(stop)
         self._undelivered_stop = None if delivered else stop
-        audit.warning("stop", by=by, where=where, reason=reason, event=self.clock.event, delivered=delivered)
+        audit.warning("stop", by=by, where=where, reason=reason, reference=self.clock.event, delivered=delivered)
         return delivered
 
     def reset(self, by: str, where: str) -> None:
@@ -121,7 +121,7 @@ class Console:
         if not isinstance(outcome, Forward) or not self._forward(outcome):
             raise LinkDown(self.robot.detail)
         self._metrics.resets.inc()
-        audit.warning("reset", by=by, where=where, event=self.clock.event)
+        audit.warning("reset", by=by, where=where, reference=self.clock.event)
 
     # PeerHost
 
@@ -273,7 +273,7 @@ class Console:
                 self._metrics.rests.labels(self.seat.seat.why).inc()
         if outcome.changed:
             seat = self.seat.seat
-            audit.info("seat", holder=seat.holder, name=seat.name, why=seat.why, event=self.clock.event)
+            audit.info("seat", holder=seat.holder, name=seat.name, why=seat.why, reference=self.clock.event)
             self.peers.tell("session", seat)
 
     def _rename(self, peer: Peer, name: str) -> None:

@@ -1,0 +1,179 @@
+"""A real console on a real bridge with the planar robot, and peers to talk to it."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import httpx
+from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from fastapi import FastAPI
+
+from robot_bridge.bridge import Bridge
+from robot_bridge.protocol.console import ClientMessage, Role, ServerMessage, decode_server_message
+from robot_bridge.protocol.console import encode_console_message as encode
+from robot_bridge.protocol.messages import Feedback
+from robot_bridge.robots.registry import create_robot
+from robot_bridge.settings import BridgeSettings
+from server.access import Access
+from server.app import create_app, make_access
+from server.serve import bind, running
+from server.services import Services
+from server.settings import Settings
+
+__all__ = ["PATIENCE", "Rig", "TestPeer", "running_bridge", "running_console", "running_rig"]
+
+PATIENCE = 10.0  # s; a busy machine, never waited for in full
+
+
+@dataclass
+class Rig:
+    """A running console.
+
+    Attributes:
+        url: "http://127.0.0.1:PORT"
+    """
+
+    url: str
+    app: FastAPI
+    access: Access
+    http: httpx.AsyncClient
+
+    @property
+    def services(self) -> Services:
+        found = self.app.state.services
+        assert isinstance(found, Services)
+        return found
+
+    def token(self, role: Role) -> dict[str, str]:
+        return {"Authorization": f"Bearer {self.access.issue(role, role)}"}
+
+    async def session(self) -> dict[str, Any]:
+        answer = await self.http.get("/api/session", headers=self.token("observer"))
+        found: dict[str, Any] = answer.json()
+        return found
+
+    def count(self, name: str, **labels: str) -> float:
+        """A metric's value; 0 when it was never touched."""
+        return self.services.metrics.registry.get_sample_value(name, labels) or 0.0
+
+    @asynccontextmanager
+    async def peer(self, role: Role, *channels: str) -> AsyncIterator["TestPeer"]:
+        """A peer with open data channels."""
+        peer = TestPeer()
+        try:
+            await peer.join(self, self.token(role), channels or ("control", "session", "stop"))
+            yield peer
+        finally:
+            await peer.close()
+
+
+class TestPeer:
+    """Speaks on data channels; keeps all that it hears."""
+
+    __test__ = False
+
+    def __init__(self) -> None:
+        self.pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+        self.channels: dict[str, RTCDataChannel] = {}
+        self.heard: list[ServerMessage] = []
+        self.closed = asyncio.Event()
+        self.location = ""
+        self._news = asyncio.Event()
+
+    async def join(self, rig: Rig, headers: dict[str, str], labels: tuple[str, ...]) -> None:
+        opened = []
+        for label in labels:
+            lossy = label == "control"
+            channel = self.pc.createDataChannel(label, ordered=not lossy, maxRetransmits=0 if lossy else None)
+            channel.on("message", self._hear)
+            channel.on("close", self.closed.set)
+            opened.append(self._until_open(channel))
+            self.channels[label] = channel
+        offer = await self.offer()
+        answer = await rig.http.post(
+            "/whep", content=offer, headers={**headers, "Content-Type": "application/sdp"}
+        )
+        assert answer.status_code == 201, answer.text
+        self.location = answer.headers["location"]
+        await self.pc.setRemoteDescription(RTCSessionDescription(answer.text, "answer"))
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.gather(*opened)
+
+    async def offer(self) -> str:
+        await self.pc.setLocalDescription(await self.pc.createOffer())
+        return self.pc.localDescription.sdp
+
+    def send(self, channel: str, message: ClientMessage) -> None:
+        self.channels[channel].send(encode(message))
+
+    def send_raw(self, channel: str, data: str | bytes) -> None:
+        self.channels[channel].send(data)
+
+    async def until(self, found: Callable[[ServerMessage], bool]) -> ServerMessage:
+        """The first message, heard already or to come, that `found` says yes to."""
+        async with asyncio.timeout(PATIENCE):
+            while True:
+                for message in self.heard:
+                    if found(message):
+                        return message
+                self._news.clear()
+                await self._news.wait()
+
+    async def feedback(self, found: Callable[[Feedback], bool] = lambda _: True) -> Feedback:
+        message = await self.until(lambda each: isinstance(each, Feedback) and found(each))
+        assert isinstance(message, Feedback)
+        return message
+
+    def newest_feedback(self) -> Feedback:
+        return next(each for each in reversed(self.heard) if isinstance(each, Feedback))
+
+    async def close(self) -> None:
+        await self.pc.close()
+
+    def _hear(self, text: str) -> None:
+        self.heard.append(decode_server_message(text))
+        self._news.set()
+
+    async def _until_open(self, channel: RTCDataChannel) -> None:
+        if channel.readyState != "open":
+            opened = asyncio.Event()
+            channel.on("open", opened.set)
+            await opened.wait()
+
+
+@asynccontextmanager
+async def running_bridge(port: int = 0) -> AsyncIterator[Bridge]:
+    async with Bridge(create_robot("planar"), BridgeSettings(port=port)) as bridge:
+        yield bridge
+
+
+@asynccontextmanager
+async def running_console(robot_port: int, **settings: Any) -> AsyncIterator[Rig]:
+    """A console on a free port; the scene only when asked for."""
+    wanted = Settings(**{"robot": f"tcp://127.0.0.1:{robot_port}", "port": 0, "scene": False, **settings})
+    access = make_access(wanted)
+    app = create_app(wanted, access)
+    listener = bind(wanted.host, wanted.port)
+    try:
+        url = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        async with running(app, listener), httpx.AsyncClient(base_url=url, trust_env=False) as http:
+            yield Rig(url, app, access, http)
+    finally:
+        listener.close()
+
+
+@asynccontextmanager
+async def running_rig(**settings: Any) -> AsyncIterator[Rig]:
+    """Bridge and console, connected."""
+    async with running_bridge() as bridge, running_console(bridge.address[1], **settings) as rig:
+        async with asyncio.timeout(PATIENCE):
+            await rig.services.console.robot.reached.wait()
+        yield rig
+
+
+def as_json(text: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(text)
+    return found
