@@ -3,6 +3,7 @@
 ConsoleError
 ├── LinkFormatError         the link given to Console is not one that `lockstep up` prints     (caller)
 ├── CommandError            values that no robot could be asked for                             (caller)
+├── NoSuchStream            a camera or microphone that is not received                        (caller)
 ├── SignallingRefused       the console answered WHEP with an error
 ├── ConnectFailed           the console, or the way to it, did not work within the time allowed
 ├── ConsoleLost             an established connection ended; terminal, make a new Console
@@ -18,6 +19,7 @@ __all__ = [
     "ConsoleError",
     "ConsoleLost",
     "LinkFormatError",
+    "NoSuchStream",
     "Refused",
     "SeatRefused",
     "SignallingRefused",
@@ -25,9 +27,9 @@ __all__ = [
 
 ADVICE = {
     "unauthorized": "use a link that the running console printed; links end with the console that printed them",
-    "forbidden": "this link's role does not permit it; use the operator's link",
+    "not_allowed": "this link's role does not permit it; use the operator's link",
     "robot_unreachable": "start the robot bridge, or give the console its address",
-    "unknown_stream": "offer only what the robot's description lists",
+    "too_many_peers": "close another connection first",
 }
 
 
@@ -48,6 +50,10 @@ class LinkFormatError(ConsoleError):
 
 class CommandError(ConsoleError):
     """An axis that the robot does not have, or a value that is not a number."""
+
+
+class NoSuchStream(ConsoleError):
+    """The robot has no such camera or microphone, or the console was told not to receive it."""
 
 
 class SignallingRefused(ConsoleError):

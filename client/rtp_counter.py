@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from client.rtp_header import find_extension, parse_rtp_header
+from client.rtp_header import RtpHeader, find_extension
 
 __all__ = ["RtpCounter"]
 
@@ -18,18 +18,16 @@ class RtpCounter:
         self.lost = 0
         self.stamp = 0
         self.unstamped = 0
-        self.codec = ""
+        self.payload_type = -1
         self._extension_id = extension_id
         self._read_stamp = read_stamp
         self._highest: int | None = None
         self._timestamp: int | None = None
 
-    def take(self, data: bytes) -> None:
-        """One decrypted RTP packet."""
-        header = parse_rtp_header(data)
-        if header is None:
-            return
+    def take(self, header: RtpHeader) -> None:
+        """One packet."""
         self.packets += 1
+        self.payload_type = header.payload_type
         if self._highest is None:
             self._highest = header.sequence
         else:

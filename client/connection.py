@@ -1,0 +1,343 @@
+"""A connected console: messages in and out, seat, stop, heartbeat. `Console` is its public face."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from client.command_gate import CommandGate, Pacing
+from client.driving import Driver
+from client.errors import CommandRefused, ConnectFailed, ConsoleError, ConsoleLost, SeatRefused, SignallingRefused
+from client.link import ConsoleLink
+from client.newest_queue import NewestQueue
+from client.peer import ChannelName, Peer, Route
+from client.pilot import Pilot
+from client.ping_ledger import PingLedger
+from client.reception import Reception
+from client.sdp import Section
+from client.statistics import ConsoleStatistics, EventRate, percentiles
+from robot_bridge.protocol.carriers import Carrier
+from robot_bridge.protocol.console import (
+    Participants,
+    Rename,
+    Report,
+    RobotState,
+    Seat,
+    SeatRelease,
+    SeatRequest,
+    StopStateNotice,
+    Welcome,
+    decode_server_message,
+)
+from robot_bridge.protocol.errors import MessageError
+from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Reset, Stop, StopState
+
+__all__ = ["Connection", "ConnectionOptions"]
+
+HEARTBEAT = 0.5  # s between two reports, and between two pings
+ANSWER_SECONDS = 5.0  # for the console to answer a request
+STOP_SECONDS = 0.3  # for the stop to be confirmed before HTTP is tried as well
+RETRY_SECONDS = 1.0  # while the robot is not reached yet; what the console's Retry-After says
+
+
+@dataclass(frozen=True)
+class ConnectionOptions:
+    """What `Console` was told."""
+
+    link: ConsoleLink
+    pacing: Pacing
+    tolerance: dict[str, int]  # by kind of medium
+    gate: bool
+    carrier: Carrier
+    video: int
+    audio: bool
+    decode: bool
+    codec: str | None
+    event_rate: float | None
+    name: str
+    connect_seconds: float
+    silence_seconds: float
+    route: Route | None
+
+
+class Connection:
+    """`open`, use, `close`. After the connection ended by itself, `lost` says why and every wait raises it."""
+
+    def __init__(self, options: ConnectionOptions) -> None:
+        self.options = options
+        self.lost: ConsoleLost | None = None
+        self.seat = Seat()
+        self.stop_state = StopState()
+        self.participants = Participants(participants=[])
+        self.malformed = 0  # messages from the console that could not be read
+        self.feedback_readers: list[NewestQueue[Feedback]] = []
+        self.media = Reception(options.carrier, options.tolerance, options.gate, self._rendered)
+        self._loop = asyncio.get_running_loop()
+        self._changed = asyncio.Event()  # a message came, or the connection ended
+        self._welcome: Welcome | None = None
+        self._robot: RobotState | None = None
+        self._driver: Driver | None = None
+        self._early_feedback: Feedback | None = None  # came before the robot's description
+        self._refusals: deque[Refusal] = deque(maxlen=16)  # of requests, not of commands
+        self._event_rate = EventRate()
+        self._pings = PingLedger()
+        self._heard_at = self._loop.time()
+        self._running: asyncio.Task[None] | None = None
+        self._peer = self._new_peer()
+
+    def _new_peer(self) -> Peer:
+        options = self.options
+        return Peer(
+            options.link,
+            carrier=options.carrier,
+            video=options.video,
+            audio=options.audio,
+            codec=options.codec,
+            route=options.route,
+            on_message=self._received,
+        )
+
+    # Its life
+
+    async def open(self) -> None:
+        """Connect; returns when the robot is known. Raises SignallingRefused or ConnectFailed."""
+        deadline = self._loop.time() + self.options.connect_seconds
+        sections = await self._negotiate(deadline)
+        self.media.prepare(self._peer, sections, self.options.decode)
+        await self._peer.connect(deadline - self._loop.time())
+        self._heard_at = self._loop.time()
+        self._peer.send("session", Rename(name=self.options.name))
+        self._running = self._loop.create_task(self._run(), name="console connection")
+        try:
+            async with asyncio.timeout_at(deadline):
+                await self._until(lambda: self._welcome is not None and self._driver is not None)
+        except TimeoutError:
+            raise ConnectFailed("connected, but the console said nothing of its robot") from None
+        except ConsoleLost as error:
+            raise ConnectFailed(error.detail) from error
+
+    async def _negotiate(self, deadline: float) -> list[Section]:
+        """Try again while the console does not reach its robot."""
+        while True:
+            try:
+                return await self._peer.negotiate()
+            except SignallingRefused as error:
+                if error.error != "robot_unreachable" or self._loop.time() + RETRY_SECONDS > deadline:
+                    raise
+            await self._peer.close()
+            await asyncio.sleep(RETRY_SECONDS)
+            self._peer = self._new_peer()
+
+    async def _run(self) -> None:
+        """The session: returns when the connection ended or was closed."""
+        try:
+            async with asyncio.TaskGroup() as group:
+                tasks = [group.create_task(self.media.run()), group.create_task(self._heartbeat())]
+                await self._peer.ended.wait()
+                for task in tasks:
+                    task.cancel()
+        finally:
+            self._end(ConsoleLost(self._peer.why or "closed"))
+
+    def _end(self, lost: ConsoleLost) -> None:
+        if self.lost is not None:
+            return
+        self.lost = lost
+        if self._driver is not None:
+            self._driver.end(lost)
+        self.media.end()
+        for reader in self.feedback_readers:
+            reader.close()
+        self._wake_waiters()
+
+    async def close(self) -> None:
+        """End everything. Idempotent."""
+        await self._peer.close()
+        if self._running is not None:
+            await self._running
+        self._end(ConsoleLost("closed"))
+        self.media.close()
+
+    async def _until(self, condition: Callable[[], bool]) -> None:
+        """Wait for what a message will make true. Raises ConsoleLost."""
+        while not condition():
+            if self.lost is not None:
+                raise self.lost
+            await self._changed.wait()
+
+    def _wake_waiters(self) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    async def _heartbeat(self) -> None:
+        while True:
+            now = self._loop.time()
+            if now - self._heard_at > self.options.silence_seconds:
+                self._peer.lose(f"nothing was heard from the console for {self.options.silence_seconds:g} s")
+            if self._pings.lost(now):
+                self.driver.loss()
+            self._peer.send("control", Ping(id=self._pings.send(now)))
+            self._peer.send("control", self._report())
+            await asyncio.sleep(HEARTBEAT)
+
+    # What the console says
+
+    def _received(self, data: str | bytes) -> None:
+        try:
+            message = decode_server_message(data)
+        except MessageError:
+            self.malformed += 1
+            return
+        self._heard_at = self._loop.time()
+        match message:
+            case Feedback():
+                self._take_feedback(message)
+            case Refusal():
+                self._take_refusal(message)
+            case Pong(id=number):
+                self._pings.answered(number, self._heard_at)
+            case Welcome():
+                self._welcome = message
+            case RobotState():
+                self._take_robot(message)
+            case Seat():
+                self.seat = message
+            case StopStateNotice():
+                self.stop_state = message.stop
+            case Participants():
+                self.participants = message
+        self._wake_waiters()
+
+    def _take_feedback(self, feedback: Feedback) -> None:
+        if self._driver is None:
+            self._early_feedback = feedback
+            return
+        if not self._driver.feedback(feedback):
+            return
+        self.stop_state = feedback.stop
+        self._event_rate.event(feedback.event, self._loop.time())
+        self.media.feedback(feedback.event)
+        for reader in self.feedback_readers:
+            reader.put(feedback)
+
+    def _take_refusal(self, refusal: Refusal) -> None:
+        if refusal.event == 0:
+            self._refusals.append(refusal)
+        elif self._driver is not None:
+            self._driver.refusal(refusal)
+
+    def _take_robot(self, robot: RobotState) -> None:
+        self._robot = robot
+        if self._driver is not None:
+            return
+        description = robot.description
+        rate = min(description.max_event_rate, self.options.event_rate or description.max_event_rate)
+        gate = CommandGate(self.options.pacing, self.options.tolerance["video"], 1 / rate)
+        pilot = Pilot(gate, [axis.rest for axis in description.axes])
+        self._driver = Driver(pilot, lambda message: self._peer.send("control", message))
+        if self._early_feedback is not None:
+            self._take_feedback(self._early_feedback)
+
+    def _rendered(self, stream: str, stamp: int) -> None:
+        cameras = self._robot.description.cameras if self._robot is not None else ()
+        if self._driver is not None and cameras and stream == cameras[0].name:
+            self._driver.shown(stamp)
+
+    # What is known after `open`
+
+    @property
+    def driver(self) -> Driver:
+        if self._driver is None:
+            raise ConsoleLost("not connected yet")
+        return self._driver
+
+    @property
+    def robot(self) -> RobotState:
+        if self._robot is None:
+            raise ConsoleLost("not connected yet")
+        return self._robot
+
+    @property
+    def welcome(self) -> Welcome:
+        if self._welcome is None:
+            raise ConsoleLost("not connected yet")
+        return self._welcome
+
+    @property
+    def holds_seat(self) -> bool:
+        return self._welcome is not None and self.seat.holder == self._welcome.peer
+
+    def statistics(self) -> ConsoleStatistics:
+        pilot, delays = self.driver.pilot, self.driver.picture_delay.samples
+        return ConsoleStatistics(
+            event=pilot.newest.event if pilot.newest is not None else 0,
+            armed=pilot.armed,
+            streams=self.media.statistics(),
+            picture_delay_ms=delays[-1] * 1000 if delays else None,
+            round_trip_ms=self._pings.round_trip * 1000 if self._pings.round_trip is not None else None,
+            command_to_feedback_ms=percentiles(pilot.samples, 1000),
+            event_rate_hz=self._event_rate.rate(self._loop.time()),
+            repeats=pilot.repeats,
+            echoes=pilot.echoes,
+        )
+
+    def _report(self) -> Report:
+        figures = self.statistics()
+        return Report(
+            event=figures.event,
+            armed=figures.armed,
+            streams=[stream.report() for stream in figures.streams],
+            picture_delay_ms=figures.picture_delay_ms,
+            round_trip_ms=figures.round_trip_ms,
+        )
+
+    # What is asked of the console
+
+    async def take_seat(self) -> None:
+        """Raises SeatRefused."""
+        refusal = await self._ask(lambda: self.holds_seat, "session", SeatRequest())
+        if refusal is not None:
+            raise SeatRefused(
+                refusal.reason, refusal.detail or (f"{self.seat.name} holds it" if self.seat.name else "")
+            )
+
+    def release_seat(self) -> None:
+        self._peer.send("session", SeatRelease())
+
+    async def reset(self) -> StopState:
+        """Raises CommandRefused."""
+        refusal = await self._ask(lambda: not self.stop_state.stopped, "stop", Reset(by=self.options.name))
+        if refusal is not None:
+            raise CommandRefused(refusal.reason, refusal.detail)
+        return self.stop_state
+
+    async def _ask(
+        self, granted: Callable[[], bool], channel: ChannelName, message: SeatRequest | Reset
+    ) -> Refusal | None:
+        """Send a request; None when it was granted, else the refusal."""
+        self._refusals.clear()
+        self._peer.send(channel, message)
+        try:
+            async with asyncio.timeout(ANSWER_SECONDS):
+                await self._until(lambda: granted() or bool(self._refusals))
+        except TimeoutError:
+            raise ConsoleLost(f"no answer from the console within {ANSWER_SECONDS:g} s") from None
+        return None if granted() else self._refusals.popleft()
+
+    async def stop(self, reason: str) -> StopState:
+        """Raises ConsoleLost when neither the data channel nor HTTP reached the console."""
+        self._peer.send("stop", Stop(by=self.options.name, reason=reason))
+        try:
+            async with asyncio.timeout(STOP_SECONDS):
+                await self._until(lambda: self.stop_state.stopped)
+        except (TimeoutError, ConsoleLost):
+            await self._stop_by_http(reason)
+        return self.stop_state
+
+    async def _stop_by_http(self, reason: str) -> None:
+        try:
+            await self._peer.stop_by_http(reason)
+        except ConsoleError as error:
+            raise ConsoleLost(f"the stop was not confirmed: {error}") from error
+        if not self.stop_state.stopped:
+            self.stop_state = StopState(stopped=True, by=self.options.name, reason=reason)

@@ -1,0 +1,271 @@
+"""The console without a browser: connect, watch, drive."""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Mapping, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from client.command_gate import GateState, Pacing
+from client.connection import Connection, ConnectionOptions
+from client.errors import CommandError, ConsoleError, ConsoleLost
+from client.link import parse_link
+from client.newest_queue import NewestQueue, QueueClosed
+from client.peer import Route
+from client.statistics import ConsoleStatistics
+from client.stream import Picture, Sound, Stream
+from robot_bridge.protocol.carriers import Carrier
+from robot_bridge.protocol.console import Seat
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Feedback, StopState
+
+__all__ = ["Console"]
+
+LEAVE_SECONDS = 1.5  # for the robot to come to rest before the connection is closed
+
+
+class Console:
+    """One connection to a Lockstep console; an async context manager. A lost one is not used again: make another.
+
+    Args:
+        link: what `lockstep up` printed: "http://host:port/#token=…"
+        pacing: "feedback": the next command waits for the feedback of the last; "media": also for its picture
+        tolerance: largest gap of a rendered picture, in events
+        audio_tolerance: the same for sound
+        gate: False renders everything, whatever its gap
+        carrier: how the event reference travels with media; the only one that is offered
+        video: how many cameras at most; True: four, False: none
+        audio: whether to receive sound
+        decode: False only counts RTP packets and frames: no pictures, no sound, next to no cost
+        codec: "VP8" or "H264"; None: what the console prefers
+        event_rate: most events per second; None: what the robot's description says. Never more than that
+        name: what other participants see
+        connect_seconds: allowed for connecting, waiting for the robot included
+        silence_seconds: without any message from the console after which it counts as lost
+        route: passes the connection through a relay; for measurements
+    """
+
+    def __init__(
+        self,
+        link: str,
+        *,
+        pacing: Pacing = "feedback",
+        tolerance: int = 4,
+        audio_tolerance: int = 6,
+        gate: bool = True,
+        carrier: Carrier = "native",
+        video: bool | int = True,
+        audio: bool = True,
+        decode: bool = True,
+        codec: str | None = None,
+        event_rate: float | None = None,
+        name: str = "script",
+        connect_seconds: float = 15.0,
+        silence_seconds: float = 5.0,
+        route: Route | None = None,
+    ) -> None:
+        self._options = ConnectionOptions(
+            link=parse_link(link),
+            pacing=pacing,
+            tolerance={"video": tolerance, "audio": audio_tolerance},
+            gate=gate,
+            carrier=carrier,
+            video=4 if video is True else int(video),
+            audio=audio,
+            decode=decode,
+            codec=codec,
+            event_rate=event_rate,
+            name=name,
+            connect_seconds=connect_seconds,
+            silence_seconds=silence_seconds,
+            route=route,
+        )
+        self._connection: Connection | None = None
+
+    async def __aenter__(self) -> Self:
+        """Connect.
+
+        Raises:
+            SignallingRefused: the console refused, as with an old link.
+            ConnectFailed: no console, no robot or no way there within `connect_seconds`.
+        """
+        connection = Connection(self._options)
+        try:
+            await connection.open()
+        except BaseException:
+            await connection.close()
+            raise
+        self._connection = connection
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Let go of the robot and the seat, then close."""
+        connection = self._live()
+        try:
+            if connection.holds_seat and connection.lost is None:
+                async with asyncio.timeout(LEAVE_SECONDS):
+                    await connection.driver.rest()
+        except (ConsoleError, TimeoutError):
+            pass  # the robot comes to rest by itself when its operator is gone
+        finally:
+            if connection.holds_seat:
+                connection.release_seat()
+            await connection.close()
+
+    # What is known
+
+    @property
+    def description(self) -> RobotDescription:
+        """The robot: its axes, sensors, cameras."""
+        return self._live().robot.description
+
+    @property
+    def epoch(self) -> str:
+        """The run of the robot bridge; event references of two epochs are not comparable."""
+        return self._live().robot.epoch
+
+    @property
+    def feedback(self) -> Feedback | None:
+        """The newest one; None before the first."""
+        return self._live().driver.pilot.newest
+
+    @property
+    def gate_state(self) -> GateState:
+        """Whether a command could leave now, and if not, why."""
+        return self._live().driver.pilot.gate.state(asyncio.get_running_loop().time())
+
+    @property
+    def seat(self) -> Seat:
+        """Who may drive."""
+        return self._live().seat
+
+    @property
+    def peer(self) -> str:
+        """This connection's id, as in `seat.holder`."""
+        return self._live().welcome.peer
+
+    def stats(self) -> ConsoleStatistics:
+        """Figures since the connection began."""
+        return self._live().statistics()
+
+    # Driving
+
+    async def take_seat(self) -> None:
+        """Take the control seat.
+
+        Raises:
+            SeatRefused: somebody else holds it, or this link is an observer's.
+        """
+        await self._live().take_seat()
+
+    def release_seat(self) -> None:
+        """Give the control seat back."""
+        self._live().release_seat()
+
+    async def drive(self, values: Mapping[str, float] | Sequence[float]) -> Feedback:
+        """Send one command as soon as the gate is open; the feedback that answers it.
+
+        `values` has one value per axis in the description's order, or names axes; those not named get their value
+        at rest. The first call arms: from then on, whenever 200 ms pass without another call, the console sends
+        neutral values, five times a second, until `rest`. A lost command is repeated; one that came too late is
+        tried again on fresh feedback.
+
+        Raises:
+            CommandError: an unknown axis, or a value that is not finite.
+            CommandRefused: the robot is stopped, this console does not hold the seat, …
+            ConsoleLost: the connection ended.
+        """
+        connection = self._live()
+        return await connection.driver.drive(self._command(values))
+
+    def _command(self, values: Mapping[str, float] | Sequence[float]) -> list[float]:
+        axes = self.description.axes
+        if isinstance(values, Mapping):
+            unknown = values.keys() - {axis.name for axis in axes}
+            if unknown:
+                known = ", ".join(axis.name for axis in axes)
+                raise CommandError(f"no axis {', '.join(sorted(unknown))}; there are {known}")
+            command = [float(values.get(axis.name, axis.rest)) for axis in axes]
+        else:
+            command = [float(value) for value in values]
+        if len(command) != len(axes):
+            raise CommandError(f"{len(command)} values for {len(axes)} axes")
+        if not all(math.isfinite(value) for value in command):
+            raise CommandError("a value is NaN or infinite")
+        return command
+
+    async def rest(self) -> None:
+        """Let go: past the gate, at once, repeated until the robot is proven to be at rest. Disarms."""
+        await self._live().driver.rest()
+
+    async def stop(self, reason: str = "") -> StopState:
+        """Latch the stop, from any role, at any time; over HTTP as well when the data channel does not confirm it.
+
+        Raises:
+            ConsoleLost: neither way reached the console.
+        """
+        return await self._live().stop(reason)
+
+    async def reset(self) -> StopState:
+        """Release the latched stop; moves nothing.
+
+        Raises:
+            CommandRefused: this link's role does not permit it.
+        """
+        return await self._live().reset()
+
+    # Watching
+
+    async def feedbacks(self) -> AsyncIterator[Feedback]:
+        """Every new feedback, the newest first if the reader is slow. Raises ConsoleLost when the connection ends."""
+        connection = self._live()
+        queue: NewestQueue[Feedback] = NewestQueue(1)
+        connection.feedback_readers.append(queue)
+        try:
+            while True:
+                yield await queue.get()
+        except QueueClosed:
+            self._raise_lost(connection)
+        finally:
+            connection.feedback_readers.remove(queue)
+
+    async def pictures(self, camera: str = "", *, keep: int = 2) -> AsyncIterator[Picture]:
+        """Pictures of a camera ("" is the main one) that passed the gate, each judged once more when it is taken.
+
+        A reader that is slow loses the oldest: at most `keep` wait. Raises ConsoleLost when the connection ends.
+        """
+        connection = self._live()
+        async for stream, medium in self._media(connection, connection.media.stream("video", camera), keep):
+            yield Picture(stream.name, medium.stamp, stream.gate.check(medium.stamp)[1], medium.frame)
+
+    async def sounds(self, microphone: str = "", *, keep: int = 50) -> AsyncIterator[Sound]:
+        """Segments of a microphone ("" is the first) that passed the gate; as `pictures`."""
+        connection = self._live()
+        async for stream, medium in self._media(connection, connection.media.stream("audio", microphone), keep):
+            yield Sound(stream.name, medium.stamp, stream.gate.check(medium.stamp)[1], medium.frame)
+
+    async def _media(self, connection: Connection, stream: Stream, keep: int) -> AsyncIterator[tuple[Stream, Any]]:
+        reader = stream.open_reader(keep)
+        try:
+            while True:
+                medium = await reader.get()
+                if stream.gate.check(medium.stamp)[0] == "render":
+                    yield stream, medium
+                else:
+                    reader.dropped += 1
+        except QueueClosed:
+            self._raise_lost(connection)
+        finally:
+            stream.close_reader(reader)
+
+    @staticmethod
+    def _raise_lost(connection: Connection) -> None:
+        if connection.lost is not None:
+            raise connection.lost
+
+    def _live(self) -> Connection:
+        if self._connection is None:
+            raise ConsoleLost("not connected: use `async with Console(link) as console`")
+        return self._connection

@@ -1,0 +1,191 @@
+"""One WHEP connection to a console: peer connection, data channels, received streams."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Literal, Protocol
+
+from aiortc import RTCBundlePolicy, RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from aiortc.rtcrtpparameters import RTCRtpCodecCapability
+from aiortc.rtcrtpreceiver import RTCRtpReceiver
+
+from client.aiortc_private import PacketSink, gather_only_on, hasten_sctp, take_packets, take_raw_rtp
+from client.errors import ConnectFailed, ConsoleError
+from client.link import ConsoleLink
+from client.sdp import Section, offer_extension, read_sections
+from client.whep import Whep
+from robot_bridge.protocol.carriers import (
+    CAPTURE_TIME_URI,
+    EVENT_REFERENCE_URI,
+    Carrier,
+    unpack_capture_time,
+    unpack_event_reference,
+)
+from robot_bridge.protocol.console import ClientMessage, encode_console_message
+
+__all__ = ["ChannelName", "Peer", "Route", "stamp_reader"]
+
+ChannelName = Literal["control", "session", "stop"]
+CHANNELS: tuple[ChannelName, ...] = ("control", "session", "stop")
+CONTROL_BACKLOG = 4096  # bytes; a message on `control` is worth nothing behind so many others
+CLOSE_SECONDS = 3.0
+EXTENSION_URIS: dict[Carrier, str] = {"native": EVENT_REFERENCE_URI, "capture-time": CAPTURE_TIME_URI}
+
+
+class Route(Protocol):
+    """Changes the descriptions on their way, so that the connection passes a relay."""
+
+    def offer(self, sdp: str) -> str: ...
+
+    def answer(self, sdp: str) -> str: ...
+
+
+def stamp_reader(carrier: Carrier) -> Callable[[bytes], int | None]:
+    """How to read the header extension of `carrier`."""
+    return unpack_capture_time if carrier == "capture-time" else unpack_event_reference
+
+
+class Peer:
+    """Order: `connect`, then `send` until `ended` is set, then `close`."""
+
+    def __init__(
+        self,
+        link: ConsoleLink,
+        *,
+        carrier: Carrier,
+        video: int,
+        audio: bool,
+        codec: str | None,
+        route: Route | None,
+        on_message: Callable[[str | bytes], None],
+    ) -> None:
+        self.ended = asyncio.Event()
+        self.why = ""  # the connection ended
+        self.skipped = 0  # messages on `control` that found others waiting
+        self._link = link
+        self._carrier = carrier
+        self._route = route
+        self._on_message = on_message
+        self._whep = Whep(link)
+        self._resource = ""
+        self._closing = False
+        self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
+        self._open = {name: asyncio.Event() for name in CHANNELS}
+        for _ in range(video):
+            transceiver = self._pc.addTransceiver("video", direction="recvonly")
+            if codec is not None:
+                transceiver.setCodecPreferences(_preferred(codec))
+        if audio:
+            self._pc.addTransceiver("audio", direction="recvonly")
+        self._channels = {name: self._create_channel(name) for name in CHANNELS}
+        self._pc.on("connectionstatechange", self._state_changed)
+
+    def _create_channel(self, name: ChannelName) -> RTCDataChannel:
+        if name == "control":
+            channel = self._pc.createDataChannel(name, ordered=False, maxRetransmits=0)
+        else:
+            channel = self._pc.createDataChannel(name)
+        channel.on("open", self._open[name].set)
+        channel.on("message", self._on_message)
+        channel.on("close", lambda: self.lose(f"the console closed the channel {name}"))
+        return channel
+
+    def _state_changed(self) -> None:
+        if self._pc.connectionState in ("failed", "closed"):
+            self.lose("the console closed the connection")
+
+    def lose(self, why: str) -> None:
+        """Count the connection as lost; the first reason stands."""
+        if not self._closing and not self.ended.is_set():
+            self.why = why
+            self.ended.set()
+
+    async def negotiate(self) -> list[Section]:
+        """Offer, and take the answer: its media sections.
+
+        Raises:
+            SignallingRefused, ConnectFailed: as `Whep.offer`.
+        """
+        if self._link.loopback:
+            gather_only_on(self._pc, ["127.0.0.1"])
+        hasten_sctp(self._pc)
+        offer = await self._pc.createOffer()
+        uri = EXTENSION_URIS.get(self._carrier)
+        await self._pc.setLocalDescription(RTCSessionDescription(offer_extension(offer.sdp, uri), "offer"))
+        sdp = self._pc.localDescription.sdp
+        sent = sdp if self._route is None else self._route.offer(sdp)
+        answer = await self._whep.offer(sent, trailer=self._carrier == "trailer")
+        self._resource = answer.resource
+        self._answer = answer.sdp if self._route is None else self._route.answer(answer.sdp)
+        return read_sections(self._answer)
+
+    def extension_id(self, sections: list[Section]) -> int | None:
+        """The id under which the console sends the carrier's header extension."""
+        uri = EXTENSION_URIS.get(self._carrier)
+        return next((section.extensions[uri] for section in sections if uri and uri in section.extensions), None)
+
+    def take_packets(self, sinks: dict[str, PacketSink], extension_id: int | None) -> None:
+        """Give packets to the sink of their section's mid. Between `negotiate` and `connect`."""
+        take_packets(self._pc, sinks, extension_id, stamp_reader(self._carrier))
+
+    def take_raw_rtp(self, take: Callable[[bytes], None]) -> None:
+        """Give every RTP packet to `take`, and nothing to anybody else. Between `negotiate` and `connect`."""
+        take_raw_rtp(self._pc, take)
+
+    async def connect(self, seconds: float) -> None:
+        """Connect; returns when the data channels are open.
+
+        Raises:
+            ConnectFailed: no way to the console over UDP within `seconds`.
+        """
+        try:
+            await self._pc.setRemoteDescription(RTCSessionDescription(self._answer, "answer"))
+        except ValueError as error:
+            raise ConnectFailed(f"the console's answer cannot be read: {error}") from error
+        try:
+            async with asyncio.timeout(seconds):
+                for opened in self._open.values():
+                    await opened.wait()
+        except TimeoutError:
+            detail = f"no data channel after {seconds:g} s: is UDP between here and the console blocked?"
+            raise ConnectFailed(detail) from None
+
+    def send(self, channel: ChannelName, message: ClientMessage) -> None:
+        """Send; on `control`, unless others still wait: an old command must not leave behind a newer one."""
+        target = self._channels[channel]
+        if target.readyState != "open":
+            return
+        if channel == "control" and target.bufferedAmount > CONTROL_BACKLOG:
+            self.skipped += 1
+            return
+        target.send(encode_console_message(message))
+
+    async def stop_by_http(self, reason: str) -> None:
+        """The way to stop that needs no data channel; raises as `Whep.stop`."""
+        await self._whep.stop(reason)
+
+    async def close(self) -> None:
+        """End the connection and say so to the console. Idempotent."""
+        if self._closing:
+            return
+        self._closing = True
+        self.ended.set()
+        try:
+            async with asyncio.timeout(CLOSE_SECONDS):
+                if self._resource:
+                    await self._whep.end(self._resource)
+        except (TimeoutError, ConsoleError):
+            pass  # it ends the session by itself when nothing arrives any more
+        finally:
+            await self._pc.close()
+            await self._whep.aclose()
+
+
+def _preferred(codec: str) -> list[RTCRtpCodecCapability]:
+    """The capabilities with `codec` alone, and its retransmissions."""
+    capabilities = RTCRtpReceiver.getCapabilities("video")
+    known = capabilities.codecs if capabilities is not None else []
+    names = {f"video/{codec}".lower(), "video/rtx"}
+    chosen = [capability for capability in known if capability.mimeType.lower() in names]
+    if len(chosen) < 2:
+        raise ValueError(f"no codec {codec}; there are VP8 and H264")
+    return chosen

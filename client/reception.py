@@ -1,0 +1,136 @@
+"""The media of one connection: a stream for each received section, or mere counters."""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Protocol
+
+from client.aiortc_private import PacketSink
+from client.errors import NoSuchStream
+from client.media_gate import MediaGate
+from client.peer import stamp_reader
+from client.rtp_counter import RtpCounter
+from client.rtp_header import parse_rtp_header
+from client.sdp import Section
+from client.statistics import StreamStatistics
+from client.stream import Stream
+from robot_bridge.protocol.carriers import Carrier
+
+__all__ = ["PacketSource", "Reception"]
+
+DECODERS = 2  # threads
+
+
+class PacketSource(Protocol):
+    """Where packets come from."""
+
+    def extension_id(self, sections: list[Section]) -> int | None: ...
+    def take_packets(self, sinks: dict[str, PacketSink], extension_id: int | None) -> None: ...
+    def take_raw_rtp(self, take: Callable[[bytes], None]) -> None: ...
+
+
+class Reception:
+    """`prepare` with the answer's sections, then `run`; `close` at the end."""
+
+    def __init__(
+        self,
+        carrier: Carrier,
+        tolerance: dict[str, int],
+        gate: bool,
+        on_render: Callable[[str, int], None],
+    ) -> None:
+        self._carrier = carrier
+        self._tolerance = tolerance
+        self._gate = gate
+        self._on_render = on_render
+        self._streams: list[Stream] = []
+        self._counters: dict[int, tuple[Section, RtpCounter]] = {}  # by SSRC
+        self._executor: ThreadPoolExecutor | None = None
+
+    def prepare(self, source: PacketSource, sections: list[Section], decode: bool) -> None:
+        """Take the packets of `source`: into decoders, or only counting them."""
+        extension_id = source.extension_id(sections)
+        received = [section for section in sections if section.receives]
+        if not decode:
+            for section in received:
+                counter = RtpCounter(extension_id, stamp_reader(self._carrier))
+                self._counters[section.ssrcs[0] if section.ssrcs else 0] = (section, counter)
+            source.take_raw_rtp(self._count)
+            return
+        sinks: dict[str, PacketSink] = {}
+        for section in received:
+            sinks[section.mid] = stream = self._new_stream(section)
+            self._streams.append(stream)
+        source.take_packets(sinks, extension_id)
+        self._executor = ThreadPoolExecutor(DECODERS, thread_name_prefix="decoder")
+
+    def _new_stream(self, section: Section) -> Stream:
+        tolerance = self._tolerance[section.kind]
+        return Stream(
+            section.stream,
+            section.kind,
+            section.codecs,
+            self._carrier,
+            MediaGate(tolerance, self._gate),
+            self._on_render,
+        )
+
+    def _count(self, data: bytes) -> None:
+        header = parse_rtp_header(data)
+        if header is not None and header.ssrc in self._counters:
+            self._counters[header.ssrc][1].take(header)
+
+    async def run(self) -> None:
+        """Decode until cancelled."""
+        if self._executor is None:
+            return
+        async with asyncio.TaskGroup() as group:
+            for stream in self._streams:
+                group.create_task(stream.run(self._executor))
+
+    def feedback(self, event: int) -> None:
+        """The newest feedback is of `event`."""
+        for stream in self._streams:
+            stream.feedback(event)
+
+    def stream(self, kind: str, name: str) -> Stream:
+        """The stream `name`, or the first of its kind when `name` is empty.
+
+        Raises:
+            NoSuchStream: it is not received.
+        """
+        streams = [stream for stream in self._streams if stream.kind == kind]
+        for stream in streams:
+            if name in ("", stream.name):
+                return stream
+        known = ", ".join(stream.name for stream in streams) or "none"
+        raise NoSuchStream(f"no {kind} stream {name!r} is received; there is: {known}")
+
+    def statistics(self) -> list[StreamStatistics]:
+        return [stream.statistics() for stream in self._streams] + [
+            self._counted(section, counter) for section, counter in self._counters.values()
+        ]
+
+    def _counted(self, section: Section, counter: RtpCounter) -> StreamStatistics:
+        return StreamStatistics(
+            stream=section.stream,
+            kind=section.kind,
+            codec=section.codecs.get(counter.payload_type, ""),
+            carrier=self._carrier,
+            stamp=counter.stamp,
+            packets=counter.packets,
+            frames=counter.frames,
+            lost=counter.lost,
+            unstamped=counter.unstamped,
+        )
+
+    def end(self) -> None:
+        """Nothing will come any more."""
+        for stream in self._streams:
+            stream.close()
+
+    def close(self) -> None:
+        """Wait for the decoders. Idempotent."""
+        self.end()
+        if self._executor is not None:
+            self._executor.shutdown(wait=True)
