@@ -93,11 +93,10 @@ class Viewer:
         self.answer = answer
         self.received: list[Received] = []
         self.lose: Callable[[Received], bool] = lambda received: False
-        self.pictures: list[Any] = []
         self._changed = asyncio.Condition()
 
     async def until(self, condition: Callable[[], bool]) -> None:
-        """Wait until `condition` holds; it is checked after every packet and picture."""
+        """Wait until `condition` holds; it is checked after everything either side receives."""
         async with asyncio.timeout(TIMEOUT), self._changed:
             await self._changed.wait_for(condition)
 
@@ -124,7 +123,9 @@ class Viewer:
 
 @asynccontextmanager
 async def running_plane(robot: RobotDescription | None = None, **settings: Any) -> AsyncIterator[MediaPlane]:
-    plane = MediaPlane(MediaSettings(**settings), CollectorRegistry())
+    registry = CollectorRegistry()
+    plane = MediaPlane(MediaSettings(**settings), registry)
+    cast(Any, plane).registry = registry  # for tests that read metrics
     plane.configure(robot or description())
     try:
         yield plane
@@ -144,6 +145,8 @@ def prefer(pc: RTCPeerConnection, codecs: Sequence[str]) -> None:
         assert capabilities is not None
         known = {name.lower() for name in codecs} | {"rtx"}
         wanted = [c for c in capabilities.codecs if c.mimeType.split("/")[1].lower() in known]
+        order = [name.lower() for name in codecs]
+        wanted.sort(key=lambda c: [*order, "rtx"].index(c.mimeType.split("/")[1].lower()))
         if any(not c.mimeType.endswith("rtx") for c in wanted):
             transceiver.setCodecPreferences(wanted)
 
@@ -172,6 +175,7 @@ async def viewing(
         answer = server.localDescription.sdp
         viewer = Viewer(pc, server, media, answer)
         _record(viewer, {identifier: uri for uri, identifier in _answered(answer).items()})
+        _notify_of_server_input(viewer)
         await pc.setRemoteDescription(RTCSessionDescription(answer, "answer"))
         await _connected(pc)
         await _connected(server)
@@ -179,6 +183,18 @@ async def viewing(
     finally:
         await server.close()
         await pc.close()
+
+
+def _notify_of_server_input(viewer: Viewer) -> None:
+    """Wake `until` after everything the server receives, too."""
+    for transport in {cast(Any, t.receiver.transport) for t in viewer.server.getTransceivers()}:
+        receive = transport._recv_next
+
+        async def received(receive: Any = receive) -> None:
+            await receive()
+            await viewer.changed()
+
+        transport._recv_next = received
 
 
 def _answered(answer: str) -> dict[str, int]:
