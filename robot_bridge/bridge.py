@@ -5,6 +5,7 @@ import contextlib
 import logging
 import secrets
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -52,6 +53,7 @@ class Bridge:
         self._source_faults: list[str] = []  # "camera overview: ..."
         self._running: asyncio.Task[None] | None = None
         self._at_rest = asyncio.Event()  # nothing is driven
+        self._robot_error: Exception | None = None
         self._closed = False
 
     @property
@@ -71,13 +73,13 @@ class Bridge:
             ListenError: the address cannot be had.
             OSError: the event log cannot be opened.
         """
-        self.address = await self._links.listen(self._settings.host, self._settings.port)
-        if self._settings.event_log is not None:
-            try:
+        try:
+            if self._settings.event_log is not None:
                 self._log = EventLog(self._settings.event_log)
-            except OSError:
-                await self._links.close()
-                raise
+            self.address = await self._links.listen(self._settings.host, self._settings.port)
+        except BaseException:
+            await self.close()
+            raise
         self._record("start", self._core.current, epoch=self.epoch)
         self._issue(time.monotonic())
         self._running = asyncio.get_running_loop().create_task(self._run(), name="bridge")
@@ -103,6 +105,8 @@ class Bridge:
             await self._come_to_rest(self._running)
             self._running.cancel()
             await asyncio.wait([self._running])
+            if not self._running.cancelled():
+                self._running.exception()  # `wait` raises it; here it only must not count as unnoticed
         self._robot.close()
         if self._log is not None:
             await asyncio.to_thread(self._log.close)
@@ -172,13 +176,20 @@ class Bridge:
     def _stop(self, stop: Stop) -> None:
         if self._core.stop(stop.by, stop.reason):
             self._shaper.rest()
-            self._robot.stop()
+            self._call_robot(self._robot.stop)
             self._record("stop", self._core.current, by=stop.by, reason=stop.reason)
 
     def _reset(self, reset: Reset) -> None:
         if self._core.reset():
-            self._robot.reset()
+            self._call_robot(self._robot.reset)
             self._record("reset", self._core.current, by=reset.by)
+
+    def _call_robot(self, call: Callable[[], None]) -> None:
+        """An adapter that raises ends the bridge at the next tick, not the link that happened to ask."""
+        try:
+            call()
+        except Exception as error:
+            self._robot_error = error
 
     # the tick
 
@@ -206,6 +217,8 @@ class Bridge:
             self._tick(time.monotonic())
 
     def _tick(self, now: float) -> None:
+        if self._robot_error is not None:
+            raise self._robot_error
         self._robot.apply(self._shaper.step(now, self._robot.tick_seconds))
         self._robot.tick()
         if self._shaper.at_rest:

@@ -16,5 +16,5 @@ class BridgeCounters:
     skipped_ticks: int = 0  # the loop was blocked for longer than could be caught up
     refusals: Counter[str] = field(default_factory=Counter)  # by reason, {"late": 3}
     bad_input: Counter[str] = field(default_factory=Counter)  # by name, {"malformed": 1}
-    drops: Counter[str] = field(default_factory=Counter)  # by message kind or stream, {"feedback": 2, "overview": 9}
+    drops: Counter[str] = field(default_factory=Counter)  # of links that are gone, by kind or stream, {"overview": 9}
     endings: Counter[str] = field(default_factory=Counter)  # of links, by goodbye, {"silent": 1}

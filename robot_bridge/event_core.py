@@ -135,7 +135,9 @@ class EventCore:
             return False
         following = event_after(newest)
         ahead = is_newer(event, following) or event_gap(event, newest) < 0
-        self._rested = following if ahead else event
+        voided = following if ahead else event
+        if self._rested is None or is_newer(voided, self._rested):  # rests may arrive in any order
+            self._rested = voided
         return True
 
     def stop(self, by: str, reason: str) -> bool:

@@ -6,7 +6,7 @@ from collections import Counter
 from types import TracebackType
 from typing import Self
 
-from robot_bridge.link_session import BadInput, ClientSession
+from robot_bridge.link_session import BadInput, ClientSession, kind_of
 from robot_bridge.link_transport import TICK_INTERVAL, LinkTransport
 from robot_bridge.media_outbox import MediaOutbox
 from robot_bridge.protocol.errors import HandshakeError, LinkError, LinkLost, LinkRefused
@@ -157,7 +157,7 @@ class RobotLink:
             self._inbox[self._arrivals] = event
             if len(self._inbox) > MAX_INBOX:
                 dropped = self._inbox.pop(next(iter(self._inbox)))
-                self.drops[type(dropped).__name__.lower()] += 1
+                self.drops[kind_of(dropped)] += 1
         self._news.set()
 
     def _ended(self) -> None:

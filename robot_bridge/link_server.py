@@ -42,7 +42,7 @@ class LinkHandler(Protocol):
         """A valid message that the link's role permits."""
 
     def link_bad_input(self, peer: "LinkPeer", bad: BadInput) -> None:
-        """Something else; already counted."""
+        """Something else, on a link that lives on; already counted."""
 
     def operator_lost(self) -> None:
         """The operator link ended, for whatever reason."""
@@ -154,7 +154,7 @@ class LinkServer:
         if self._events:
             notice = encode_once(EventNotice(event=feedback.event, time=feedback.time))
             for peer in self._events:
-                peer.send_encoded("eventnotice", notice)
+                peer.send_encoded("event", notice)
 
     def publish_media(self, media: Media) -> None:
         """To every media link, newest wins per stream."""
@@ -183,14 +183,17 @@ class LinkServer:
 
     def connected(self, peer: LinkPeer) -> None:
         self._connections.add(peer)
-        if len(self._connections) > self._max_links or self._server is None:
+        if self._server is None:
+            peer.end("closing", "the bridge is closing")
+        elif len(self._connections) > self._max_links:
             peer.end("full", f"this bridge takes {self._max_links} links")
 
     def received(self, peer: LinkPeer, event: LinkMessage | BadInput) -> None:
         match event:
             case BadInput():
                 self._counters.bad_input[event.name] += 1
-                self._handler.link_bad_input(peer, event)
+                if peer.session.ended is None:
+                    self._handler.link_bad_input(peer, event)
             case Hello():
                 self._handler.link_opened(peer)
             case Command() | Rest() | Stop() | Reset():

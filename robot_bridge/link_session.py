@@ -29,7 +29,7 @@ from robot_bridge.protocol.messages import (
     decode_message,
 )
 
-__all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState"]
+__all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState", "kind_of"]
 
 PING_INTERVAL = 0.2  # s
 SILENCE = 1.0  # s without a valid message after which the other side is taken for dead
@@ -124,7 +124,7 @@ class LinkSession:
             self._last_valid = now
             return message
         event = message.event if isinstance(message, Command) else 0
-        return BadInput("not_allowed", f"{type(message).__name__.lower()} on a link of role {self.role}", event)
+        return BadInput("not_allowed", f"{kind_of(message)} on a link of role {self.role}", event)
 
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         raise NotImplementedError
@@ -183,7 +183,7 @@ class BridgeSession(LinkSession):
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         """Returns the hello when it was admitted."""
         if not isinstance(message, Hello):
-            return self._reject("handshake", f"the first message must be hello, not {type(message).__name__.lower()}")
+            return self._reject("handshake", f"the first message must be hello, not {kind_of(message)}")
         if message.version != PROTOCOL_VERSION:
             return self._reject("version", f"this bridge speaks version {PROTOCOL_VERSION}, not {message.version}")
         if message.role not in FROM_CLIENT:
@@ -217,7 +217,7 @@ class ClientSession(LinkSession):
             self._finish(message)
             return None
         if not isinstance(message, Hello):
-            return self._reject("handshake", f"expected hello, not {type(message).__name__.lower()}")
+            return self._reject("handshake", f"expected hello, not {kind_of(message)}")
         if message.version != PROTOCOL_VERSION or message.role != "robot" or not message.epoch:
             return self._reject("version", f"not a bridge of version {PROTOCOL_VERSION}")
         if self.role != "events" and message.description is None:
@@ -230,3 +230,8 @@ class ClientSession(LinkSession):
     def _reject(self, error: str, detail: str) -> BadInput:
         self.end(error, detail)
         return BadInput("handshake", detail)
+
+
+def kind_of(message: LinkMessage) -> str:
+    """The `type` of the message on the wire."""
+    return str(message.__struct_config__.tag)

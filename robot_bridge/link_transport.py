@@ -5,9 +5,10 @@ import socket
 import time
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import cast
 
-from robot_bridge.link_session import BadInput, LinkSession
+from robot_bridge.link_session import BadInput, LinkSession, kind_of
 from robot_bridge.media_outbox import MediaOutbox, NewestOutbox
 from robot_bridge.protocol.framing import frame
 from robot_bridge.protocol.messages import LinkMessage, Media, encode_message
@@ -52,20 +53,16 @@ class LinkTransport(asyncio.Protocol):
 
     def send(self, message: LinkMessage) -> None:
         """Send, or keep the newest of its kind until there is room. Ignored after the end."""
-        self.send_encoded(type(message).__name__.lower(), lambda: frame(encode_message(message)))
+        self.send_encoded(kind_of(message), partial(_encode, message))
 
     def send_encoded(self, kind: str, make: Callable[[], bytes]) -> None:
         """As `send`, with a frame that several peers share."""
-        if self._transport is None or self._closing_since is not None:
-            return
-        if self._full:
-            self._control.put(kind, make())
-        else:
-            self._transport.write(make())
+        if self.session.ended is None:
+            self._write(kind, make)
 
     def send_media(self, media: Media, make: Callable[[], bytes]) -> None:
         """As `send_encoded`, per stream."""
-        if self._transport is None or self._closing_since is not None:
+        if self._transport is None or self.session.ended is not None:
             return
         if self._full:
             self._media.put(media, make)
@@ -114,7 +111,10 @@ class LinkTransport(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         now = self._clock()
-        for event in self.session.receive(data, now):
+        events = self.session.receive(data, now)
+        if self.session.ended is None:
+            self._send_outgoing()  # our hello goes before any answer to what came with theirs
+        for event in events:
             self.received(event)
         self._flush_session(now)
 
@@ -137,15 +137,30 @@ class LinkTransport(asyncio.Protocol):
         self._report_lost()
 
     def _flush_session(self, now: float) -> None:
-        for message in self.session.take_outgoing():
-            self.send(message)
+        self._send_outgoing()
         if self.session.ended is not None and self._transport is not None and self._closing_since is None:
             self._closing_since = now
             self._transport.close()
             self._report_lost()
+
+    def _send_outgoing(self) -> None:
+        for message in self.session.take_outgoing():
+            self._write(kind_of(message), partial(_encode, message))
+
+    def _write(self, kind: str, make: Callable[[], bytes]) -> None:
+        if self._transport is None or self._closing_since is not None:
+            return
+        if self._full:
+            self._control.put(kind, make())
+        else:
+            self._transport.write(make())
 
     def _report_lost(self) -> None:
         if self._lost:
             return
         self._lost = True
         self.lost()
+
+
+def _encode(message: LinkMessage) -> bytes:
+    return frame(encode_message(message))

@@ -25,7 +25,7 @@ def create_robot(name: str) -> Robot:
         RobotUnavailable: something it needs is missing on this machine.
     """
     if name not in _PACKAGES:
-        raise UnknownRobot(f"{name!r}; there are {', '.join(robot_names())}")
+        raise UnknownRobot(f"no robot {name!r}; there are {', '.join(robot_names())}")
     robot = import_module(_PACKAGES[name]).create()
     if not isinstance(robot, Robot):
         raise TypeError(f"{_PACKAGES[name]}.create() must return a Robot")
