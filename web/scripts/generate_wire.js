@@ -1,0 +1,73 @@
+// Writes src/wire.ts (types) and src/wire_schema.json (what the parser checks) from docs/schemas/console.schema.json.
+// With --check nothing is written and a difference ends with status 1.
+import { existsSync, readFileSync, writeFileSync } from "node:fs";
+
+const schema = JSON.parse(
+  readFileSync(new URL("../../docs/schemas/console.schema.json", import.meta.url), "utf8"),
+);
+const definitions = schema.$defs;
+
+function nameOf(reference) {
+  return reference.slice("#/$defs/".length);
+}
+
+function typeOf(node) {
+  if (node.$ref) return nameOf(node.$ref);
+  const union = node.anyOf ?? node.oneOf;
+  if (union) return union.map(typeOf).join(" | ");
+  if (node.enum) return node.enum.map((value) => JSON.stringify(value)).join(" | ");
+  if (node.prefixItems) return `readonly [${node.prefixItems.map(typeOf).join(", ")}]`;
+  if (node.type === "array") return `readonly (${typeOf(node.items)})[]`;
+  if (node.type === "integer" || node.type === "number") return "number";
+  if (node.type === "string" || node.type === "boolean" || node.type === "null") return node.type;
+  throw new Error(`no type for ${JSON.stringify(node)}`);
+}
+
+function fieldsOf(node) {
+  const required = new Set(node.required ?? []);
+  return Object.entries(node.properties ?? {}).map(
+    ([name, field]) => `  readonly ${name}${required.has(name) ? "" : "?"}: ${typeOf(field)};`,
+  );
+}
+
+function declarationOf([name, node]) {
+  const about = node.description ? `/** ${node.description.replace(/\s*\n\s*/g, " ")} */\n` : "";
+  if (node.type !== "object") return `${about}export type ${name} = ${typeOf(node)};`;
+  return `${about}export interface ${name} {\n${fieldsOf(node).join("\n")}\n}`;
+}
+
+function withoutWords(node) {
+  if (Array.isArray(node)) return node.map(withoutWords);
+  if (node === null || typeof node !== "object") return node;
+  const kept = Object.entries(node).filter(([key, value]) => {
+    const isWords = (key === "title" || key === "description") && typeof value === "string";
+    return !isWords && key !== "default";
+  });
+  return Object.fromEntries(kept.map(([key, value]) => [key, withoutWords(value)]));
+}
+
+function reachableFrom(name, found = new Set()) {
+  if (found.has(name)) return found;
+  found.add(name);
+  for (const [, reference] of JSON.stringify(definitions[name]).matchAll(/"#\/\$defs\/(\w+)"/g))
+    reachableFrom(reference, found);
+  return found;
+}
+
+const head = "// Generated from docs/schemas/console.schema.json by `npm run generate`. Do not edit.\n";
+const types = `${head}\n${Object.entries(definitions).map(declarationOf).join("\n\n")}\n`;
+const received = [...reachableFrom("ServerMessage")].sort();
+const checks = Object.fromEntries(received.map((name) => [name, withoutWords(definitions[name])]));
+const generated = {
+  "../src/wire.ts": types,
+  "../src/wire_schema.json": `${JSON.stringify(checks)}\n`,
+};
+
+for (const [path, text] of Object.entries(generated)) {
+  const url = new URL(path, import.meta.url);
+  if (existsSync(url) && readFileSync(url, "utf8") === text) continue;
+  if (process.argv.includes("--check")) {
+    console.error(`${path.slice(3)} is not what the schema says: npm run generate`);
+    process.exitCode = 1;
+  } else writeFileSync(url, text);
+}

@@ -1,0 +1,360 @@
+import { axisValues, restValues } from "./core/axis_mapping";
+import * as arming from "./core/arming";
+import * as driver from "./core/driver";
+import {
+  applyMessage,
+  createConsoleState,
+  forgetConnection,
+  holdsSeat,
+  isOperator,
+  note,
+  robotIsUp,
+} from "./core/console_state";
+import { contactStrength, forceOf, speedShare } from "./core/contact";
+import { notePicture } from "./core/latency";
+import { noteShown } from "./core/command_gate";
+import { createRateMeter, noteHappening, quantile } from "./core/samples";
+import { parseServerMessage } from "./core/wire_parser";
+import { ARM_REFUSAL_WORDS } from "./core/words";
+import { Controls, type ControlSample } from "./input/controls";
+import { Disposal } from "./input/disposal";
+import { Rumble } from "./input/rumble";
+import type { TouchSticks } from "./input/touch_sticks";
+import { MediaRoom } from "./media_room";
+import type { VideoStream } from "./media/video_stream";
+import { ContactTone } from "./media/contact_tone";
+import { Connection, type LinkState } from "./rtc/connection";
+import type { ConsoleApi } from "./rtc/console_api";
+import type { ChannelName, Peer } from "./rtc/peer";
+import { StampReader } from "./rtc/stamp_reader";
+import { reportOf } from "./statistics";
+import { StopSender } from "./stop_sender";
+import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, Welcome } from "./wire";
+
+const BEAT_MS = 500; // reports and pings
+const SILENT_MS = 1500; // the other side counts as gone for driving
+const DEAD_MS = 5000; // and for the connection
+const FEEL_MS = 50; // rumble and tone
+
+export interface ConsoleAppEvents {
+  canvas(info: StreamInfo): HTMLCanvasElement;
+  mainStream(): string | null; // name of the camera in the large view
+  armedChanged(): void;
+}
+
+/** The page's engine: connection, driving and media. What it shows is read from its fields. */
+export class ConsoleApp {
+  readonly state = createConsoleState();
+  readonly arming = arming.createArming();
+  readonly room: MediaRoom;
+  readonly connection: Connection;
+  readonly stopping: StopSender;
+  readonly controls: Controls;
+  readonly events = createRateMeter();
+  readonly audio = new AudioContext({ latencyHint: "interactive" });
+  link: LinkState = { kind: "connecting" };
+  driver: driver.Driver | null = null;
+  layer = 0;
+  values: readonly number[] = []; // commanded now
+  force = 0; // N
+  firstPictureMs: number | null = null;
+  private readonly reader = StampReader.isSupported() ? new StampReader() : null;
+  private readonly rumble = new Rumble();
+  private readonly tone = new ContactTone(this.audio);
+  private readonly disposal = new Disposal();
+  private peer: Peer | null = null;
+  private heardMs = 0;
+  private beatMs = 0;
+  private feelMs = 0;
+  private pings = new Map<number, number>(); // id -> when it was sent
+  private nextPing = 1;
+
+  constructor(
+    api: ConsoleApi,
+    trailer: boolean,
+    private readonly name: string | null,
+    sticks: TouchSticks,
+    private readonly page: ConsoleAppEvents,
+  ) {
+    this.room = new MediaRoom(this.state, this.reader, this.audio, {
+      canvas: (info) => page.canvas(info),
+      drawn: (stream, stamp, at) => this.drawn(stream, stamp, at),
+    });
+    this.connection = new Connection(api, this.reader, trailer, {
+      state: (link) => this.linkChanged(link),
+      message: (channel, data) => this.received(channel, data),
+      opened: (peer) => (this.peer = peer),
+      closed: () => this.connectionClosed(),
+    });
+    this.stopping = new StopSender(api, this.connection);
+    this.controls = new Controls(sticks, {
+      stop: () => this.stop("stop key"),
+      arm: () => this.toggleArmed(),
+      nextLayer: () => this.nextLayer(),
+      isArmed: () => this.isArmed(),
+      lost: () => this.disarm("pad_lost"),
+    });
+    if (this.reader === null)
+      note(this.state, "error", "This browser cannot read stamps: no picture passes the gate", Date.now());
+    this.watchPage();
+    this.startTicking();
+  }
+
+  isArmed(): boolean {
+    return this.arming.state !== "disarmed";
+  }
+
+  conditions(now = performance.now()): arming.ArmConditions {
+    const { state } = this;
+    return {
+      operator: isOperator(state),
+      connected: state.welcome !== null && now - this.heardMs < SILENT_MS,
+      robotUp: robotIsUp(state),
+      holdsSeat: holdsSeat(state),
+      stopped: state.stop.stopped || this.stopping.isPending,
+      visible: !document.hidden,
+    };
+  }
+
+  toggleArmed(): void {
+    if (this.isArmed()) {
+      this.disarm("operator");
+      return;
+    }
+    const refusal = arming.arm(this.arming, this.conditions());
+    if (refusal !== null) note(this.state, "warning", ARM_REFUSAL_WORDS[refusal], Date.now());
+    this.page.armedChanged();
+  }
+
+  disarm(reason: arming.DisarmReason): void {
+    if (!arming.disarm(this.arming, reason)) return;
+    this.controls.release();
+    this.rumble.stop();
+    if (this.driver !== null) driver.driverDisarm(this.driver, performance.now());
+    this.drive(performance.now());
+    this.page.armedChanged();
+  }
+
+  stop(reason: string): void {
+    this.stopping.stop(reason, performance.now());
+    this.disarm("stopped");
+  }
+
+  reset(): void {
+    this.connection.send("stop", JSON.stringify({ type: "reset", by: "" }));
+  }
+
+  nextLayer(): void {
+    this.selectLayer((this.layer + 1) % Math.max(1, this.state.robot?.description.layers.length ?? 1));
+  }
+
+  /** The layers' inputs mean different axes, so switching brings the robot to rest first. */
+  selectLayer(layer: number): void {
+    if (layer === this.layer) return;
+    this.layer = layer;
+    if (this.arming.state === "driving" && this.driver !== null)
+      driver.driverRelease(this.driver, performance.now());
+  }
+
+  requestSeat(): void {
+    this.tell("session", { type: "seat_request" });
+  }
+
+  releaseSeat(): void {
+    this.disarm("operator");
+    this.tell("session", { type: "seat_release" });
+  }
+
+  /** A setting changed: the gates take it at once. */
+  settingsChanged(): void {
+    if (this.driver !== null) {
+      this.driver.gate.pacing = this.state.settings.pacing;
+      this.driver.gate.tolerance = this.state.settings.tolerance.video;
+    }
+    this.room.changed();
+  }
+
+  async close(): Promise<void> {
+    this.disarm("operator");
+    this.disposal.close();
+    this.controls.close();
+    this.connection.close();
+    this.room.close();
+    this.reader?.close();
+    this.tone.close();
+    await this.audio.close();
+  }
+
+  private watchPage(): void {
+    this.disposal.listen(window, "blur", () => this.disarm("blur"));
+    this.disposal.listen(window, "pagehide", () => {
+      this.disarm("hidden");
+      this.connection.close();
+    });
+    this.disposal.listen(window, "pageshow", (event) => {
+      if (event.persisted) location.reload();
+    });
+    this.disposal.listen(window, "online", () => this.connection.retryNow());
+    const visibility = (): void => {
+      if (document.hidden) this.disarm("hidden");
+      this.room.listen();
+    };
+    document.addEventListener("visibilitychange", visibility);
+    this.disposal.add(() => document.removeEventListener("visibilitychange", visibility));
+  }
+
+  private startTicking(): void {
+    const worker = new Worker(new URL("./input/tick_worker.ts", import.meta.url), { type: "module" });
+    worker.onmessage = () => this.tick(performance.now());
+    this.disposal.add(() => worker.terminate());
+  }
+
+  private linkChanged(link: LinkState): void {
+    this.link = link;
+  }
+
+  private connectionClosed(): void {
+    this.disarm("connection_lost");
+    this.peer = null;
+    this.driver = null;
+    this.room.close();
+    this.pings.clear();
+    forgetConnection(this.state);
+  }
+
+  private received(channel: ChannelName, data: unknown): void {
+    const parsed = parseServerMessage(data);
+    if (parsed.kind !== "message") {
+      this.state.badMessages += 1;
+      const detail = parsed.kind === "unknown" ? parsed.type : parsed.detail;
+      note(this.state, "warning", `Unreadable message on ${channel}: ${detail}`, Date.now());
+      return;
+    }
+    this.heardMs = performance.now();
+    const before = this.state.feedback;
+    applyMessage(this.state, parsed.message, Date.now());
+    this.follow(parsed.message, before, this.heardMs);
+  }
+
+  private follow(message: ServerMessage, before: Feedback | null, now: number): void {
+    if (message.type === "feedback" && this.state.feedback === message)
+      this.tookFeedback(message, before, now);
+    else if (message.type === "refusal" && this.driver !== null) {
+      driver.driverRefusal(this.driver, message, this.isArmed());
+      this.drive(now);
+    } else if (message.type === "pong") this.tookPong(message.id, now);
+    else if (message.type === "welcome") this.welcomed(message);
+    else if (message.type === "robot") this.robotChanged(message, now);
+    else if (message.type === "seat" && !holdsSeat(this.state) && this.driver !== null)
+      driver.driverSilence(this.driver);
+  }
+
+  private tookFeedback(feedback: Feedback, before: Feedback | null, now: number): void {
+    if (before?.event !== feedback.event) noteHappening(this.events, now);
+    this.force = forceOf(feedback.wrench);
+    if (this.driver !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
+    this.drive(now);
+    this.room.changed();
+  }
+
+  private tookPong(id: number, now: number): void {
+    const sent = this.pings.get(id);
+    if (sent !== undefined) this.state.roundTripMs = now - sent;
+    this.pings.delete(id);
+  }
+
+  private welcomed(welcome: Welcome): void {
+    this.link = { kind: "connected" };
+    if (this.peer !== null) this.room.open(this.peer, welcome.streams);
+    if (this.name !== null) this.tell("session", { type: "rename", name: this.name });
+    if (welcome.role === "operator") this.requestSeat();
+  }
+
+  private robotChanged(robot: RobotState, now: number): void {
+    if (robot.link === "down" && this.driver !== null) driver.driverSilence(this.driver);
+    if (this.driver !== null) return;
+    const { description } = robot;
+    const { settings, feedback } = this.state;
+    const interval = 1000 / description.max_event_rate;
+    const neutral = restValues(description.axes);
+    this.driver = driver.createDriver(settings.pacing, settings.tolerance.video, interval, neutral);
+    this.layer = Math.min(this.layer, Math.max(0, description.layers.length - 1));
+    if (feedback !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
+  }
+
+  private canCommand(): boolean {
+    const { operator, robotUp, holdsSeat: seated, stopped } = this.conditions();
+    return operator && robotUp && seated && !stopped;
+  }
+
+  private tick(now: number): void {
+    const sample = this.controls.sample();
+    const lost = arming.lostCondition(this.conditions(now));
+    if (lost !== null) this.disarm(lost);
+    const change = arming.sampleDeadman(this.arming, sample.deadman, sample.signature, now);
+    this.takeValues(sample);
+    if (this.driver !== null && change === "released") driver.driverRelease(this.driver, now);
+    if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
+    if (change === "taped_down") this.page.armedChanged();
+    this.drive(now);
+    this.room.listen();
+    this.stopping.step(this.state.stop.stopped, now);
+    if (now >= this.feelMs) this.feel(now);
+    if (now >= this.beatMs) this.beat(now);
+  }
+
+  private takeValues(sample: ControlSample): void {
+    const description = this.state.robot?.description;
+    if (description === undefined) this.values = [];
+    else if (this.arming.state !== "driving") this.values = restValues(description.axes);
+    else {
+      const delay = this.driver === null ? null : quantile(this.driver.latency.toPicture, 0.5);
+      const share = sample.slowShare * (this.state.settings.speedCap ? speedShare(delay) : 1);
+      this.values = axisValues(description.axes, description.layers[this.layer], sample.held, share);
+    }
+  }
+
+  private drive(now: number): void {
+    if (this.driver === null || this.state.welcome === null) return;
+    const intention = { armed: this.isArmed(), values: this.values };
+    const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
+    for (const message of messages) this.tell("control", message);
+  }
+
+  private tell(channel: ChannelName, message: ClientMessage): void {
+    this.connection.send(channel, JSON.stringify(message));
+  }
+
+  private beat(now: number): void {
+    this.beatMs = now + BEAT_MS;
+    if (this.state.welcome === null) return;
+    if (now - this.heardMs > DEAD_MS) {
+      this.connection.drop("the console fell silent");
+      return;
+    }
+    const id = this.nextPing++;
+    this.pings.set(id, now);
+    if (this.pings.size > 20) this.pings.delete(id - 20);
+    this.tell("control", { type: "ping", id });
+    this.tell("control", reportOf(this));
+  }
+
+  /** Force is felt only while driving is possible. */
+  private feel(now: number): void {
+    this.feelMs = now + FEEL_MS;
+    const sensor = this.state.robot?.description.wrench ?? null;
+    const { visible, stopped, connected } = this.conditions(now);
+    const strength =
+      sensor !== null && visible && connected && !stopped ? contactStrength(this.force, sensor) : 0;
+    this.rumble.feel(this.isArmed() ? (this.controls.pad.state?.gamepad ?? null) : null, strength, now);
+    this.tone.sound(this.state.settings.contactTone && this.room.isAudible() ? strength : 0);
+  }
+
+  private drawn(stream: VideoStream, stamp: number | null, at: number): void {
+    this.firstPictureMs ??= at;
+    if (stamp === null || stream.info.stream !== this.page.mainStream() || this.driver === null) return;
+    notePicture(this.driver.latency, stamp, at);
+    noteShown(this.driver.gate, stamp);
+    if (this.state.settings.pacing === "media") this.drive(at);
+  }
+}

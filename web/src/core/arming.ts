@@ -1,0 +1,102 @@
+/** disarmed: nothing moves. armed: the deadman may be pressed. driving: it is held. */
+export type ArmState = "disarmed" | "armed" | "driving";
+
+export type ArmRefusal =
+  "observer" | "not_connected" | "robot_down" | "no_seat" | "stopped" | "hidden" | "deadman_held";
+
+export type DisarmReason =
+  | "start"
+  | "operator"
+  | "blur"
+  | "hidden"
+  | "pad_lost"
+  | "connection_lost"
+  | "robot_down"
+  | "seat_lost"
+  | "stopped"
+  | "taped_down";
+
+export interface ArmConditions {
+  readonly operator: boolean;
+  readonly connected: boolean;
+  readonly robotUp: boolean;
+  readonly holdsSeat: boolean;
+  readonly stopped: boolean;
+  readonly visible: boolean;
+}
+
+export interface Arming {
+  state: ArmState;
+  reason: DisarmReason; // why it is disarmed; of the last time otherwise
+  deadman: boolean; // held at the last sample
+  input: string; // what was held at the last change, to notice a deadman that is taped down
+  inputSinceMs: number;
+}
+
+/** A deadman held with nothing else changing for this long counts as taped down. */
+const UNCHANGED_LIMIT_MS = 60_000;
+
+export function createArming(): Arming {
+  return { state: "disarmed", reason: "start", deadman: true, input: "", inputSinceMs: 0 };
+}
+
+/** Why arming is not possible now; null when it is. The deadman must have been seen released. */
+export function armRefusal(arming: Arming, conditions: ArmConditions): ArmRefusal | null {
+  if (!conditions.operator) return "observer";
+  if (!conditions.connected) return "not_connected";
+  if (!conditions.robotUp) return "robot_down";
+  if (!conditions.holdsSeat) return "no_seat";
+  if (conditions.stopped) return "stopped";
+  if (!conditions.visible) return "hidden";
+  return arming.deadman ? "deadman_held" : null;
+}
+
+/** Arms if it may; says why not otherwise. */
+export function arm(arming: Arming, conditions: ArmConditions): ArmRefusal | null {
+  if (arming.state !== "disarmed") return null;
+  const refusal = armRefusal(arming, conditions);
+  if (refusal === null) arming.state = "armed";
+  return refusal;
+}
+
+/** Says whether it was armed. */
+export function disarm(arming: Arming, reason: DisarmReason): boolean {
+  if (arming.state === "disarmed") return false;
+  arming.state = "disarmed";
+  arming.reason = reason;
+  return true;
+}
+
+/** What the first condition that no longer holds means for one who is armed; null when all hold. */
+export function lostCondition(conditions: ArmConditions): DisarmReason | null {
+  if (!conditions.connected) return "connection_lost";
+  if (conditions.stopped) return "stopped";
+  if (!conditions.robotUp) return "robot_down";
+  if (!conditions.operator || !conditions.holdsSeat) return "seat_lost";
+  return conditions.visible ? null : "hidden";
+}
+
+/**
+ * Takes what is held now. `input` names it, so that an unchanged one can be told.
+ * Returns "released" when the deadman was let go and "taped_down" when it disarmed for that.
+ */
+export function sampleDeadman(
+  arming: Arming,
+  deadman: boolean,
+  input: string,
+  now: number,
+): "released" | "taped_down" | null {
+  if (!deadman || input !== arming.input || !arming.deadman) {
+    arming.input = input;
+    arming.inputSinceMs = now;
+  }
+  const wasDriving = arming.state === "driving";
+  arming.deadman = deadman;
+  if (arming.state !== "disarmed") arming.state = deadman ? "driving" : "armed";
+  if (wasDriving && !deadman) return "released";
+  if (arming.state === "driving" && now - arming.inputSinceMs >= UNCHANGED_LIMIT_MS) {
+    disarm(arming, "taped_down");
+    return "taped_down";
+  }
+  return null;
+}

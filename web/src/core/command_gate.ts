@@ -1,0 +1,84 @@
+import { eventAfter, eventGap, isNewer } from "./serial";
+
+export type Pacing = "feedback" | "media";
+
+/** Why no new command may be sent now, or that it may. */
+export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture";
+
+export interface CommandGate {
+  pacing: Pacing;
+  tolerance: number; // events, of the picture; 4
+  minIntervalMs: number; // between two events; 40
+  event: number | null; // newest feedback; null before the first
+  issue: number; // newest issue of that event
+  inFlight: number | null; // the event sent and not yet answered
+  lastSentMs: number; // -Infinity before the first
+  shown: number | null; // stamp of the picture on screen
+}
+
+/** The next event and the issue of the feedback that it answers. */
+export interface NextCommand {
+  readonly event: number;
+  readonly issue: number;
+}
+
+export function createCommandGate(pacing: Pacing, tolerance: number, minIntervalMs: number): CommandGate {
+  return {
+    pacing,
+    tolerance,
+    minIntervalMs,
+    event: null,
+    issue: 0,
+    inFlight: null,
+    lastSentMs: -Infinity,
+    shown: null,
+  };
+}
+
+/** Takes a feedback; says whether it was news. */
+export function takeFeedback(gate: CommandGate, event: number, issue: number): boolean {
+  if (gate.event === event) {
+    if (issue <= gate.issue) return false;
+    gate.issue = issue;
+    return true;
+  }
+  if (gate.event !== null && !isNewer(event, gate.event)) return false;
+  gate.event = event;
+  gate.issue = issue;
+  if (gate.inFlight !== null && !isNewer(gate.inFlight, event)) gate.inFlight = null;
+  return true;
+}
+
+/** Takes a refusal; says whether it ended the flight. */
+export function takeRefusal(gate: CommandGate, event: number): boolean {
+  if (gate.inFlight !== event) return false;
+  gate.inFlight = null;
+  return true;
+}
+
+/** A new event was sent; repeats of it are not told. */
+export function noteSent(gate: CommandGate, now: number): void {
+  if (gate.event === null) return;
+  gate.inFlight = eventAfter(gate.event);
+  gate.lastSentMs = now;
+}
+
+/** A picture with this stamp is now on screen. */
+export function noteShown(gate: CommandGate, stamp: number): void {
+  gate.shown = stamp;
+}
+
+export function gateState(gate: CommandGate, now: number): GateState {
+  if (gate.event === null) return "no_feedback";
+  if (gate.inFlight !== null) return "in_flight";
+  if (now - gate.lastSentMs < gate.minIntervalMs) return "rate";
+  return gate.pacing === "media" && !pictureIsWithin(gate, gate.event) ? "picture" : "open";
+}
+
+export function nextCommand(gate: CommandGate): NextCommand | null {
+  return gate.event === null ? null : { event: eventAfter(gate.event), issue: gate.issue };
+}
+
+function pictureIsWithin(gate: CommandGate, event: number): boolean {
+  return gate.shown !== null && Math.abs(eventGap(event, gate.shown)) <= gate.tolerance;
+}

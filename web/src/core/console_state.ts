@@ -1,0 +1,159 @@
+import type {
+  Feedback,
+  Participant,
+  Refusal,
+  RobotState,
+  Seat,
+  ServerMessage,
+  StopState,
+  Welcome,
+} from "../wire";
+import type { Pacing } from "./command_gate";
+import { isNewer } from "./serial";
+import { REFUSAL_WORDS } from "./words";
+
+export interface Settings {
+  tolerance: { video: number; audio: number }; // events; 4 and 6
+  pacing: Pacing;
+  gateEnabled: boolean; // false: the thesis' control experiment
+  speedCap: boolean; // slower the later the picture
+  contactTone: boolean;
+  soundWanted: boolean;
+}
+
+/** A line of the log; the same one again only counts up. */
+export interface LogLine {
+  readonly level: "info" | "warning" | "error";
+  readonly text: string;
+  count: number;
+  atMs: number; // Date.now() of the newest
+}
+
+/** What the page knows of the other side. One object; everything that shows or drives reads it. */
+export interface ConsoleState {
+  readonly settings: Settings;
+  readonly log: LogLine[]; // newest first
+  welcome: Welcome | null; // null while not connected
+  robot: RobotState | null;
+  seat: Seat | null;
+  participants: readonly Participant[];
+  feedback: Feedback | null; // newest
+  stop: StopState;
+  roundTripMs: number | null;
+  badMessages: number; // could not be read
+}
+
+const LOG_LIMIT = 40;
+const NOT_STOPPED: StopState = { stopped: false, by: "", reason: "" };
+
+export function createConsoleState(): ConsoleState {
+  return {
+    settings: {
+      tolerance: { video: 4, audio: 6 },
+      pacing: "feedback",
+      gateEnabled: true,
+      speedCap: false,
+      contactTone: false,
+      soundWanted: true,
+    },
+    log: [],
+    welcome: null,
+    robot: null,
+    seat: null,
+    participants: [],
+    feedback: null,
+    stop: NOT_STOPPED,
+    roundTripMs: null,
+    badMessages: 0,
+  };
+}
+
+/** Forgets what belonged to the connection that ended. A stop stays shown until the robot says otherwise. */
+export function forgetConnection(state: ConsoleState): void {
+  state.welcome = null;
+  state.robot = null;
+  state.seat = null;
+  state.participants = [];
+  state.feedback = null;
+  state.roundTripMs = null;
+}
+
+export function isOperator(state: ConsoleState): boolean {
+  return state.welcome?.role === "operator";
+}
+
+export function holdsSeat(state: ConsoleState): boolean {
+  return state.seat !== null && state.seat.holder !== "" && state.seat.holder === state.welcome?.peer;
+}
+
+export function robotIsUp(state: ConsoleState): boolean {
+  return state.robot?.link === "up";
+}
+
+/** Takes what a message says about the other side; commands and latencies are the driver's. */
+export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs: number): void {
+  switch (message.type) {
+    case "welcome":
+      state.welcome = message;
+      return;
+    case "robot":
+      state.robot = message;
+      if (message.link === "down") note(state, "error", `Robot link down: ${message.detail}`, wallMs);
+      return;
+    case "seat":
+      state.seat = message;
+      note(state, "info", seatWords(message), wallMs);
+      return;
+    case "participants":
+      state.participants = message.participants;
+      return;
+    case "notice":
+      note(state, message.level, message.text, wallMs);
+      return;
+    case "stop_state":
+      state.stop = message.stop;
+      return;
+    case "refusal":
+      note(state, "warning", refusalWords(message), wallMs);
+      return;
+    case "feedback":
+      if (isNews(state.feedback, message)) takeFeedbackState(state, message);
+      return;
+    case "pong":
+      return;
+    default:
+      message satisfies never;
+  }
+}
+
+export function note(state: ConsoleState, level: LogLine["level"], text: string, wallMs: number): void {
+  const last = state.log[0];
+  if (last?.text === text && last.level === level) {
+    last.count += 1;
+    last.atMs = wallMs;
+    return;
+  }
+  state.log.unshift({ level, text, count: 1, atMs: wallMs });
+  state.log.length = Math.min(state.log.length, LOG_LIMIT);
+}
+
+function isNews(known: Feedback | null, feedback: Feedback): boolean {
+  if (known === null) return true;
+  if (known.event === feedback.event) return feedback.issue > known.issue;
+  return isNewer(feedback.event, known.event);
+}
+
+function takeFeedbackState(state: ConsoleState, feedback: Feedback): void {
+  state.feedback = feedback;
+  state.stop = feedback.stop;
+}
+
+function seatWords(seat: Seat): string {
+  const why = seat.why === "" ? "" : ` (${seat.why})`;
+  return seat.holder === "" ? `The control seat is free${why}` : `${seat.name} holds the control seat${why}`;
+}
+
+function refusalWords(refusal: Refusal): string {
+  const detail = refusal.detail === "" ? "" : ` (${refusal.detail})`;
+  return `Refused: ${REFUSAL_WORDS[refusal.reason]}${detail}`;
+}

@@ -1,0 +1,81 @@
+import { judge } from "./media_gate";
+import { createCounts, noteRendered, type GateContext, type MediumCounts } from "./medium_counts";
+
+/** A picture in memory; whoever keeps it last closes it. */
+export interface Closable {
+  close(): void;
+}
+
+interface Kept<P extends Closable> {
+  readonly picture: P;
+  readonly rtpTimestamp: number;
+  counted: boolean; // as held
+}
+
+/** The gate of one video stream. Keeps at most one picture: the newest, until its stamp or the feedback arrives. */
+export interface PictureGate<P extends Closable> {
+  readonly counts: MediumCounts;
+  kept: Kept<P> | null;
+  shown: number | null; // stamp of the picture on screen
+}
+
+/** `undefined`: nothing known yet; null: the picture has no stamp. */
+export type StampLookup = (rtpTimestamp: number) => number | null | undefined;
+export type Draw<P> = (picture: P, stamp: number | null, gap: number | null) => void;
+
+export function createPictureGate<P extends Closable>(): PictureGate<P> {
+  return { counts: createCounts(), kept: null, shown: null };
+}
+
+/** Takes the newest picture, then settles it as far as it can be. */
+export function offerPicture<P extends Closable>(
+  gate: PictureGate<P>,
+  picture: P,
+  rtpTimestamp: number,
+  lookup: StampLookup,
+  context: GateContext,
+  draw: Draw<P>,
+): void {
+  dropKept(gate);
+  gate.kept = { picture, rtpTimestamp, counted: false };
+  settlePicture(gate, lookup, context, draw);
+}
+
+/** Judges the kept picture again: after a feedback, a stamp, or a change of the settings. */
+export function settlePicture<P extends Closable>(
+  gate: PictureGate<P>,
+  lookup: StampLookup,
+  context: GateContext,
+  draw: Draw<P>,
+): void {
+  const { kept, counts } = gate;
+  if (kept === null) return;
+  const stamp = lookup(kept.rtpTimestamp);
+  if (stamp === undefined && context.enabled) return;
+  if (stamp !== null && stamp !== undefined) counts.stamp = stamp;
+  const { verdict, gap } = judge(context.feedback, stamp ?? null, context.tolerance, context.enabled);
+  if (verdict === "hold") {
+    if (!kept.counted) counts.held += 1;
+    kept.counted = true;
+    return;
+  }
+  gate.kept = null;
+  if (verdict === "render") {
+    draw(kept.picture, stamp ?? null, gap);
+    gate.shown = stamp ?? null;
+    noteRendered(counts, gap, context);
+  } else counts.discarded += 1;
+  kept.picture.close();
+}
+
+export function closePictureGate<P extends Closable>(gate: PictureGate<P>): void {
+  gate.kept?.picture.close();
+  gate.kept = null;
+}
+
+/** A newer picture replaces the kept one. One that never got its stamp was discarded; a held one is counted already. */
+function dropKept<P extends Closable>(gate: PictureGate<P>): void {
+  if (gate.kept === null) return;
+  if (!gate.kept.counted) gate.counts.discarded += 1;
+  closePictureGate(gate);
+}

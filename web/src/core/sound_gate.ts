@@ -1,0 +1,41 @@
+import { judge } from "./media_gate";
+import { createCounts, noteRendered, type GateContext, type MediumCounts } from "./medium_counts";
+
+/** The gate of one audio stream. A segment counts by the verdict at its start. */
+export interface SoundGate {
+  readonly counts: MediumCounts;
+  playing: number | null; // RTP timestamp of the segment being played
+  judged: boolean; // whether that segment is counted
+}
+
+export function createSoundGate(): SoundGate {
+  return { counts: createCounts(), playing: null, judged: false };
+}
+
+/**
+ * Takes the segment being played; says whether it may be heard now.
+ * `stamp` is undefined while nothing is known of it. `audible`: whether sound is on; silence renders nothing.
+ */
+export function observeSound(
+  gate: SoundGate,
+  rtpTimestamp: number,
+  stamp: number | null | undefined,
+  context: GateContext,
+  audible: boolean,
+): boolean {
+  const { counts } = gate;
+  if (gate.playing !== rtpTimestamp) {
+    gate.playing = rtpTimestamp;
+    gate.judged = false;
+  }
+  if (stamp === undefined && context.enabled) return false;
+  const { verdict, gap } = judge(context.feedback, stamp ?? null, context.tolerance, context.enabled);
+  if (stamp !== null && stamp !== undefined) counts.stamp = stamp;
+  if (!gate.judged && audible) {
+    gate.judged = true;
+    if (verdict === "render") noteRendered(counts, gap, context);
+    else if (verdict === "hold") counts.held += 1;
+    else counts.discarded += 1;
+  }
+  return verdict === "render";
+}

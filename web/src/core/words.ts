@@ -1,0 +1,55 @@
+import type { Refusal } from "../wire";
+import type { ArmRefusal, DisarmReason } from "./arming";
+import type { GateState } from "./command_gate";
+
+type RefusalReason = Refusal["reason"];
+
+/** What an operator reads for each refusal. */
+export const REFUSAL_WORDS: Readonly<Record<RefusalReason, string>> = {
+  late: "It came too late: the feedback it answers is too old",
+  out_of_order: "It is not the next event",
+  rested: "The robot was told to rest before it arrived",
+  stopped: "The robot is stopped",
+  not_a_number: "A value was not a number",
+  wrong_size: "It did not have one value for each axis",
+  malformed: "The console could not read it",
+  no_seat: "You do not hold the control seat",
+  seat_taken: "Somebody else holds the control seat",
+  not_allowed: "Your link does not permit it",
+  link_down: "The console has no link to the robot",
+};
+
+export const GATE_WORDS: Readonly<Record<GateState, string>> = {
+  open: "Ready for the next command",
+  no_feedback: "Waiting for the first feedback",
+  in_flight: "Waiting for the robot's answer",
+  rate: "Keeping to the robot's event rate",
+  picture: "Waiting for a fresh picture",
+};
+
+export const ARM_REFUSAL_WORDS: Readonly<Record<ArmRefusal, string>> = {
+  observer: "This link is for watching",
+  not_connected: "Not connected to the console",
+  robot_down: "The robot cannot be reached",
+  no_seat: "You do not hold the control seat",
+  stopped: "The robot is stopped: reset it first",
+  hidden: "The page is hidden",
+  deadman_held: "Let go of the hold-to-run control first",
+};
+
+export const DISARM_WORDS: Readonly<Record<DisarmReason, string>> = {
+  start: "Arm to drive",
+  operator: "Disarmed by you",
+  blur: "Disarmed: the window lost focus",
+  hidden: "Disarmed: the page was hidden",
+  pad_lost: "Disarmed: the gamepad is gone",
+  connection_lost: "Disarmed: the connection was lost",
+  robot_down: "Disarmed: the robot cannot be reached",
+  seat_lost: "Disarmed: the control seat was lost",
+  stopped: "Disarmed: the robot was stopped",
+  taped_down: "Disarmed: hold-to-run was held a minute without change",
+};
+
+export function eventsBehind(count: number): string {
+  return count === 1 ? "1 event behind" : `${count} events behind`;
+}

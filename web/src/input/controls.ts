@@ -1,0 +1,53 @@
+import type { HeldInputs } from "../core/axis_mapping";
+import { Keyboard, type KeyboardEvents } from "./keyboard";
+import { Pad, type PadEvents } from "./pad";
+import type { TouchSticks } from "./touch_sticks";
+
+const SLOW_SHARE = 0.3;
+
+/** What the operator holds at one sample. */
+export interface ControlSample {
+  readonly deadman: boolean;
+  readonly held: HeldInputs;
+  readonly slowShare: number; // 1, or less with the slow button
+  readonly signature: string; // the same while nothing is changed
+}
+
+/** Gamepad, keyboard and touch as one set of controls. */
+export class Controls {
+  readonly pad: Pad;
+  readonly keyboard: Keyboard;
+
+  constructor(
+    readonly sticks: TouchSticks,
+    events: KeyboardEvents & PadEvents,
+  ) {
+    this.pad = new Pad(events);
+    this.keyboard = new Keyboard(events);
+  }
+
+  sample(): ControlSample {
+    this.pad.poll();
+    const { keyboard, sticks } = this;
+    const pad = this.pad.state?.standard === true ? this.pad.state : null;
+    const touch = sticks.deadman ? sticks.inputs : null;
+    const held: HeldInputs = { pad: pad?.inputs ?? null, keys: keyboard.keys, touch };
+    return {
+      deadman: keyboard.deadman || sticks.deadman || (pad?.deadman ?? false),
+      held,
+      slowShare: keyboard.slow || pad?.slow === true ? SLOW_SHARE : 1,
+      signature: JSON.stringify([held.pad, [...keyboard.keys], touch]),
+    };
+  }
+
+  /** Forgets all that is held. */
+  release(): void {
+    this.keyboard.release();
+    this.sticks.release();
+  }
+
+  close(): void {
+    this.release();
+    this.keyboard.close();
+  }
+}

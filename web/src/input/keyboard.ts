@@ -1,0 +1,70 @@
+import { Disposal } from "./disposal";
+
+export interface KeyboardEvents {
+  stop(): void;
+  arm(): void;
+  nextLayer(): void;
+  isArmed(): boolean;
+}
+
+const STOP_KEYS = new Set(["Escape", "Backspace"]);
+const FIELDS = "input, textarea, select";
+const CONTROLS = "button, a, summary, [role=button]";
+
+/** Keys held now. While armed, keys drive; else they work the page as anywhere. */
+export class Keyboard {
+  readonly keys = new Set<string>();
+  private readonly disposal = new Disposal();
+
+  constructor(private readonly events: KeyboardEvents) {
+    this.disposal.listen(window, "keydown", (event) => this.down(event), { capture: true });
+    this.disposal.listen(window, "keyup", (event) => this.keys.delete(event.code), { capture: true });
+  }
+
+  get deadman(): boolean {
+    return this.keys.has("Space");
+  }
+
+  get slow(): boolean {
+    return this.keys.has("ShiftLeft") || this.keys.has("ShiftRight");
+  }
+
+  /** Forgets all keys: their release may never be seen. */
+  release(): void {
+    this.keys.clear();
+  }
+
+  close(): void {
+    this.disposal.close();
+    this.release();
+  }
+
+  private down(event: KeyboardEvent): void {
+    const target = event.target instanceof Element ? event.target : null;
+    const inField = target?.matches(FIELDS) ?? false;
+    if (STOP_KEYS.has(event.code) && !(inField && event.code === "Backspace")) {
+      event.preventDefault();
+      if (!event.repeat) this.events.stop();
+      return;
+    }
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (this.events.isArmed()) this.drive(event);
+    else this.idle(event, inField || (target?.matches(CONTROLS) ?? false));
+  }
+
+  private drive(event: KeyboardEvent): void {
+    event.preventDefault();
+    if (event.repeat) return;
+    if (event.code === "Tab") this.events.nextLayer();
+    else this.keys.add(event.code);
+  }
+
+  /** The space bar still counts as held where it works a button: arming needs it seen released. */
+  private idle(event: KeyboardEvent, onControl: boolean): void {
+    if (event.repeat) return;
+    this.keys.add(event.code);
+    if (onControl) return;
+    if (event.code === "Space") event.preventDefault();
+    if (event.code === "Enter") this.events.arm();
+  }
+}

@@ -1,0 +1,26 @@
+import "./style/fonts.css";
+import "./style/base.css";
+import "./style/layout.css";
+import "./style/panels.css";
+import "./style/views.css";
+import "./style/small_screens.css";
+import { readFragment } from "./core/fragment";
+import { installHook } from "./lockstep_hook";
+import { Page } from "./page";
+import { ConsoleApi } from "./rtc/console_api";
+
+const link = readFragment(location.hash);
+const page = new Page(new ConsoleApi(link.token ?? ""), link.trailer, link.name);
+installHook(page);
+page.start();
+if (link.token === null) page.app.link = { kind: "no_token" };
+else void page.app.connection.run();
+
+// Another link pasted into the same tab changes only the fragment.
+addEventListener("hashchange", () => location.reload());
+// Any first touch of the page lets it make sound, unless the operator turned it off.
+for (const type of ["pointerdown", "keydown"] as const)
+  addEventListener(type, () => {
+    if (page.app.state.settings.soundWanted && page.app.audio.state === "suspended")
+      page.app.audio.resume().catch(() => undefined);
+  });

@@ -1,0 +1,70 @@
+import { closePictureGate, createPictureGate, offerPicture, settlePicture } from "../core/picture_gate";
+import type { GateContext } from "../core/medium_counts";
+import { createRateMeter, noteHappening } from "../core/samples";
+import { findStamp } from "../core/stamp_book";
+import type { Section } from "../rtc/peer";
+import type { StreamInfo } from "../wire";
+import { openFrames } from "./frame_source";
+import type { Picture } from "./picture";
+import { RenderLog } from "./render_log";
+
+export interface VideoStreamEvents {
+  context(): GateContext; // read at the moment of drawing
+  drawn(stream: VideoStream, stamp: number | null, at: number): void;
+}
+
+/** One camera: its pictures pass the gate and are drawn on a canvas. */
+export class VideoStream {
+  readonly gate = createPictureGate<Picture>();
+  readonly log = new RenderLog();
+  readonly frames = createRateMeter();
+  width = 0;
+  height = 0;
+  lastDrawnMs: number | null = null;
+  lastGoodMs: number | null = null; // when a picture last came, drawn or not
+  private readonly drawing: CanvasRenderingContext2D | null;
+  private readonly endFrames: () => void;
+
+  constructor(
+    readonly info: StreamInfo,
+    readonly section: Section,
+    readonly canvas: HTMLCanvasElement,
+    private readonly events: VideoStreamEvents,
+  ) {
+    this.drawing = canvas.getContext("2d", { alpha: false });
+    if (section.stamps !== null) section.stamps.onstamp = () => this.settle();
+    this.endFrames = openFrames(section.transceiver.receiver.track, (picture, rtpTimestamp) => {
+      this.lastGoodMs = performance.now();
+      offerPicture(this.gate, picture, rtpTimestamp, this.lookup, events.context(), this.draw);
+    });
+  }
+
+  /** Judges the waiting picture again. */
+  settle(): void {
+    settlePicture(this.gate, this.lookup, this.events.context(), this.draw);
+  }
+
+  close(): void {
+    this.endFrames();
+    closePictureGate(this.gate);
+  }
+
+  private readonly lookup = (rtpTimestamp: number): number | null | undefined => {
+    const { stamps } = this.section;
+    return stamps === null ? null : findStamp(stamps.book, rtpTimestamp);
+  };
+
+  private readonly draw = (picture: Picture, stamp: number | null, gap: number | null): void => {
+    const { canvas } = this;
+    if (canvas.width !== picture.width || canvas.height !== picture.height) {
+      canvas.width = this.width = picture.width;
+      canvas.height = this.height = picture.height;
+    }
+    this.drawing?.drawImage(picture.image, 0, 0);
+    const at = performance.now();
+    this.lastDrawnMs = at;
+    noteHappening(this.frames, at);
+    this.log.add({ stamp, gap, feedback: this.events.context().feedback, at });
+    this.events.drawn(this, stamp, at);
+  };
+}

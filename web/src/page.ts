@@ -1,0 +1,109 @@
+import { ConsoleApp } from "./console_app";
+import { isOperator } from "./core/console_state";
+import { TouchSticks } from "./input/touch_sticks";
+import type { ConsoleApi } from "./rtc/console_api";
+import { createAnnouncer } from "./ui/announcer";
+import { createArmPanel } from "./ui/arm_panel";
+import { createAxisPanel } from "./ui/axis_panel";
+import { createBanner } from "./ui/banner";
+import { createDelayPanel } from "./ui/delay_panel";
+import { h, setData, type Panel } from "./ui/dom";
+import { createEventPanel } from "./ui/event_panel";
+import { createForceGauge } from "./ui/force_gauge";
+import { createLogPanel } from "./ui/log_panel";
+import { createOverlay } from "./ui/overlay";
+import { createPeoplePanel } from "./ui/people_panel";
+import { createRangeRadar } from "./ui/range_radar";
+import { SceneView } from "./ui/scene_view";
+import { createSettingsPanel } from "./ui/settings_panel";
+import { createStatusBar } from "./ui/status_bar";
+import { createStopPanel } from "./ui/stop_panel";
+import { createStreamTable } from "./ui/stream_table";
+import { ViewBoard } from "./ui/view_board";
+
+const REDRAW_MS = 66;
+
+/** The whole page: one engine, and panels that show it. */
+export class Page {
+  readonly app: ConsoleApp;
+  readonly board: ViewBoard;
+  private readonly root = h("div", "console");
+  private readonly panels: Panel[];
+  private drawnMs = 0;
+
+  constructor(api: ConsoleApi, trailer: boolean, name: string | null) {
+    const left = h("div", "stick left", { "aria-label": "Left stick" });
+    const right = h("div", "stick right", { "aria-label": "Right stick" });
+    this.board = new ViewBoard(new SceneView(api));
+    this.app = new ConsoleApp(api, trailer, name, new TouchSticks(left, right), {
+      canvas: (info) => this.board.canvas(info),
+      mainStream: () => this.board.mainStream(),
+      armedChanged: () => this.draw(performance.now()),
+    });
+    this.panels = this.build(left, right);
+    watchTouch();
+  }
+
+  /** Shows the page and keeps it current. */
+  start(): void {
+    document.body.replaceChildren(this.root);
+    const frame = (now: number): void => {
+      requestAnimationFrame(frame);
+      if (now - this.drawnMs >= REDRAW_MS) this.draw(now);
+    };
+    requestAnimationFrame(frame);
+    this.draw(performance.now());
+  }
+
+  private build(left: HTMLElement, right: HTMLElement): Panel[] {
+    const { app, board } = this;
+    const bar = createStatusBar(app, () => this.root.classList.toggle("shows-details"));
+    const banner = createBanner(app);
+    const event = createEventPanel(app);
+    const force = createForceGauge(app);
+    const radar = createRangeRadar(app);
+    const overlay = createOverlay(app);
+    const details = [
+      createStreamTable(app),
+      createDelayPanel(app, () => board.mainStream()),
+      createSettingsPanel(app),
+      createPeoplePanel(app),
+      createLogPanel(app),
+    ];
+    const arm = createArmPanel(app);
+    const axes = createAxisPanel(app);
+    const stop = createStopPanel(app);
+    const announcer = createAnnouncer(app);
+    board.element.append(
+      h("div", "stage", {}, h("div", "gauges", {}, force.element, radar.element), overlay.element),
+    );
+    const rail = h(
+      "aside",
+      "rail",
+      {},
+      event.element,
+      h("div", "details", {}, ...details.map((panel) => panel.element)),
+    );
+    const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
+    this.root.append(bar.element, banner.element, board.element, rail, deck, announcer.element);
+    return [bar, banner, event, force, radar, overlay, ...details, arm, axes, stop, announcer];
+  }
+
+  private draw(now: number): void {
+    this.drawnMs = now;
+    const { app, root } = this;
+    setData(root, "armed", app.arming.state);
+    setData(root, "role", app.state.welcome === null ? "" : isOperator(app.state) ? "operator" : "observer");
+    setData(root, "stopped", String(app.state.stop.stopped));
+    setData(root, "gate", app.state.settings.gateEnabled ? "on" : "off");
+    this.board.update(app, now);
+    for (const panel of this.panels) panel.update(now);
+  }
+}
+
+/** On-screen sticks appear where fingers are. */
+function watchTouch(): void {
+  const html = document.documentElement;
+  if (matchMedia("(pointer: coarse)").matches) setData(html, "touch", "true");
+  addEventListener("touchstart", () => setData(html, "touch", "true"), { once: true, passive: true });
+}

@@ -1,0 +1,119 @@
+import { isRecord } from "../core/schema_check";
+
+/** What the console said instead of doing what it was asked. */
+export class ConsoleError extends Error {
+  constructor(
+    readonly status: number, // 0: it could not be reached
+    readonly error: string, // stable name
+    readonly detail: string,
+    readonly retryAfterMs: number | null,
+  ) {
+    super(detail === "" ? error : `${error}: ${detail}`);
+  }
+}
+
+export interface WhepAnswer {
+  readonly sdp: string;
+  readonly location: string; // of the session, to end it
+}
+
+/** The console's HTTP interface (docs/console-api.md), for the holder of one token. */
+export class ConsoleApi {
+  constructor(private readonly token: string) {}
+
+  /** How many cameras and microphones the robot has; a guess while that is not known. */
+  async media(signal: AbortSignal): Promise<{ cameras: number; microphones: number }> {
+    const session = await this.json("GET", "/api/session", undefined, signal);
+    return {
+      cameras: lengthOf(session, "cameras", 2),
+      microphones: Math.min(1, lengthOf(session, "microphones", 1)),
+    };
+  }
+
+  async offer(sdp: string, trailer: boolean, signal: AbortSignal): Promise<WhepAnswer> {
+    const path = trailer ? "/whep?stamp=trailer" : "/whep";
+    const response = await this.fetch("POST", path, { "Content-Type": "application/sdp" }, sdp, signal);
+    return { sdp: await response.text(), location: response.headers.get("Location") ?? "" };
+  }
+
+  /** Ends a WHEP session; also while the page is being left. */
+  async end(location: string): Promise<void> {
+    if (location !== "") await this.fetch("DELETE", location, {}, undefined, undefined);
+  }
+
+  async stop(reason: string): Promise<void> {
+    await this.json("POST", "/api/stop", { reason }, AbortSignal.timeout(3000));
+  }
+
+  async reset(): Promise<void> {
+    await this.json("POST", "/api/reset", {}, AbortSignal.timeout(3000));
+  }
+
+  /** Path of the 3D scene, valid for a short time. */
+  async scene(): Promise<string> {
+    const scene = await this.json("POST", "/api/scene", {}, AbortSignal.timeout(5000));
+    const path = isRecord(scene) ? scene["path"] : undefined;
+    if (typeof path !== "string" || !path.startsWith("/"))
+      throw new ConsoleError(200, "malformed", "no path", null);
+    return path;
+  }
+
+  private async json(
+    method: string,
+    path: string,
+    body: object | undefined,
+    signal: AbortSignal,
+  ): Promise<unknown> {
+    const headers: Record<string, string> = body === undefined ? {} : { "Content-Type": "application/json" };
+    const text = body === undefined ? undefined : JSON.stringify(body);
+    const response = await this.fetch(method, path, headers, text, signal);
+    const answer: unknown = await response.json().catch(() => null);
+    return answer;
+  }
+
+  private async fetch(
+    method: string,
+    path: string,
+    headers: Record<string, string>,
+    body: string | undefined,
+    signal: AbortSignal | undefined,
+  ): Promise<Response> {
+    const init: RequestInit = {
+      method,
+      headers: { ...headers, Authorization: `Bearer ${this.token}` },
+      keepalive: method === "DELETE" || path === "/api/stop",
+      cache: "no-store",
+    };
+    if (body !== undefined) init.body = body;
+    if (signal !== undefined) init.signal = signal;
+    let response: Response;
+    try {
+      response = await fetch(path, init);
+    } catch (error) {
+      throw new ConsoleError(0, "console_unreachable", error instanceof Error ? error.message : "", null);
+    }
+    if (!response.ok) throw await errorOf(response);
+    return response;
+  }
+}
+
+async function errorOf(response: Response): Promise<ConsoleError> {
+  const body: unknown = await response.json().catch(() => null);
+  const field = (name: string): string => {
+    const value = isRecord(body) ? body[name] : undefined;
+    return typeof value === "string" ? value : "";
+  };
+  const retryAfter = Number(response.headers.get("Retry-After") ?? NaN);
+  return new ConsoleError(
+    response.status,
+    field("error") || `http_${response.status}`,
+    field("detail"),
+    Number.isFinite(retryAfter) ? retryAfter * 1000 : null,
+  );
+}
+
+function lengthOf(session: unknown, name: string, fallback: number): number {
+  const description = isRecord(session) ? session["description"] : undefined;
+  const list = isRecord(description) ? description[name] : undefined;
+  return Array.isArray(list) ? list.length : fallback;
+}

@@ -1,0 +1,27 @@
+/** Between the page and the transform worker. */
+
+/** Options of one RTCRtpScriptTransform. */
+export interface TransformOptions {
+  readonly receiver: number; // our own number of the receiver
+  readonly kind: "audio" | "video";
+  readonly trailer: boolean; // the carrier is the trailer
+}
+
+/** Page to worker, at every feedback and change of settings: what sound is judged against. */
+export interface SoundContext {
+  readonly feedback: number | null;
+  readonly tolerance: number;
+  readonly enabled: boolean;
+}
+
+/** Worker to page, for every encoded frame. */
+export interface FrameNote {
+  readonly receiver: number;
+  readonly rtpTimestamp: number;
+  readonly stamp: number | null; // null: none that is valid
+  readonly dropped: boolean; // too old already; never decoded
+}
+
+export function isFrameNote(value: unknown): value is FrameNote {
+  return typeof value === "object" && value !== null && "receiver" in value && "rtpTimestamp" in value;
+}

@@ -1,0 +1,57 @@
+import { createStampBook, noteStamp, type StampBook } from "../core/stamp_book";
+import { isFrameNote, type SoundContext, type TransformOptions } from "./stamp_messages";
+
+const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
+
+/** Stamps of one receiver's frames. */
+export interface ReceiverStamps {
+  readonly book: StampBook;
+  dropped: number; // sound thrown away before decoding
+  onstamp: (() => void) | null;
+}
+
+/** Owns the transform worker, for all receivers of the page. */
+export class StampReader {
+  private readonly worker = new Worker(new URL("./stamp_worker.ts", import.meta.url), { type: "module" });
+  private readonly receivers = new Map<number, ReceiverStamps>();
+  private nextReceiver = 1;
+
+  constructor() {
+    this.worker.onmessage = (event: MessageEvent<unknown>) => this.note(event.data);
+  }
+
+  static isSupported(): boolean {
+    return "RTCRtpScriptTransform" in globalThis && "transform" in RTCRtpReceiver.prototype;
+  }
+
+  /** Puts the transform in front of a receiver's decoder. Call before the first frame arrives. */
+  attach(receiver: RTCRtpReceiver, kind: "audio" | "video", trailer: boolean): ReceiverStamps {
+    const options: TransformOptions = { receiver: this.nextReceiver++, kind, trailer };
+    const stamps: ReceiverStamps = { book: createStampBook(BOOK_LIMIT), dropped: 0, onstamp: null };
+    this.receivers.set(options.receiver, stamps);
+    receiver.transform = new RTCRtpScriptTransform(this.worker, options);
+    return stamps;
+  }
+
+  detach(stamps: ReceiverStamps): void {
+    for (const [receiver, known] of this.receivers) if (known === stamps) this.receivers.delete(receiver);
+  }
+
+  tell(context: SoundContext): void {
+    this.worker.postMessage(context);
+  }
+
+  close(): void {
+    this.receivers.clear();
+    this.worker.terminate();
+  }
+
+  private note(data: unknown): void {
+    if (!isFrameNote(data)) return;
+    const stamps = this.receivers.get(data.receiver);
+    if (stamps === undefined) return;
+    noteStamp(stamps.book, data.rtpTimestamp, data.stamp);
+    if (data.dropped) stamps.dropped += 1;
+    stamps.onstamp?.();
+  }
+}

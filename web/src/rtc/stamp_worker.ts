@@ -1,0 +1,65 @@
+/** Transform worker: reads the stamp of every encoded frame before it is decoded, and takes the trailer off. */
+import { eventOfOffset } from "../core/capture_time";
+import { judge } from "../core/media_gate";
+import { splitTrailer } from "../core/trailer";
+import type { FrameNote, SoundContext, TransformOptions } from "./stamp_messages";
+
+interface EncodedFrame {
+  data: ArrayBuffer;
+  getMetadata(): { rtpTimestamp?: number; senderCaptureTimeOffset?: number };
+}
+
+interface Transformer {
+  readonly options: TransformOptions;
+  readonly readable: ReadableStream<EncodedFrame>;
+  readonly writable: WritableStream<EncodedFrame>;
+}
+
+interface TransformScope {
+  onrtctransform: ((event: { readonly transformer: Transformer }) => void) | null;
+  onmessage: ((event: MessageEvent<SoundContext>) => void) | null;
+  postMessage(note: FrameNote): void;
+}
+
+const scope = self as unknown as TransformScope;
+let context: SoundContext = { feedback: null, tolerance: 0, enabled: true };
+
+scope.onmessage = (event) => {
+  context = event.data;
+};
+
+scope.onrtctransform = ({ transformer }) => {
+  const { options } = transformer;
+  const stamping = new TransformStream<EncodedFrame, EncodedFrame>({
+    transform(frame, controller) {
+      if (passes(frame, options)) controller.enqueue(frame);
+    },
+  });
+  // The pipe ends with the receiver; there is nobody left to tell.
+  transformer.readable
+    .pipeThrough(stamping)
+    .pipeTo(transformer.writable)
+    .catch(() => undefined);
+};
+
+function passes(frame: EncodedFrame, options: TransformOptions): boolean {
+  const metadata = frame.getMetadata();
+  const stamp = options.trailer ? takeTrailer(frame) : eventOfOffset(metadata.senderCaptureTimeOffset);
+  const dropped = options.kind === "audio" && isTooOld(stamp);
+  if (metadata.rtpTimestamp !== undefined)
+    scope.postMessage({ receiver: options.receiver, rtpTimestamp: metadata.rtpTimestamp, stamp, dropped });
+  return !dropped;
+}
+
+function takeTrailer(frame: EncodedFrame): number | null {
+  const { length, trailer } = splitTrailer(new Uint8Array(frame.data));
+  if (trailer === null) return null;
+  frame.data = frame.data.slice(0, length);
+  return trailer.event;
+}
+
+/** The gap of a sound only grows, so one that is too old now would never be heard. */
+function isTooOld(stamp: number | null): boolean {
+  if (stamp === null) return false;
+  return judge(context.feedback, stamp, context.tolerance, context.enabled).verdict === "discard";
+}

@@ -1,0 +1,154 @@
+import { gateState, type GateState, type Pacing } from "./core/command_gate";
+import { holdsSeat } from "./core/console_state";
+import type { MediumCounts } from "./core/medium_counts";
+import { quantile, rateOf } from "./core/samples";
+import { staleness } from "./core/staleness";
+import { GATE_WORDS } from "./core/words";
+import type { ConsoleApp } from "./console_app";
+import type { VideoStream } from "./media/video_stream";
+import type { SoundStream } from "./media/sound_stream";
+import type { Report, StreamInfo, StreamReport } from "./wire";
+
+/** One stream in `window.lockstep.stats()`. */
+export interface StreamStatistics {
+  readonly kind: "audio" | "video";
+  readonly carrier: StreamInfo["carrier"];
+  readonly codec: string;
+  readonly stamp: number | null;
+  readonly gap: number | null;
+  readonly max_gap: number;
+  readonly rendered: number;
+  readonly discarded: number;
+  readonly held: number;
+  readonly violations: number;
+  readonly frame_rate: number | null; // drawn per second; null for sound
+  readonly width: number;
+  readonly height: number;
+}
+
+/** `window.lockstep.stats()`, documented in docs/console-api.md. */
+export interface Statistics {
+  readonly peer: string | null;
+  readonly role: string | null;
+  readonly connected: boolean;
+  readonly event: number | null;
+  readonly epoch: string | null;
+  readonly armed: boolean;
+  readonly driving: boolean;
+  readonly seat: { readonly holder: string; readonly name: string; readonly mine: boolean } | null;
+  readonly gate: { readonly state: GateState; readonly reason: string };
+  readonly pacing: Pacing;
+  readonly tolerance: { readonly video: number; readonly audio: number };
+  readonly gate_enabled: boolean;
+  readonly gateEnabled: boolean;
+  readonly streams: Readonly<Record<string, StreamStatistics>>;
+  readonly picture_delay_ms: number | null;
+  readonly picture_delay_p50_ms: number | null;
+  readonly picture_delay_p95_ms: number | null;
+  readonly round_trip_ms: number | null;
+  readonly command_to_feedback_ms: { readonly median: number | null; readonly p99: number | null };
+  readonly event_rate: number;
+  readonly stop: { readonly stopped: boolean; readonly by: string; readonly reason: string };
+  readonly stale: string | null; // why the large view must not be trusted
+  readonly at_rest: boolean | null;
+  readonly first_picture_ms: number | null;
+  readonly sound: "on" | "off";
+  readonly bad_messages: number;
+}
+
+export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statistics {
+  const { state, driver, arming } = app;
+  const now = performance.now();
+  const gate = driver === null ? "no_feedback" : gateState(driver.gate, now);
+  const main = mainStream === null ? undefined : app.room.videos.get(mainStream);
+  const { seat, settings } = state;
+  return {
+    peer: state.welcome?.peer ?? null,
+    role: state.welcome?.role ?? null,
+    connected: state.welcome !== null,
+    event: state.feedback?.event ?? null,
+    epoch: state.robot?.epoch ?? null,
+    armed: arming.state !== "disarmed",
+    driving: arming.state === "driving",
+    seat: seat === null ? null : { holder: seat.holder, name: seat.name, mine: holdsSeat(state) },
+    gate: { state: gate, reason: GATE_WORDS[gate] },
+    pacing: settings.pacing,
+    tolerance: { ...settings.tolerance },
+    gate_enabled: settings.gateEnabled,
+    gateEnabled: settings.gateEnabled,
+    streams: streamsOf(app, now),
+    picture_delay_ms: driver?.latency.pictureMs ?? null,
+    picture_delay_p50_ms: driver === null ? null : quantile(driver.latency.toPicture, 0.5),
+    picture_delay_p95_ms: driver === null ? null : quantile(driver.latency.toPicture, 0.95),
+    round_trip_ms: state.roundTripMs,
+    command_to_feedback_ms: {
+      median: driver === null ? null : quantile(driver.latency.toFeedback, 0.5),
+      p99: driver === null ? null : quantile(driver.latency.toFeedback, 0.99),
+    },
+    event_rate: rateOf(app.events, now),
+    stop: { ...state.stop },
+    stale: main === undefined ? null : stalenessOf(app, main, now),
+    at_rest: state.feedback?.at_rest ?? null,
+    first_picture_ms: app.firstPictureMs,
+    sound: app.room.isAudible() ? "on" : "off",
+    bad_messages: state.badMessages,
+  };
+}
+
+/** Why a view must not be trusted; null when it may. */
+export function stalenessOf(app: ConsoleApp, video: VideoStream, now: number): string | null {
+  return staleness(video.gate.shown, video.lastDrawnMs, video.lastGoodMs, app.room.context("video"), now);
+}
+
+/** What the console is told twice a second. */
+export function reportOf(app: ConsoleApp): Report {
+  return {
+    type: "report",
+    event: app.state.feedback?.event ?? 0,
+    armed: app.arming.state !== "disarmed",
+    streams: [...app.room.videos.values(), ...app.room.sounds.values()].map(streamReport),
+    picture_delay_ms: app.driver?.latency.pictureMs ?? null,
+    round_trip_ms: app.state.roundTripMs,
+  };
+}
+
+function streamReport(stream: VideoStream | SoundStream): StreamReport {
+  const { counts } = stream.gate;
+  return {
+    stream: stream.info.stream,
+    carrier: stream.info.carrier,
+    stamp: counts.stamp ?? 0,
+    gap: counts.gap ?? 0,
+    max_gap: counts.maxGap,
+    rendered: counts.rendered,
+    discarded: "discarded" in stream ? stream.discarded() : counts.discarded,
+    held: counts.held,
+  };
+}
+
+function streamsOf(app: ConsoleApp, now: number): Record<string, StreamStatistics> {
+  const found: Record<string, StreamStatistics> = {};
+  for (const [name, video] of app.room.videos) {
+    const { width, height, frames } = video;
+    found[name] = {
+      ...common(video.info, video.gate.counts),
+      frame_rate: rateOf(frames, now),
+      width,
+      height,
+    };
+  }
+  for (const [name, sound] of app.room.sounds) {
+    const counts = common(sound.info, sound.gate.counts);
+    found[name] = { ...counts, discarded: sound.discarded(), frame_rate: null, width: 0, height: 0 };
+  }
+  return found;
+}
+
+function common(
+  info: StreamInfo,
+  counts: MediumCounts,
+): Omit<StreamStatistics, "frame_rate" | "width" | "height"> {
+  const { stamp, gap, rendered, discarded, held, violations } = counts;
+  const { kind, carrier, codec } = info;
+  return { kind, carrier, codec, stamp, gap, max_gap: counts.maxGap, rendered, discarded, held, violations };
+}

@@ -1,0 +1,53 @@
+import { armRefusal } from "../core/arming";
+import { isOperator } from "../core/console_state";
+import { ARM_REFUSAL_WORDS, DISARM_WORDS } from "../core/words";
+import type { ConsoleApp } from "../console_app";
+import { button, h, setData, setHidden, setText, type Panel } from "./dom";
+
+const STATE_WORDS = { disarmed: "Disarmed", armed: "Armed", driving: "Driving" } as const;
+
+/** Whether the robot may be driven, and what to do to drive it. */
+export function createArmPanel(app: ConsoleApp): Panel {
+  const state = h("strong", "arm-state");
+  const words = h("span", "arm-words");
+  const pad = h("span", "arm-pad");
+  const toggle = button("arm-button", "Arm", () => {
+    app.toggleArmed();
+    toggle.blur();
+  });
+  const text = h("div", "arm-text", {}, state, words, pad);
+  const element = h("section", "arm", { "aria-label": "Driving" }, toggle, text);
+  return {
+    element,
+    update(now) {
+      const { arming } = app;
+      setHidden(element, !isOperator(app.state));
+      setData(element, "state", arming.state);
+      setText(state, STATE_WORDS[arming.state]);
+      setText(toggle, arming.state === "disarmed" ? "Arm" : "Disarm");
+      setText(words, armWords(app, now));
+      setText(pad, padWords(app));
+    },
+  };
+}
+
+function armWords(app: ConsoleApp, now: number): string {
+  if (app.arming.state === "driving") return "Let go to bring the robot to rest";
+  if (app.arming.state === "armed") return `Hold ${deadmanName(app)} to move`;
+  const refusal = armRefusal(app.arming, app.conditions(now));
+  return refusal === null || refusal === "deadman_held"
+    ? DISARM_WORDS[app.arming.reason]
+    : ARM_REFUSAL_WORDS[refusal];
+}
+
+function deadmanName(app: ConsoleApp): string {
+  if (app.controls.pad.state?.standard === true) return "the right bumper (RB)";
+  return document.documentElement.dataset["touch"] === "true" ? "a stick" : "the space bar";
+}
+
+function padWords(app: ConsoleApp): string {
+  const { state } = app.controls.pad;
+  if (state === null) return "No gamepad: press a button on it to wake it";
+  if (!state.standard) return `${state.id} has no standard mapping: it cannot drive`;
+  return app.isArmed() ? `${state.id}: Y layer · LB slow · B STOP` : `${state.id} ready: START arms`;
+}

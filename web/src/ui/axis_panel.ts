@@ -1,0 +1,73 @@
+import { isOperator } from "../core/console_state";
+import type { ConsoleApp } from "../console_app";
+import type { Axis, RobotDescription } from "../wire";
+import { button, h, setHidden, setPressed, setText, type Panel } from "./dom";
+
+interface AxisBar {
+  readonly axis: Axis;
+  readonly element: HTMLElement;
+  show(measured: number | undefined, commanded: number | undefined): void;
+}
+
+/** The control layers, and each axis as commanded and as measured. */
+export function createAxisPanel(app: ConsoleApp): Panel {
+  const layers = h("div", "segments layers", { role: "group", "aria-label": "Control layer" });
+  const bars = h("div", "axes");
+  const element = h("section", "axis-panel", { "aria-label": "Axes" }, layers, bars);
+  let description: RobotDescription | null = null;
+  let shown: AxisBar[] = [];
+  return {
+    element,
+    update() {
+      const now = app.state.robot?.description ?? null;
+      if (now !== null && now !== description) {
+        description = now;
+        shown = now.axes.map(createBar);
+        bars.replaceChildren(...shown.map((bar) => bar.element));
+        layers.replaceChildren(
+          ...now.layers.map((layer, index) => button("segment", layer.label, () => app.selectLayer(index))),
+        );
+      }
+      setHidden(layers, !isOperator(app.state) || layers.childElementCount < 2);
+      for (const [index, child] of [...layers.children].entries())
+        if (child instanceof HTMLElement) setPressed(child, index === app.layer);
+      showBars(app, shown);
+    },
+  };
+}
+
+/** Only the axes of the active layer fit; an observer sees the first layer's. */
+function showBars(app: ConsoleApp, bars: readonly AxisBar[]): void {
+  const layer = app.state.robot?.description.layers[app.layer];
+  const names = new Set(layer?.bindings.map((binding) => binding.axis));
+  for (const [index, bar] of bars.entries()) {
+    setHidden(bar.element, names.size > 0 && !names.has(bar.axis.name));
+    bar.show(app.state.feedback?.axes[index], app.values[index]);
+  }
+}
+
+function createBar(axis: Axis): AxisBar {
+  const value = h("span", "axis-value");
+  const fill = h("span", "axis-fill");
+  const mark = h("span", "axis-mark");
+  const track = h("span", "axis-track", { "aria-hidden": "true" }, fill, mark);
+  const line = h("span", "axis-line", {}, h("span", "axis-label", {}, axis.label), value);
+  const share = (amount: number): number =>
+    (amount - axis.minimum) / Math.max(1e-9, axis.maximum - axis.minimum);
+  const middle = share(axis.rest);
+  return {
+    axis,
+    element: h("div", "axis", {}, line, track),
+    show(measured, commanded) {
+      const at = Math.min(1, Math.max(0, share(measured ?? axis.rest)));
+      fill.style.left = percent(Math.min(at, middle));
+      fill.style.width = percent(Math.abs(at - middle));
+      mark.style.left = percent(Math.min(1, Math.max(0, share(commanded ?? axis.rest))));
+      setText(value, measured === undefined ? "–" : `${measured.toFixed(2)} ${axis.unit}`);
+    },
+  };
+}
+
+function percent(share: number): string {
+  return `${(share * 100).toFixed(1)}%`;
+}

@@ -1,0 +1,59 @@
+import { contactStrength, forceOf } from "../core/contact";
+import type { ConsoleApp } from "../console_app";
+import { h, setData, setHidden, setText, svg, type Panel } from "./dom";
+
+const REACH = 44; // of the arrow, in the drawing's units
+
+/** The contact force: an arrow seen from above (forward is up), and a meter. */
+export function createForceGauge(app: ConsoleApp): Panel {
+  const drawing = svg("svg", { viewBox: "-56 -56 112 112", class: "gauge-drawing", "aria-hidden": "true" });
+  const arrow = svg("path", { class: "force-arrow" });
+  drawing.append(
+    svg("circle", { r: "52", class: "gauge-ring" }),
+    svg("circle", { r: "26", class: "gauge-ring faint" }),
+    svg("path", { d: "M0-52v8M0 52v-8M-52 0h8M52 0h-8", class: "gauge-ring" }),
+    arrow,
+    svg("circle", { r: "4", class: "gauge-hub" }),
+  );
+  const value = h("span", "gauge-value");
+  const fill = h("span", "meter-fill");
+  const threshold = h("span", "meter-mark");
+  const meter = h("span", "meter", { "aria-hidden": "true" }, fill, threshold);
+  const element = h(
+    "div",
+    "gauge force",
+    { "aria-label": "Contact force" },
+    h("span", "gauge-name", {}, "Force"),
+    drawing,
+    value,
+    meter,
+  );
+  return {
+    element,
+    update() {
+      const sensor = app.state.robot?.description.wrench ?? null;
+      const wrench = app.state.feedback?.wrench ?? [];
+      setHidden(element, sensor === null || wrench.length < 3);
+      if (sensor === null) return;
+      const force = forceOf(wrench);
+      const strength = contactStrength(force, sensor);
+      setData(element, "tone", strength >= 0.7 ? "bad" : strength > 0 ? "wait" : "good");
+      arrow.setAttribute("d", arrowPath(wrench[0] ?? 0, wrench[1] ?? 0, sensor.full_scale_force));
+      setText(value, `${force.toFixed(force < 100 ? 1 : 0)} N`);
+      fill.style.width = `${Math.min(100, (100 * force) / sensor.full_scale_force).toFixed(1)}%`;
+      threshold.style.left = `${((100 * sensor.threshold_force) / sensor.full_scale_force).toFixed(1)}%`;
+    },
+  };
+}
+
+/** x forward is up, y left is left (REP 103). */
+function arrowPath(forward: number, left: number, fullScale: number): string {
+  const size = Math.hypot(forward, left);
+  const length = Math.min(1, size / fullScale) * REACH;
+  if (length < 3) return "";
+  const [x, y] = [-left / size, -forward / size];
+  const point = (along: number, across: number): string =>
+    `${(x * along - y * across).toFixed(1)} ${(y * along + x * across).toFixed(1)}`;
+  const neck = Math.max(0, length - 10);
+  return `M${point(0, 2.5)}L${point(neck, 2.5)}L${point(neck, 8)}L${point(length, 0)}L${point(neck, -8)}L${point(neck, -2.5)}L${point(0, -2.5)}Z`;
+}

@@ -1,0 +1,95 @@
+import { isOperator, robotIsUp } from "../core/console_state";
+import type { ConsoleApp } from "../console_app";
+import type { LinkState, LinkTrouble } from "../rtc/connection";
+import { button, h, setData, setHidden, setText, type Panel } from "./dom";
+import { holdButton } from "./hold_button";
+
+/** What stands over the large view. `tone` says how grave it is. */
+export interface OverlayWords {
+  readonly tone: "calm" | "bad" | "stopped";
+  readonly title: string;
+  readonly text: string;
+}
+
+const TROUBLE: Readonly<Record<LinkTrouble, readonly [title: string, text: string]>> = {
+  console_unreachable: ["Console unreachable", "The console does not answer."],
+  robot_unreachable: ["Robot unreachable", "The console has no link to the robot yet."],
+  token_refused: [
+    "This link is not valid",
+    "The console does not accept it. Open the newest link it printed.",
+  ],
+  refused: ["The console refused the connection", ""],
+  lost: ["Connection lost", "The robot comes to rest by itself."],
+};
+
+/** Says over the large view what is wrong, and offers the way out. */
+export function createOverlay(app: ConsoleApp): Panel {
+  const title = h("strong", "plate-title");
+  const text = h("p", "plate-text");
+  const retry = button("wide-button", "Try now", () => app.connection.retryNow());
+  const reset = holdButton("reset", "Hold to reset", () => app.reset());
+  const plate = h("div", "plate", {}, title, text, retry, reset);
+  const element = h("div", "overlay", {}, plate);
+  return {
+    element,
+    update(now) {
+      const words = overlayWords(app, now);
+      setHidden(element, words === null);
+      if (words === null) return;
+      setData(element, "tone", words.tone);
+      setText(title, words.title);
+      setText(text, words.text);
+      setHidden(text, words.text === "");
+      setHidden(retry, app.link.kind !== "waiting");
+      setHidden(reset, words.tone !== "stopped" || !isOperator(app.state));
+    },
+  };
+}
+
+export function overlayWords(app: ConsoleApp, now: number): OverlayWords | null {
+  if (app.link.kind !== "connected") return linkWords(app.link, now);
+  if (app.state.robot !== null && !robotIsUp(app.state)) {
+    const { detail } = app.state.robot;
+    return {
+      tone: "bad",
+      title: "Robot unreachable",
+      text: detail || "The console tries to reach it again.",
+    };
+  }
+  return app.state.stop.stopped ? stopWords(app) : null;
+}
+
+function linkWords(link: LinkState, now: number): OverlayWords {
+  switch (link.kind) {
+    case "no_token":
+      return {
+        tone: "calm",
+        title: "Open the link",
+        text: "This page needs the link that lockstep up printed: it ends in #token=…",
+      };
+    case "connecting":
+      return { tone: "calm", title: "Connecting…", text: "" };
+    case "waiting": {
+      const [title, text] = TROUBLE[link.why];
+      const seconds = Math.max(0, Math.ceil((link.retryAtMs - now) / 1000));
+      const detail = link.detail === "" ? "" : ` ${sentence(link.detail)}`;
+      return { tone: "bad", title, text: `${text}${detail} Trying again in ${seconds} s.`.trim() };
+    }
+    case "connected":
+      return { tone: "calm", title: "Connected", text: "" };
+  }
+}
+
+function stopWords(app: ConsoleApp): OverlayWords {
+  const { by, reason } = app.state.stop;
+  const who = by === "" ? "The robot was stopped" : `By ${by}`;
+  const why = reason === "" ? "" : `: ${reason}`;
+  const next = isOperator(app.state)
+    ? "Reset moves nothing; arm again afterwards."
+    : "The operator can reset it.";
+  return { tone: "stopped", title: "Stopped", text: `${who}${why}. ${next}` };
+}
+
+function sentence(text: string): string {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1).replace(/\.?$/, ".")}`;
+}

@@ -1,0 +1,48 @@
+import type { ConsoleApi } from "../rtc/console_api";
+import { button, h, setText } from "./dom";
+
+type SceneState = "off" | "loading" | "on" | "failed";
+
+/** The 3D scene in a frame of its own. It is loaded when asked for: it costs a graphics context. */
+export class SceneView {
+  readonly element = h("div", "scene");
+  private readonly words = h("p", "scene-words");
+  private readonly open = button("wide-button", "Open the 3D scene", () => this.load());
+  private frame: HTMLIFrameElement | null = null;
+  private state: SceneState = "off";
+
+  constructor(private readonly api: ConsoleApi) {
+    this.element.append(h("div", "scene-idle", {}, this.words, this.open));
+    this.show("off", "Robot, posed from its feedback");
+  }
+
+  /** Opens the scene unless it is open. */
+  load(): void {
+    if (this.state === "on" || this.state === "loading") return;
+    this.show("loading", "Opening the 3D scene…");
+    this.api.scene().then(
+      (path) => this.embed(path),
+      () => this.show("failed", "The 3D scene is not available"),
+    );
+  }
+
+  /** A new connection may mean a new scene. */
+  reset(): void {
+    this.frame?.remove();
+    this.frame = null;
+    this.show("off", "Robot, posed from its feedback");
+  }
+
+  private embed(path: string): void {
+    this.frame?.remove();
+    this.frame = h("iframe", "scene-frame", { src: path, title: "3D scene of the robot", tabindex: "-1" });
+    this.element.append(this.frame);
+    this.show("on", "");
+  }
+
+  private show(state: SceneState, words: string): void {
+    this.state = state;
+    this.element.dataset["state"] = state;
+    setText(this.words, words);
+  }
+}

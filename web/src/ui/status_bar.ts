@@ -1,0 +1,86 @@
+import { holdsSeat, isOperator, robotIsUp } from "../core/console_state";
+import type { ConsoleApp } from "../console_app";
+import { button, h, setData, setHidden, setPressed, setText, type Panel } from "./dom";
+
+type Tone = "good" | "wait" | "bad" | "off";
+
+interface Chip {
+  readonly element: HTMLElement;
+  show(tone: Tone, text: string): void;
+}
+
+/** Name, links, seat and sound: the top of the page. */
+export function createStatusBar(app: ConsoleApp, toggleDetails: () => void): Panel {
+  const robotName = h("span", "bar-robot");
+  const consoleChip = createChip("Console");
+  const robotChip = createChip("Robot");
+  const seatChip = createChip("Seat");
+  const level = h("span", "sound-level", { "aria-hidden": "true" });
+  const soundText = h("span");
+  const sound = button("chip-button sound", "", () => toggleSound(app));
+  sound.append(level, soundText);
+  const details = button("chip-button details-button", "Details", toggleDetails);
+  const element = h(
+    "header",
+    "bar",
+    {},
+    h("span", "bar-brand", {}, "Lockstep"),
+    robotName,
+    h("div", "bar-chips", {}, consoleChip.element, robotChip.element, seatChip.element),
+    h("div", "bar-tools", {}, sound, details),
+  );
+  return {
+    element,
+    update() {
+      setText(robotName, app.state.robot?.description.label ?? "");
+      consoleChip.show(...consoleWords(app));
+      robotChip.show(...robotWords(app));
+      seatChip.show(...seatWords(app));
+      const audible = app.room.isAudible();
+      setHidden(sound, app.room.sounds.size === 0);
+      setPressed(sound, audible);
+      setText(soundText, audible ? "Sound on" : "Turn on sound");
+      const loudest = Math.max(0, ...[...app.room.sounds.values()].map((stream) => stream.level()));
+      level.style.setProperty("--level", loudest.toFixed(2));
+    },
+  };
+}
+
+/** Browsers let a page make sound only after the user touched it. */
+function toggleSound(app: ConsoleApp): void {
+  const { settings } = app.state;
+  settings.soundWanted = !app.room.isAudible();
+  if (settings.soundWanted) app.audio.resume().catch(() => undefined);
+  app.settingsChanged();
+}
+
+function createChip(label: string): Chip {
+  const text = h("span", "chip-text");
+  const element = h("span", "chip", {}, h("span", "chip-dot"), h("span", "chip-label", {}, label), text);
+  return {
+    element,
+    show(tone, words) {
+      setData(element, "tone", tone);
+      setText(text, words);
+    },
+  };
+}
+
+function consoleWords(app: ConsoleApp): [Tone, string] {
+  if (app.link.kind === "connected") return ["good", "connected"];
+  if (app.link.kind === "no_token") return ["off", "no link"];
+  return app.link.kind === "connecting" ? ["wait", "connecting"] : ["bad", "not connected"];
+}
+
+function robotWords(app: ConsoleApp): [Tone, string] {
+  if (app.state.robot === null) return ["off", "unknown"];
+  return robotIsUp(app.state) ? ["good", "connected"] : ["bad", "unreachable"];
+}
+
+function seatWords(app: ConsoleApp): [Tone, string] {
+  const { seat } = app.state;
+  if (holdsSeat(app.state)) return ["good", "yours"];
+  if (seat === null) return ["off", "unknown"];
+  if (seat.holder === "") return [isOperator(app.state) ? "wait" : "off", "free"];
+  return ["off", seat.name];
+}

@@ -1,0 +1,75 @@
+import type { ConsoleApp } from "../console_app";
+import type { SoundStream } from "../media/sound_stream";
+import type { VideoStream } from "../media/video_stream";
+import { grouped, h, setData, setHidden, setText, type Panel } from "./dom";
+
+interface Row {
+  readonly element: HTMLElement;
+  show(stream: VideoStream | SoundStream, tolerance: number): void;
+}
+
+/** Every stream's gap against its tolerance, and what the gate did with it. */
+export function createStreamTable(app: ConsoleApp): Panel {
+  const rows = new Map<string, Row>();
+  const empty = h("p", "muted", {}, "No streams");
+  const body = h("div", "streams");
+  const carrier = h("span", "card-note");
+  const head = h("div", "card-head", {}, h("h2", "", {}, "Streams"), carrier);
+  return {
+    element: h("section", "card", { "aria-label": "Streams" }, head, empty, body),
+    update() {
+      const streams = [...app.room.videos.values(), ...app.room.sounds.values()];
+      setHidden(empty, streams.length > 0);
+      setText(carrier, [...new Set(streams.map((stream) => stream.info.carrier))].join(", "));
+      keepRows(rows, body, new Set(streams.map((stream) => stream.info.stream)));
+      for (const stream of streams) {
+        const row = rows.get(stream.info.stream) ?? addRow(rows, body, stream.info.stream);
+        row.show(stream, app.state.settings.tolerance[stream.info.kind === "audio" ? "audio" : "video"]);
+      }
+    },
+  };
+}
+
+function keepRows(rows: Map<string, Row>, body: HTMLElement, names: ReadonlySet<string>): void {
+  for (const [name, row] of rows) {
+    if (names.has(name)) continue;
+    body.removeChild(row.element);
+    rows.delete(name);
+  }
+}
+
+function addRow(rows: Map<string, Row>, body: HTMLElement, name: string): Row {
+  const row = createRow();
+  rows.set(name, row);
+  body.append(row.element);
+  return row;
+}
+
+function createRow(): Row {
+  const label = h("span", "stream-label");
+  const codec = h("span", "stream-codec");
+  const gap = h("span", "stream-gap");
+  const bar = h("span", "gap-bar", { "aria-hidden": "true" }, h("span", "gap-fill"));
+  const counts = h("span", "stream-counts");
+  const element = h("div", "stream", {}, label, codec, bar, gap, counts);
+  return {
+    element,
+    show(stream, tolerance) {
+      const { counts: found } = stream.gate;
+      const discarded = "discarded" in stream ? stream.discarded() : found.discarded;
+      const size = Math.abs(found.gap ?? 0);
+      setText(label, stream.info.label);
+      setText(codec, stream.info.codec);
+      setText(gap, found.gap === null ? "–" : `${found.gap} of ${tolerance}`);
+      bar.style.setProperty(
+        "--share",
+        (tolerance === 0 ? Number(size > 0) : Math.min(1, size / tolerance)).toFixed(2),
+      );
+      setData(bar, "tone", size > tolerance ? "bad" : size > tolerance / 2 ? "wait" : "good");
+      setText(
+        counts,
+        `${grouped(found.rendered)} shown · ${grouped(discarded)} discarded · ${grouped(found.held)} held`,
+      );
+    },
+  };
+}

@@ -1,0 +1,108 @@
+import type { ConsoleApp } from "../console_app";
+import { robotIsUp } from "../core/console_state";
+import { stalenessOf } from "../statistics";
+import type { StreamInfo } from "../wire";
+import { h, setData, setHidden, setText } from "./dom";
+import type { SceneView } from "./scene_view";
+
+interface View {
+  readonly name: string;
+  readonly element: HTMLElement;
+  readonly caption: HTMLElement;
+  readonly detail: HTMLElement;
+  readonly veil: HTMLElement;
+  readonly veilWords: HTMLElement;
+  readonly swap: HTMLButtonElement;
+  readonly canvas: HTMLCanvasElement | null; // null: the scene
+}
+
+const SCENE = "3D scene";
+
+/** One view large, the others small; a click on a small one swaps it in. */
+export class ViewBoard {
+  readonly element = h("main", "views", { "aria-label": "Views" });
+  private readonly views = new Map<string, View>();
+  private main: string | null = null;
+
+  constructor(private readonly scene: SceneView) {
+    this.addView(SCENE, "3D scene", null, scene.element);
+  }
+
+  /** The canvas of a stream; the same one again after a reconnect. */
+  canvas(info: StreamInfo): HTMLCanvasElement {
+    const known = this.views.get(info.stream)?.canvas;
+    if (known) return known;
+    const canvas = h("canvas", "picture", { "data-stream": info.stream, width: "640", height: "480" });
+    this.addView(info.stream, info.label, canvas, canvas);
+    if (this.main === null) this.swapIn(info.stream);
+    return canvas;
+  }
+
+  /** The camera in the large view, or the first one while the scene is large. */
+  mainStream(): string | null {
+    if (this.main !== null && this.main !== SCENE) return this.main;
+    return [...this.views.keys()].find((name) => name !== SCENE) ?? null;
+  }
+
+  update(app: ConsoleApp, now: number): void {
+    this.element.classList.toggle("is-locked", app.isArmed());
+    for (const view of this.views.values()) if (view.canvas !== null) showVeil(app, view, now);
+  }
+
+  private addView(name: string, label: string, canvas: HTMLCanvasElement | null, content: HTMLElement): void {
+    const caption = h("span", "view-label", {}, label);
+    const detail = h("span", "view-detail");
+    const veilWords = h("strong", "veil-words");
+    const about = h("span", "veil-about", {}, "This picture does not show the robot's present state");
+    const veil = h("div", "veil", {}, h("div", "veil-plate", {}, veilWords, about));
+    const swap = h("button", "view-swap", { type: "button", "aria-label": `Show ${label} large` });
+    swap.addEventListener("click", () => this.swapIn(name));
+    const bar = h("figcaption", "view-caption", {}, caption, detail);
+    const element = h("figure", "view", { "data-view": name }, content, veil, bar, swap);
+    setHidden(veil, true);
+    this.views.set(name, { name, element, caption, detail, veil, veilWords, swap, canvas });
+    this.element.append(element);
+    this.arrange();
+  }
+
+  private swapIn(name: string): void {
+    this.main = name;
+    if (name === SCENE) this.scene.load();
+    this.arrange();
+  }
+
+  private arrange(): void {
+    let place = 1;
+    for (const view of this.views.values()) {
+      const isMain = view.name === this.main;
+      setData(view.element, "place", isMain ? "main" : "small");
+      view.element.style.order = String(isMain ? 0 : view.name === SCENE ? 99 : place);
+      view.element.style.setProperty(
+        "--slot",
+        String(isMain ? 0 : view.name === SCENE ? this.views.size - 2 : place - 1),
+      );
+      if (!isMain && view.name !== SCENE) place += 1;
+      setHidden(view.swap, isMain);
+    }
+    this.element.style.setProperty("--small", String(this.views.size - 1));
+  }
+}
+
+function showVeil(app: ConsoleApp, view: View, now: number): void {
+  const video = app.room.videos.get(view.name);
+  const words = veilWords(app, view, now);
+  setHidden(view.veil, words === null);
+  view.element.classList.toggle("is-stale", words !== null);
+  if (words !== null) setText(view.veilWords, words);
+  const gap = video?.gate.counts.gap ?? null;
+  const tolerance = app.state.settings.tolerance.video;
+  setText(view.detail, gap === null ? "" : `gap ${gap} of ${tolerance}`);
+  setData(view.element, "gap", gap !== null && Math.abs(gap) > tolerance ? "bad" : "good");
+}
+
+function veilWords(app: ConsoleApp, view: View, now: number): string | null {
+  const video = app.room.videos.get(view.name);
+  if (video === undefined) return "Not connected";
+  if (!robotIsUp(app.state) && app.state.robot !== null) return "Robot unreachable";
+  return stalenessOf(app, video, now);
+}

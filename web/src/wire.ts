@@ -1,0 +1,292 @@
+// Generated from docs/schemas/console.schema.json by `npm run generate`. Do not edit.
+
+/** One value of a command, in physical units. */
+export interface Axis {
+  readonly name: string;
+  readonly label: string;
+  readonly unit: string;
+  readonly minimum: number;
+  readonly maximum: number;
+  readonly slew: number;
+  readonly brake: number;
+  readonly rest: number;
+}
+
+/** What moves an axis. A positive input drives the axis up to `scale * maximum`, after `invert`. */
+export interface Binding {
+  readonly axis: string;
+  readonly pad: "dpad_x" | "dpad_y" | "left_x" | "left_y" | "right_x" | "right_y" | "triggers" | null;
+  readonly touch: "left_x" | "left_y" | "right_x" | "right_y" | null;
+  readonly invert_pad: boolean;
+  readonly invert_touch: boolean;
+  readonly key_positive: string;
+  readonly key_negative: string;
+  readonly scale: number;
+}
+
+/** A rigid body of the kinematic tree. Its joints act in list order, in the body's own frame, after `position` and `orientation`. */
+export interface Body {
+  readonly name: string;
+  readonly parent: string;
+  readonly position: readonly [number, number, number];
+  readonly orientation: readonly [number, number, number, number];
+  readonly joints: readonly (BodyJoint)[];
+  readonly geoms: readonly (Geom)[];
+}
+
+/** How a body moves against its parent: the named entry of `RobotDescription.joints` about or along `axis`. */
+export interface BodyJoint {
+  readonly joint: string;
+  readonly kind: "prismatic" | "revolute";
+  readonly axis: readonly [number, number, number];
+}
+
+export interface Camera {
+  readonly name: string;
+  readonly label: string;
+  readonly width: number;
+  readonly height: number;
+  readonly frame_rate: number;
+}
+
+export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatRelease | Rename | Stop | Reset;
+
+/** Event `event`, valid only as the answer to issue `issue` of feedback `event - 1`. */
+export interface Command {
+  readonly type: "command";
+  readonly event: number;
+  readonly issue: number;
+  readonly values: readonly (number)[];
+}
+
+/** A set of bindings that are active together; the operator switches between layers. */
+export interface ControlLayer {
+  readonly name: string;
+  readonly label: string;
+  readonly bindings: readonly (Binding)[];
+}
+
+/** Measured state after command `event`. A later `issue` of the same event is the same event measured again. */
+export interface Feedback {
+  readonly type: "feedback";
+  readonly event: number;
+  readonly issue: number;
+  readonly time: number;
+  readonly axes: readonly (number)[];
+  readonly joints: readonly (number)[];
+  readonly wrench: readonly (number)[];
+  readonly ranges: readonly (number)[];
+  readonly at_rest: boolean;
+  readonly stop: StopState;
+  readonly faults: readonly (string)[];
+}
+
+/** A shape for the 3D view. `size`: box: half extents; sphere: (radius, 0, 0); cylinder and capsule: (radius, half length, 0). */
+export interface Geom {
+  readonly shape: "box" | "capsule" | "cylinder" | "sphere";
+  readonly size: readonly [number, number, number];
+  readonly position: readonly [number, number, number];
+  readonly orientation: readonly [number, number, number, number];
+  readonly rgba: readonly [number, number, number, number];
+}
+
+/** One measured joint position, in the order of `Feedback.joints`. */
+export interface Joint {
+  readonly name: string;
+  readonly unit: "m" | "rad";
+  readonly minimum: number | null;
+  readonly maximum: number | null;
+}
+
+export interface Microphone {
+  readonly name: string;
+  readonly label: string;
+  readonly sample_rate: number;
+  readonly channels: number;
+}
+
+/** Something a person should read. */
+export interface Notice {
+  readonly type: "notice";
+  readonly level: "error" | "info" | "warning";
+  readonly text: string;
+}
+
+export interface Participant {
+  readonly peer: string;
+  readonly name: string;
+  readonly role: "observer" | "operator";
+  readonly carrier: "capture-time" | "native" | "none" | "trailer";
+  readonly gap: number;
+  readonly picture_delay_ms: number | null;
+}
+
+export interface Participants {
+  readonly type: "participants";
+  readonly participants: readonly (Participant)[];
+}
+
+/** Heartbeat; answered at once by a pong with the same id. */
+export interface Ping {
+  readonly type: "ping";
+  readonly id: number;
+}
+
+export interface Pong {
+  readonly type: "pong";
+  readonly id: number;
+}
+
+/** Range sensors in a plane, with the field names of sensor_msgs/LaserScan. */
+export interface RangeRing {
+  readonly name: string;
+  readonly body: string;
+  readonly count: number;
+  readonly angle_min: number;
+  readonly angle_increment: number;
+  readonly range_min: number;
+  readonly range_max: number;
+}
+
+/** Why a command was not executed, and which event is current. */
+export interface Refusal {
+  readonly type: "refusal";
+  readonly event: number;
+  readonly reason: "late" | "link_down" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "out_of_order" | "rested" | "seat_taken" | "stopped" | "wrong_size";
+  readonly current: number;
+  readonly detail: string;
+}
+
+/** The name that others see. */
+export interface Rename {
+  readonly type: "rename";
+  readonly name: string;
+}
+
+/** A client's statistics, a few times a second; also its heartbeat for the control seat. */
+export interface Report {
+  readonly type: "report";
+  readonly event?: number;
+  readonly armed?: boolean;
+  readonly streams?: readonly (StreamReport)[];
+  readonly picture_delay_ms?: number | null;
+  readonly round_trip_ms?: number | null;
+}
+
+/** Release the latched stop. Moves nothing. */
+export interface Reset {
+  readonly type: "reset";
+  readonly by?: string;
+}
+
+/** Bring the axes to rest unless an event newer than `event` was executed; voids moving commands up to `event`. */
+export interface Rest {
+  readonly type: "rest";
+  readonly event: number;
+}
+
+export interface RobotDescription {
+  readonly name: string;
+  readonly label: string;
+  readonly axes: readonly (Axis)[];
+  readonly joints: readonly (Joint)[];
+  readonly layers: readonly (ControlLayer)[];
+  readonly cameras: readonly (Camera)[];
+  readonly microphones: readonly (Microphone)[];
+  readonly wrench: WrenchSensor | null;
+  readonly ranges: RangeRing | null;
+  readonly bodies: readonly (Body)[];
+  readonly hold: number;
+  readonly max_event_age: number;
+  readonly max_event_rate: number;
+}
+
+/** State of the robot link. A new epoch always comes with a new connection: the server closes the old one. */
+export interface RobotState {
+  readonly type: "robot";
+  readonly link: "down" | "up";
+  readonly epoch: string;
+  readonly description: RobotDescription;
+  readonly detail: string;
+}
+
+/** Who may drive. `holder` is a peer id, empty when the seat is free. */
+export interface Seat {
+  readonly type: "seat";
+  readonly holder: string;
+  readonly name: string;
+  readonly why: string;
+}
+
+/** Give the control seat back. */
+export interface SeatRelease {
+  readonly type: "seat_release";
+}
+
+/** Ask for the control seat; answered by `seat` to all, or by a refusal. */
+export interface SeatRequest {
+  readonly type: "seat_request";
+}
+
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Notice | StopStateNotice;
+
+/** Latch the stop. */
+export interface Stop {
+  readonly type: "stop";
+  readonly by?: string;
+  readonly reason?: string;
+}
+
+/** The latched stop. `by` and `reason` are empty unless stopped. */
+export interface StopState {
+  readonly stopped: boolean;
+  readonly by: string;
+  readonly reason: string;
+}
+
+/** The robot's stop state, as the bridge reports it; sent on every change and to newcomers. */
+export interface StopStateNotice {
+  readonly type: "stop_state";
+  readonly stop: StopState;
+  readonly event: number;
+}
+
+/** One negotiated medium. */
+export interface StreamInfo {
+  readonly mid: string;
+  readonly stream: string;
+  readonly label: string;
+  readonly kind: "audio" | "video";
+  readonly codec: string;
+  readonly carrier: "capture-time" | "native" | "none" | "trailer";
+}
+
+/** How one stream does at a client, since it connected. */
+export interface StreamReport {
+  readonly stream: string;
+  readonly carrier: "capture-time" | "native" | "none" | "trailer";
+  readonly stamp?: number;
+  readonly gap?: number;
+  readonly max_gap?: number;
+  readonly rendered?: number;
+  readonly discarded?: number;
+  readonly held?: number;
+}
+
+/** First message on `session`. */
+export interface Welcome {
+  readonly type: "welcome";
+  readonly peer: string;
+  readonly role: "observer" | "operator";
+  readonly name: string;
+  readonly streams: readonly (StreamInfo)[];
+}
+
+/** A force and torque sensor; `full_scale_force` is the force that is felt and drawn as "all there is". */
+export interface WrenchSensor {
+  readonly name: string;
+  readonly body: string;
+  readonly threshold_force: number;
+  readonly full_scale_force: number;
+  readonly full_scale_torque: number;
+}
