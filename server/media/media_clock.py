@@ -34,12 +34,18 @@ class SoundClock:
     def place(self, link_time: float, samples: int) -> tuple[int, bool]:
         """Index of the first of `samples` captured from `link_time` on, and whether it continues the last sound.
 
-        The bridge's clock jitters against its sound card; up to 40 ms of difference count as continuous.
+        The bridge's clock jitters against its sound card; up to 40 ms of difference count as continuous. A card that
+        is slower skips 40 ms then; one that is faster moves the time line.
         """
         if self._origin is None:
             self._origin = link_time
         expected = round((link_time - self._origin) * self._rate)
-        continuous = abs(expected - self._next) <= MAX_SOUND_DRIFT_SECONDS * self._rate
-        start = self._next if continuous else max(self._next, expected)
-        self._next = start + samples
+        limit = MAX_SOUND_DRIFT_SECONDS * self._rate
+        continuous = expected - self._next <= limit
+        if not continuous:
+            self._next = expected
+        elif self._next - expected > limit:  # the sound card is faster than the bridge's clock
+            self._origin = link_time - self._next / self._rate
+        start = self._next
+        self._next += samples
         return start, continuous

@@ -1,0 +1,109 @@
+import asyncio
+from contextlib import suppress
+
+from server.media.fanout import FanOut
+from server.media.frame import EncodedFrame
+from tests.server.media.test_outbox import frame
+
+
+class FakeTarget:
+    """Sends one queued frame per call; `cost` seconds of the fake clock each."""
+
+    def __init__(self, log: list[str], name: str, clock: "FakeClock", *, priority: bool = False, cost: float = 0.0):
+        self.name = name
+        self.priority = priority
+        self.blocked = False
+        self.frames: list[EncodedFrame] = []
+        self._log = log
+        self._clock = clock
+        self._cost = cost
+
+    def put(self, frame: EncodedFrame) -> None:
+        self.frames = [*self.frames, frame][-3:]
+
+    def send_next(self) -> bool:
+        if self.blocked or not self.frames:
+            return False
+        sent = self.frames.pop(0)
+        self._clock.now += self._cost
+        self._log.append(f"{self.name}{sent.stamp}")
+        return bool(self.frames)
+
+
+class FakeClock:
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+async def test_the_operator_is_served_within_publish_and_before_observers() -> None:
+    log: list[str] = []
+    clock = FakeClock()
+    observers = [FakeTarget(log, f"observer{i}:", clock) for i in range(3)]
+    operator = FakeTarget(log, "operator:", clock, priority=True)
+    fan_out = FanOut(0.001, clock)
+    fan_out.publish(frame(1), [*observers, operator])
+    assert log == ["operator:1"]
+    fan_out.serve()
+    assert log == ["operator:1", "observer0:1", "observer1:1", "observer2:1"]
+
+
+async def test_a_slice_is_bounded_and_the_next_one_goes_on_where_it_ended() -> None:
+    log: list[str] = []
+    clock = FakeClock()
+    observers = [FakeTarget(log, f"{i}:", clock, cost=0.0004) for i in range(7)]
+    fan_out = FanOut(0.001, clock)
+    fan_out.publish(frame(1), observers)
+    fan_out.serve()
+    assert log == ["0:1", "1:1", "2:1"]
+    fan_out.serve()
+    assert log[3:] == ["3:1", "4:1", "5:1"]
+
+
+async def test_a_blocked_observer_delays_nobody_and_is_tried_again_with_the_next_frame() -> None:
+    log: list[str] = []
+    clock = FakeClock()
+    slow, quick = FakeTarget(log, "slow:", clock), FakeTarget(log, "quick:", clock)
+    operator = FakeTarget(log, "operator:", clock, priority=True)
+    slow.blocked = True
+    fan_out = FanOut(0.001, clock)
+    for i in range(1, 4):
+        fan_out.publish(frame(i), [slow, quick, operator])
+        fan_out.serve()
+    assert log == ["operator:1", "quick:1", "operator:2", "quick:2", "operator:3", "quick:3"]
+    slow.blocked = False
+    fan_out.publish(frame(4), [slow])
+    fan_out.serve()
+    assert log[6:] == ["slow:2", "slow:3", "slow:4"]
+
+
+async def test_a_forgotten_target_gets_nothing_more() -> None:
+    log: list[str] = []
+    clock = FakeClock()
+    target = FakeTarget(log, "gone:", clock)
+    fan_out = FanOut(0.001, clock)
+    fan_out.publish(frame(1), [target])
+    fan_out.forget(target)
+    fan_out.forget(target)
+    fan_out.serve()
+    assert log == []
+
+
+async def test_the_loop_gets_a_turn_between_slices() -> None:
+    """With 100 observers of 0.5 ms each, work that becomes ready meanwhile waits for one slice at most."""
+    log: list[str] = []
+    clock = FakeClock()
+    observers = [FakeTarget(log, f"{i}:", clock, cost=0.0005) for i in range(100)]
+    fan_out = FanOut(0.001, clock)
+    task = asyncio.create_task(fan_out.run())
+    fan_out.publish(frame(1), observers)
+    turns = []
+    while len(log) < 100:
+        before = len(log)
+        await asyncio.sleep(0)  # one turn of the loop
+        turns.append(len(log) - before)
+    assert max(turns) <= 2
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task

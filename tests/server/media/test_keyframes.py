@@ -1,0 +1,63 @@
+from server.media.keyframes import JOIN_BURST, KeyframeScheduler
+
+FPS = 30
+
+
+def taken(scheduler: KeyframeScheduler, start: float, pictures: int) -> list[int]:
+    """Which of the next pictures are keyframes."""
+    return [i for i in range(pictures) if scheduler.take(start + i / FPS)]
+
+
+def test_the_first_picture_is_a_keyframe() -> None:
+    assert taken(KeyframeScheduler(10, 0.3), 5.0, 3) == [0]
+
+
+def test_a_keyframe_comes_after_the_interval_without_being_asked_for() -> None:
+    assert taken(KeyframeScheduler(1.0, 0.3), 0.0, 65) == [0, 30, 60]
+
+
+def test_a_joining_peer_is_served_with_the_next_picture() -> None:
+    scheduler = KeyframeScheduler(10, 0.3)
+    scheduler.take(0.0)
+    scheduler.join()
+    assert scheduler.take(0.01)
+    assert not scheduler.take(0.02)
+
+
+def test_requests_within_the_spacing_are_merged_into_one_later_keyframe() -> None:
+    scheduler = KeyframeScheduler(10, 0.3)
+    scheduler.take(0.0)
+    for _ in range(100):
+        scheduler.request()
+    assert taken(scheduler, 1 / FPS, 20) == [8]
+
+
+def test_a_storm_of_joins_is_served_at_once_for_a_burst_and_then_spaced() -> None:
+    scheduler = KeyframeScheduler(100, 0.3)
+    scheduler.take(0.0)
+    served = 0
+    for i in range(90):  # 3 s in which somebody joins before every picture
+        scheduler.join()
+        served += scheduler.take((i + 1) / FPS)
+    assert JOIN_BURST < served <= JOIN_BURST + 3 / 0.3 + 10
+    scheduler.join()
+    assert any(scheduler.take(3 + i / FPS) for i in range(10))  # nobody is forgotten
+
+
+def test_a_lone_join_after_a_storm_is_served_at_once_again() -> None:
+    scheduler = KeyframeScheduler(100, 0.3)
+    for i in range(60):
+        scheduler.join()
+        scheduler.take(i / FPS)
+    scheduler.request()
+    assert scheduler.take(8.0)
+    scheduler.join()
+    assert scheduler.take(8.01)
+
+
+def test_without_spacing_every_request_is_served() -> None:
+    scheduler = KeyframeScheduler(100, 0.0)
+    scheduler.take(0.0)
+    for i in range(5):
+        scheduler.request()
+        assert scheduler.take(i / FPS)
