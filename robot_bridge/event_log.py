@@ -6,6 +6,8 @@ Lines are written by a thread of its own from a bounded queue, never on the loop
 import logging
 import queue
 import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -48,16 +50,25 @@ class EventLog:
         if self._writer.is_alive():
             self._waiting.put(None)
             self._writer.join()
-        self._file.close()
 
     def _write(self) -> None:
-        encode = msgspec.json.encode
-        try:
-            while (line := self._waiting.get()) is not None:
-                self._file.write(encode(line) + b"\n")
-                if self._waiting.empty():
-                    self._file.flush()
-        except OSError as error:
-            _logger.error("event log stopped: %s", error)
-            while self._waiting.get() is not None:
+        works = True
+        while (line := self._waiting.get()) is not None:
+            if works:
+                works = self._try(partial(self._append, line))
+            else:
                 self.dropped += 1
+        self._try(self._file.close)
+
+    def _append(self, line: dict[str, Field]) -> None:
+        self._file.write(msgspec.json.encode(line) + b"\n")
+        if self._waiting.empty():
+            self._file.flush()
+
+    def _try(self, work: Callable[[], None]) -> bool:
+        try:
+            work()
+        except OSError as error:
+            _logger.error("the event log is cut off here: %s", error)
+            return False
+        return True

@@ -1,0 +1,194 @@
+"""A bridge on a free port, robots that remember, and an operator that answers feedback, for tests over real TCP."""
+
+import asyncio
+import contextlib
+import json
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import TypeVar
+
+from robot_bridge.bridge import Bridge
+from robot_bridge.link_client import RobotLink
+from robot_bridge.protocol.framing import FrameReader, frame
+from robot_bridge.protocol.messages import (
+    Command,
+    Feedback,
+    Hello,
+    LinkMessage,
+    LinkRole,
+    Refusal,
+    decode_message,
+    encode_message,
+)
+from robot_bridge.protocol.serial import FIRST_EVENT, event_after
+from robot_bridge.robots.base import MediaSource
+from robot_bridge.robots.planar.robot import PlanarRobot
+from robot_bridge.settings import BridgeSettings
+
+__all__ = [
+    "DRIVE",
+    "NEUTRAL",
+    "Operator",
+    "RawLink",
+    "RecordingRobot",
+    "log_lines",
+    "operator",
+    "raw_link",
+    "running_bridge",
+]
+
+Kind = TypeVar("Kind", bound=LinkMessage)
+
+PATIENCE = 5.0  # s
+DRIVE = [0.4, 0.0, 0.0]
+NEUTRAL = [0.0, 0.0, 0.0]
+
+
+class RecordingRobot(PlanarRobot):
+    """Remembers what was applied when, and what was called."""
+
+    def __init__(self, *, media: bool = False) -> None:
+        super().__init__()
+        self.applied: list[tuple[float, list[float]]] = []
+        self.calls: list[str] = []
+        self._media = media
+        self._ticked = asyncio.Event()
+
+    async def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait until the condition holds after a tick."""
+        try:
+            async with asyncio.timeout(PATIENCE):
+                while not condition():
+                    self._ticked.clear()
+                    await self._ticked.wait()
+        except TimeoutError:
+            raise AssertionError(f"never happened: {what}") from None
+
+    def apply(self, values: Sequence[float]) -> None:
+        self.applied.append((time.monotonic(), list(values)))
+        super().apply(values)
+        self._ticked.set()
+
+    def stop(self) -> None:
+        self.calls.append("stop")
+
+    def reset(self) -> None:
+        self.calls.append("reset")
+
+    def close(self) -> None:
+        self.calls.append("close")
+
+    def sources(self) -> Sequence[MediaSource]:
+        return super().sources() if self._media else ()
+
+
+@asynccontextmanager
+async def running_bridge(
+    robot: PlanarRobot | None = None, *, event_log: Path | None = None, first_event: int = FIRST_EVENT
+) -> AsyncIterator[Bridge]:
+    """Runs a bridge; afterwards no connection and no task of it may be left."""
+    settings = BridgeSettings(port=0, event_log=event_log, first_event=first_event)
+    async with Bridge(robot or RecordingRobot(), settings) as bridge:
+        yield bridge
+    assert bridge.links == 0
+    others = {task for task in asyncio.all_tasks() if task is not asyncio.current_task()}
+    assert not others, f"left behind: {others}"
+
+
+def log_lines(path: Path, kind: str) -> list[dict[str, object]]:
+    """The event log's lines of one kind; read it after the bridge has closed."""
+    lines: list[dict[str, object]] = [json.loads(line) for line in path.read_text().splitlines()]
+    return [line for line in lines if line["kind"] == kind]
+
+
+class Operator:
+    """An operator link and the newest feedback."""
+
+    def __init__(self, link: RobotLink) -> None:
+        self.link = link
+        self.feedback = Feedback(event=1, issue=1, time=0.0, axes=[])
+
+    async def next(self, kind: type[Kind]) -> Kind:
+        async with asyncio.timeout(PATIENCE):
+            async for message in self.link:
+                if isinstance(message, Feedback):
+                    self.feedback = message
+                if isinstance(message, kind):
+                    return message
+        raise AssertionError("the link was closed")
+
+    def command(self, values: list[float] = DRIVE) -> Command:
+        return Command(event=event_after(self.feedback.event), issue=self.feedback.issue, values=values)
+
+    async def drive(self, values: list[float] = DRIVE) -> Feedback:
+        """Send the next command and wait for its feedback."""
+        command = self.command(values)
+        self.link.send(command)
+        while self.feedback.event != command.event:
+            await self.next(Feedback)
+        return self.feedback
+
+    async def heard(self, condition: Callable[[Feedback], bool]) -> None:
+        """Wait until the newest feedback meets the condition."""
+        while not condition(self.feedback):
+            await self.next(Feedback)
+
+    async def refused(self, message: LinkMessage) -> Refusal:
+        self.link.send(message)
+        return await self.next(Refusal)
+
+
+@asynccontextmanager
+async def operator(bridge: Bridge) -> AsyncIterator[Operator]:
+    async with RobotLink(*bridge.address, "operator", name="test") as link:
+        driver = Operator(link)
+        await driver.next(Feedback)
+        yield driver
+
+
+class RawLink:
+    """A TCP connection that speaks only when told to."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader = reader
+        self.writer = writer
+        self._frames = FrameReader(16 << 20)
+        self._waiting: list[LinkMessage] = []
+
+    def send(self, *messages: LinkMessage) -> None:
+        self.writer.write(b"".join(frame(encode_message(message)) for message in messages))
+
+    async def next(self) -> LinkMessage | None:
+        """The next message; None at the end of the stream."""
+        async with asyncio.timeout(PATIENCE):
+            while not self._waiting:
+                data = await self._reader.read(65536)
+                if not data:
+                    return None
+                self._frames.feed(data)
+                self._waiting += [decode_message(payload) for payload in self._frames.frames()]
+        return self._waiting.pop(0)
+
+    async def find(self, kind: type[Kind]) -> Kind:
+        while (message := await self.next()) is not None:
+            if isinstance(message, kind):
+                return message
+        raise AssertionError(f"the stream ended before any {kind.__name__}")
+
+
+@asynccontextmanager
+async def raw_link(bridge: Bridge, role: LinkRole | None = None) -> AsyncIterator[RawLink]:
+    """A raw connection, with the handshake done when a role is given."""
+    reader, writer = await asyncio.open_connection(*bridge.address)
+    link = RawLink(reader, writer)
+    try:
+        if role is not None:
+            link.send(Hello(role=role))
+            await link.find(Hello)
+        yield link
+    finally:
+        writer.close()
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()

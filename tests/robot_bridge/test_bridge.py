@@ -1,0 +1,422 @@
+"""The whole bridge over real TCP."""
+
+import asyncio
+import signal
+import socket
+import sys
+from pathlib import Path
+
+import pytest
+
+from robot_bridge.bridge import Bridge
+from robot_bridge.errors import DescriptionError, ListenError, RobotFailed
+from robot_bridge.link_client import RobotLink
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.errors import LinkLost, LinkRefused
+from robot_bridge.protocol.framing import frame
+from robot_bridge.protocol.messages import (
+    EventNotice,
+    Feedback,
+    Goodbye,
+    Hello,
+    Media,
+    Ping,
+    Refusal,
+    Reset,
+    Rest,
+    Stop,
+    encode_message,
+)
+from robot_bridge.protocol.serial import MAX_EVENT
+from robot_bridge.robots.base import Measurement, MediaSource
+from robot_bridge.settings import BridgeSettings
+from tests.robot_bridge.bridge_helpers import (
+    DRIVE,
+    NEUTRAL,
+    RecordingRobot,
+    log_lines,
+    operator,
+    raw_link,
+    running_bridge,
+)
+
+
+def speed(robot: RecordingRobot) -> float:
+    return abs(robot.state.vx)
+
+
+async def test_commands_move_the_robot_and_each_feedback_belongs_to_its_command() -> None:
+    robot = RecordingRobot()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        assert driver.feedback.event == 1
+        events = [(await driver.drive()).event for _ in range(30)]
+        assert events == list(range(2, 32))
+        assert driver.feedback.joints[0] > 0.0
+        assert driver.feedback.axes[0] > 0.1
+        assert bridge.counters.executed == 30
+    assert robot.calls == ["close"]
+
+
+async def test_events_go_on_over_the_wrap() -> None:
+    async with running_bridge(first_event=MAX_EVENT - 1) as bridge, operator(bridge) as driver:
+        assert [(await driver.drive()).event for _ in range(4)] == [MAX_EVENT, 1, 2, 3]
+
+
+async def test_a_second_operator_is_told_that_the_place_is_taken_until_the_first_leaves() -> None:
+    async with running_bridge() as bridge:
+        async with operator(bridge) as driver:
+            with pytest.raises(LinkRefused, match="taken"):
+                await RobotLink(*bridge.address, "operator").connect()
+            await driver.drive()
+        async with operator(bridge) as successor:
+            assert (await successor.drive()).event == 3
+
+
+async def test_a_silent_operator_is_dropped_and_makes_room_for_another() -> None:
+    async with running_bridge() as bridge, raw_link(bridge, "operator") as silent:
+        goodbye = await silent.find(Goodbye)
+        assert goodbye.error == "silent"
+        async with operator(bridge) as driver:
+            await driver.drive()
+        assert bridge.counters.endings["silent"] == 1
+
+
+async def test_without_commands_the_robot_is_at_rest_within_hold_while_the_link_lives(tmp_path: Path) -> None:
+    robot, log = RecordingRobot(), tmp_path / "events.jsonl"
+    async with running_bridge(robot, event_log=log) as bridge, operator(bridge) as driver:
+        for _ in range(30):
+            await driver.drive()
+        assert speed(robot) > 0.1
+        await robot.until(lambda: robot.applied[-1][1] == NEUTRAL, "at rest")
+        hold = bridge.description.hold
+    executed = log_lines(log, "executed")[-1]["time"]
+    assert isinstance(executed, float)
+    assert all(values == NEUTRAL for when, values in robot.applied if when >= executed + hold + 0.01)
+    assert any(values != NEUTRAL for when, values in robot.applied if when >= executed)
+
+
+DRIVE_FOREVER = """
+import asyncio, sys
+from robot_bridge.link_client import RobotLink
+from robot_bridge.protocol.messages import Command, Feedback
+
+async def main():
+    async with RobotLink("127.0.0.1", int(sys.argv[1]), "operator") as link:
+        async for message in link:
+            if isinstance(message, Feedback):
+                link.send(Command(event=message.event + 1, issue=message.issue, values=[0.4, 0.0, 0.0]))
+
+asyncio.run(main())
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+async def test_a_client_process_that_dies_leaves_the_robot_at_rest_within_hold(
+    how: signal.Signals, tmp_path: Path
+) -> None:
+    robot, log = RecordingRobot(), tmp_path / "events.jsonl"
+    async with running_bridge(robot, event_log=log) as bridge:
+        port = str(bridge.address[1])
+        client = await asyncio.create_subprocess_exec(sys.executable, "-c", DRIVE_FOREVER, port)
+        try:
+            await robot.until(lambda: speed(robot) > 0.3, "the client drives")
+            client.send_signal(how)
+            await robot.until(lambda: robot.applied[-1][1] == NEUTRAL, "at rest")
+            await robot.until(lambda: bridge.links == 0, "the link is dropped")
+            rested = len(robot.applied)
+            await robot.until(lambda: len(robot.applied) > rested + 20, "more ticks")
+            assert all(values == NEUTRAL for _, values in robot.applied[rested:])
+        finally:
+            if client.returncode is None:
+                client.kill()
+            await client.wait()
+        hold = bridge.description.hold
+    executed = log_lines(log, "executed")[-1]["time"]
+    assert isinstance(executed, float)
+    assert all(values == NEUTRAL for when, values in robot.applied if when >= executed + hold + 0.01)
+
+
+async def test_rest_brings_the_axes_to_rest_and_voids_the_command_in_flight() -> None:
+    robot = RecordingRobot()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        for _ in range(20):
+            await driver.drive()
+        command = driver.command()
+        driver.link.send(Rest(event=command.event))
+        refusal = await driver.refused(command)
+        assert refusal.reason == "rested"
+        await robot.until(lambda: robot.applied[-1][1] == NEUTRAL, "at rest")
+        await driver.drive(NEUTRAL)
+        await driver.drive()
+        assert speed(robot) > 0
+
+
+async def test_stop_latches_and_reset_moves_nothing() -> None:
+    robot = RecordingRobot()
+    async with (
+        running_bridge(robot) as bridge,
+        operator(bridge) as driver,
+        RobotLink(*bridge.address, "events") as watcher,
+    ):
+        for _ in range(10):
+            await driver.drive()
+        watcher.send(Stop(by="Ada", reason="smoke"))
+        await driver.heard(lambda feedback: feedback.stop.stopped)
+        assert (driver.feedback.stop.by, driver.feedback.stop.reason) == ("Ada", "smoke")
+        assert (await driver.refused(driver.command())).reason == "stopped"
+        await robot.until(lambda: robot.applied[-1][1] == NEUTRAL, "at rest")
+        driver.link.send(Reset(by="Ada"))
+        await driver.heard(lambda feedback: not feedback.stop.stopped)
+        assert robot.applied[-1][1] == NEUTRAL
+        await driver.drive()
+    assert robot.calls == ["stop", "reset", "close"]
+
+
+async def test_a_repeat_of_the_current_event_gets_its_feedback_again_and_executes_nothing() -> None:
+    async with running_bridge() as bridge, operator(bridge) as driver:
+        command = driver.command()
+        first = await driver.drive()
+        driver.link.send(command)
+        assert await driver.next(Feedback) == first
+        assert bridge.counters.executed == 1
+
+
+async def test_an_idle_bridge_issues_the_same_event_again_and_tells_event_links() -> None:
+    async with (
+        running_bridge() as bridge,
+        operator(bridge) as driver,
+        RobotLink(*bridge.address, "events") as watcher,
+    ):
+        before = driver.feedback
+        await driver.heard(lambda feedback: feedback.issue >= before.issue + 3)
+        assert driver.feedback.event == 1
+        notice = await anext(watcher)
+        assert isinstance(notice, EventNotice)
+        assert notice.event == 1
+        with pytest.raises(LinkLost, match="description"):
+            watcher_description(watcher)
+
+
+def watcher_description(link: RobotLink) -> RobotDescription:
+    if link.hello.description is None:
+        raise LinkLost("no description")
+    return link.hello.description
+
+
+async def test_media_are_stamped_with_the_event_that_held(tmp_path: Path) -> None:
+    log = tmp_path / "events.jsonl"
+    received: dict[str, Media] = {}
+    async with (
+        running_bridge(RecordingRobot(media=True), event_log=log) as bridge,
+        operator(bridge) as driver,
+        RobotLink(*bridge.address, "media") as watcher,
+    ):
+        async with asyncio.timeout(5):
+            async for medium in watcher:
+                assert isinstance(medium, Media)
+                await driver.drive()
+                assert medium.stamp <= bridge.event
+                received[medium.stream] = medium
+                if len(received) == 3 and bridge.event > 20:
+                    break
+    captured = {(line["stream"], line["captured"]): line["event"] for line in log_lines(log, "media")}
+    issued = [(float(str(line["time"])), int(str(line["event"]))) for line in log_lines(log, "feedback")]
+    for medium in received.values():
+        assert captured[medium.stream, medium.time] == medium.stamp
+        assert medium.stamp == max(event for when, event in issued if when <= medium.time + 0.0005)
+
+
+async def test_every_byte_may_come_alone() -> None:
+    async with running_bridge() as bridge, raw_link(bridge) as link:
+        for byte in frame(encode_message(Hello(role="operator"))) + frame(encode_message(Ping(id=1))):
+            link.writer.write(bytes([byte]))
+            await asyncio.sleep(0)
+        hello = await link.find(Hello)
+        assert (hello.role, hello.epoch) == ("robot", bridge.epoch)
+        assert (await link.find(Feedback)).event == 1
+
+
+async def test_malformed_messages_are_refused_counted_and_do_not_count_as_life() -> None:
+    async with running_bridge() as bridge, raw_link(bridge, "operator") as link:
+        link.writer.write(frame(b"\xc1"))
+        refusal = await link.find(Refusal)
+        assert (refusal.event, refusal.reason, refusal.current) == (0, "malformed", 1)
+        goodbye = None
+        while goodbye is None:
+            link.writer.write(frame(b"\xc1"))
+            message = await link.next()
+            goodbye = message if isinstance(message, Goodbye) else None
+        assert goodbye.error == "silent"
+        assert bridge.counters.bad_input["malformed"] > 1
+        assert bridge.counters.refusals["malformed"] == bridge.counters.bad_input["malformed"]
+
+
+async def test_malformed_messages_do_not_keep_the_robot_moving() -> None:
+    robot = RecordingRobot()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        for _ in range(20):
+            await driver.drive()
+        assert speed(robot) > 0.1
+        wrong = driver.command([0.4])
+        while robot.applied[-1][1] != NEUTRAL:
+            assert (await driver.refused(wrong)).reason == "wrong_size"
+        assert bridge.counters.refusals["wrong_size"] >= 1
+
+
+async def test_an_oversized_frame_ends_only_the_link_that_sent_it() -> None:
+    async with running_bridge() as bridge, operator(bridge) as driver, raw_link(bridge, "media") as link:
+        link.writer.write(b"\xff\xff\xff\xff")
+        assert (await link.find(Goodbye)).error == "framing"
+        await driver.drive()
+        assert bridge.counters.bad_input["framing"] == 1
+
+
+async def test_a_role_cannot_do_what_it_must_not() -> None:
+    async with running_bridge() as bridge, raw_link(bridge, "events") as link:
+        link.send(Rest(event=1), Reset())
+        assert (await link.find(Refusal)).reason == "not_allowed"
+        assert bridge.counters.bad_input["not_allowed"] == 2
+
+
+async def test_a_media_peer_that_does_not_read_is_dropped_and_disturbs_nobody() -> None:
+    robot = RecordingRobot(media=True)
+    async with running_bridge(robot) as bridge:
+        greedy = socket.create_connection(bridge.address)
+        greedy.setblocking(False)
+        loop = asyncio.get_running_loop()
+        try:
+            await loop.sock_sendall(greedy, frame(encode_message(Hello(role="media"))))
+            async with operator(bridge) as driver:
+                slowest = 0.0
+                while bridge.links > 1:
+                    await loop.sock_sendall(greedy, frame(encode_message(Ping(id=1))))
+                    started = loop.time()
+                    await driver.drive()
+                    slowest = max(slowest, loop.time() - started)
+                assert bridge.counters.endings == {"lost": 1}
+                assert bridge.counters.drops["overview"] > 5
+                assert driver.feedback.event > 100
+                assert slowest < 0.2
+        finally:
+            greedy.close()
+
+
+async def test_closing_the_bridge_says_so_and_leaves_the_robot_at_rest() -> None:
+    robot = RecordingRobot()
+    async with running_bridge(robot) as bridge:
+        async with operator(bridge) as driver:
+            for _ in range(20):
+                await driver.drive()
+            assert speed(robot) > 0.1
+            await bridge.close()
+            with pytest.raises(LinkLost, match="closing"):
+                await driver.next(Goodbye)
+        await bridge.close()
+    assert robot.applied[-1][1] == NEUTRAL
+    assert robot.calls == ["close"]
+
+
+async def test_a_robot_that_raises_ends_the_bridge_with_its_reason() -> None:
+    class BrokenRobot(RecordingRobot):
+        def stop(self) -> None:
+            super().stop()
+            raise OSError("the relay does not answer")
+
+    robot = BrokenRobot()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        driver.link.send(Stop())
+        with pytest.raises(RobotFailed, match="the relay does not answer"):
+            await bridge.wait()
+        with pytest.raises(LinkLost):
+            await driver.next(Goodbye)
+
+
+async def test_a_media_source_that_breaks_is_a_fault_and_not_the_end() -> None:
+    class BrokenSource(MediaSource):
+        async def run(self, stamp: object, emit: object) -> None:
+            raise OSError("no camera")
+
+    class HalfBlindRobot(RecordingRobot):
+        def sources(self) -> list[MediaSource]:
+            return [BrokenSource()]
+
+    async with running_bridge(HalfBlindRobot()) as bridge, operator(bridge) as driver:
+        await driver.heard(lambda feedback: bool(feedback.faults))
+        assert driver.feedback.faults == ["media: OSError: no camera"]
+        await driver.drive()
+
+
+async def test_a_port_in_use_is_named_and_the_robot_is_released() -> None:
+    async with running_bridge() as bridge:
+        robot = RecordingRobot()
+        with pytest.raises(ListenError, match="cannot listen"):
+            await Bridge(robot, BridgeSettings(port=bridge.address[1])).start()
+        assert robot.calls == ["close"]
+
+
+async def test_more_links_than_the_bridge_takes_are_turned_away() -> None:
+    async with Bridge(RecordingRobot(), BridgeSettings(port=0, max_links=1)) as bridge, operator(bridge) as driver:
+        with pytest.raises(LinkRefused, match="full"):
+            await RobotLink(*bridge.address, "media").connect()
+        await driver.drive()
+
+
+def test_a_description_that_contradicts_itself_is_refused_before_anything_runs() -> None:
+    class NoAxes(RecordingRobot):
+        def describe(self) -> RobotDescription:
+            return RobotDescription(name="none", label="None", axes=())
+
+    with pytest.raises(DescriptionError, match="at least one axis"):
+        Bridge(NoAxes(), BridgeSettings(port=0))
+
+
+async def test_after_the_loop_was_blocked_there_is_no_burst_of_ticks() -> None:
+    robot = RecordingRobot()
+    async with running_bridge(robot) as bridge:
+        await robot.until(lambda: len(robot.applied) > 3, "ticks")
+        loop = asyncio.get_running_loop()
+        before, end = len(robot.applied), loop.time() + 0.3
+        while loop.time() < end:
+            pass
+        await robot.until(lambda: bridge.counters.skipped_ticks > 0, "skipped ticks")
+        assert len(robot.applied) - before < 15
+        assert bridge.counters.skipped_ticks > 50
+
+
+async def test_the_log_tells_what_happened(tmp_path: Path) -> None:
+    log = tmp_path / "events.jsonl"
+    async with running_bridge(event_log=log) as bridge, operator(bridge) as driver:
+        await driver.drive(DRIVE)
+        await driver.refused(driver.command([0.0]))
+        driver.link.send(Stop(by="Ada", reason="smoke"))
+        driver.link.send(Reset(by="Bob"))
+        driver.link.send(Rest(event=2))
+        await driver.heard(lambda feedback: feedback.issue >= 2 and not feedback.stop.stopped)
+    (start,) = log_lines(log, "start")
+    assert start["epoch"] == bridge.epoch
+    (executed,) = log_lines(log, "executed")
+    assert (executed["event"], executed["values"]) == (2, DRIVE)
+    (refused,) = log_lines(log, "refused")
+    assert (refused["event"], refused["reason"], refused["current"]) == (3, "wrong_size", 2)
+    assert log_lines(log, "stop")[0]["by"] == "Ada"
+    assert log_lines(log, "reset")[0]["by"] == "Bob"
+    assert [line["event"] for line in log_lines(log, "feedback")][0] == 1
+
+
+async def test_the_measurement_is_taken_right_after_the_tick() -> None:
+    class Watched(RecordingRobot):
+        def tick(self) -> None:
+            self.calls.append("tick")
+            super().tick()
+
+        def measure(self) -> Measurement:
+            self.calls.append("measure")
+            return super().measure()
+
+    robot = Watched()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        await driver.drive()
+        del robot.calls[-1]
+    measures = [index for index, call in enumerate(robot.calls) if call == "measure"][1:]
+    assert measures
+    assert all(robot.calls[index - 1] == "tick" for index in measures)

@@ -1,0 +1,80 @@
+import math
+
+import msgspec
+import pytest
+
+from robot_bridge.check_description import check_description
+from robot_bridge.errors import DescriptionError
+from robot_bridge.protocol.description import (
+    Axis,
+    Binding,
+    Body,
+    BodyJoint,
+    Camera,
+    ControlLayer,
+    Joint,
+    Microphone,
+    RobotDescription,
+)
+from robot_bridge.robots.planar.description import DESCRIPTION
+
+AXIS = Axis(name="a", label="A", unit="m/s", minimum=-1, maximum=1, slew=4, brake=10)
+
+
+def with_axis(**changes: object) -> RobotDescription:
+    return RobotDescription(name="r", label="R", axes=(msgspec.structs.replace(AXIS, **changes),))
+
+
+def with_change(**changes: object) -> RobotDescription:
+    return msgspec.structs.replace(DESCRIPTION, **changes)
+
+
+def test_the_planar_robots_description_is_sound() -> None:
+    check_description(DESCRIPTION)
+    check_description(with_axis())
+
+
+@pytest.mark.parametrize(
+    ("description", "message"),
+    [
+        (with_change(axes=()), "at least one axis"),
+        (with_change(hold=0.0), "hold"),
+        (with_change(hold=math.nan), "hold"),
+        (with_change(max_event_age=11.0), "max_event_age"),
+        (with_change(max_event_rate=0.0), "max_event_rate"),
+        (with_axis(maximum=math.inf), "finite"),
+        (with_axis(slew=math.nan), "finite"),
+        (with_axis(rest=2.0), "rest must lie"),
+        (with_axis(minimum=1.0, maximum=-1.0), "rest must lie"),
+        (with_axis(slew=0.0), "positive"),
+        (with_axis(brake=-1.0), "positive"),
+        (with_axis(brake=3.0), "longer than hold"),
+        (with_change(axes=(AXIS, AXIS), layers=()), "axis name 'a'"),
+        (with_change(joints=(Joint(name="", unit="m"),)), "joint name ''"),
+        (with_change(microphones=(Microphone(name="front", label="F", sample_rate=8000),)), "stream name 'front'"),
+        (with_change(cameras=DESCRIPTION.cameras * 2), "stream name"),
+        (
+            with_change(layers=(ControlLayer(name="l", label="L", bindings=(Binding(axis="arm"),)),)),
+            "layer l names the axis 'arm'",
+        ),
+        (with_change(bodies=(*DESCRIPTION.bodies, Body(name="x", parent="nobody"))), "body 'nobody'"),
+        (
+            with_change(
+                bodies=(
+                    *DESCRIPTION.bodies,
+                    Body(name="x", parent="", joints=(BodyJoint(joint="j", kind="revolute", axis=(0, 0, 1)),)),
+                )
+            ),
+            "joint 'j'",
+        ),
+        (with_change(bodies=()), "sensor bumper names the body 'base'"),
+    ],
+)
+def test_a_contradiction_is_named(description: RobotDescription, message: str) -> None:
+    with pytest.raises(DescriptionError, match=message):
+        check_description(description)
+
+
+def test_a_camera_and_a_microphone_are_both_streams() -> None:
+    camera = Camera(name="c", label="C", width=2, height=2, frame_rate=1)
+    check_description(with_change(cameras=(camera,), microphones=()))

@@ -1,0 +1,64 @@
+import asyncio
+import json
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from robot_bridge import cli
+from robot_bridge.errors import RobotUnavailable
+from robot_bridge.link_client import RobotLink
+from robot_bridge.robots.base import Robot
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+async def test_it_prints_its_address_once_ready_and_leaves_cleanly(how: signal.Signals, tmp_path: Path) -> None:
+    log = tmp_path / "events.jsonl"
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "robot_bridge", "planar", "--port", "0", "--json", "--event-log", str(log)),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    try:
+        assert process.stdout is not None
+        async with asyncio.timeout(20):
+            line = json.loads(await process.stdout.readline())
+        host, _, port = line["robot"].removeprefix("tcp://").rpartition(":")
+        async with RobotLink(host, int(port), "events") as link:
+            await anext(link)
+        process.send_signal(how)
+        async with asyncio.timeout(20):
+            out, err = await process.communicate()
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+    assert process.returncode == 0, err.decode()
+    assert out == b""
+    assert b"Traceback" not in err
+    assert json.loads(log.read_text().splitlines()[0])["kind"] == "start"
+
+
+def test_an_unknown_robot_is_answered_with_those_there_are() -> None:
+    result = CliRunner().invoke(cli.robot_app, ["tractor", "--port", "0"])
+    assert result.exit_code == 1
+    assert "no robot 'tractor'" in result.output
+    assert "planar" in result.output
+
+
+def test_a_robot_that_cannot_run_here_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def create(name: str) -> Robot:
+        raise RobotUnavailable("no GL: install libegl1 and libgl1-mesa-dri")
+
+    monkeypatch.setattr(cli, "create_robot", create)
+    result = CliRunner().invoke(cli.robot_app, ["mobile-manipulator", "--port", "0"])
+    assert result.exit_code == 1
+    assert "install libegl1" in result.output
+
+
+def test_an_event_log_that_cannot_be_written_is_an_error_and_not_a_traceback(tmp_path: Path) -> None:
+    result = CliRunner().invoke(cli.robot_app, ["planar", "--port", "0", "--event-log", str(tmp_path / "no" / "log")])
+    assert result.exit_code == 1
+    assert "No such file" in result.output

@@ -1,0 +1,258 @@
+import math
+
+import pytest
+
+from robot_bridge.event_core import MAX_REMEMBERED_ISSUES, Absorbed, Answered, EventCore, Executed, Refused
+from robot_bridge.protocol.messages import StopState
+from robot_bridge.protocol.serial import MAX_EVENT, event_after
+from tests.robot_bridge.core_helpers import AXES, MAX_AGE, MEASURED, NEUTRAL, command, core_at, reason
+
+ANY_START = pytest.mark.parametrize("start", [1, 2, 1000, MAX_EVENT - 1, MAX_EVENT])
+
+
+def test_the_first_feedback_is_event_1_issue_1_before_any_command() -> None:
+    core = EventCore(AXES, max_event_age=MAX_AGE)
+    assert core.feedback is None
+    assert core.issue_due(0.0)
+    feedback = core.issue(MEASURED, 5.0)
+    assert (feedback.event, feedback.issue, feedback.time) == (1, 1, 5.0)
+    assert core.feedback == feedback
+
+
+@pytest.mark.parametrize("event", [0, -1, MAX_EVENT + 1])
+def test_a_core_cannot_start_at_an_invalid_reference(event: int) -> None:
+    with pytest.raises(ValueError, match="valid reference"):
+        EventCore(AXES, max_event_age=MAX_AGE, first_event=event)
+
+
+@ANY_START
+def test_the_next_event_executes_and_its_feedback_makes_it_current(start: int) -> None:
+    core = core_at(start)
+    following = event_after(start)
+    assert core.command(command(following), 100.0) == Executed(following, [0.5, 0.2])
+    assert (core.current, core.pending) == (start, following)
+    assert core.issue_due(100.0)
+    feedback = core.issue(MEASURED, 100.004)
+    assert (feedback.event, feedback.issue) == (following, 1)
+    assert (core.current, core.pending) == (following, None)
+
+
+@ANY_START
+def test_a_repeat_of_the_pending_event_is_absorbed(start: int) -> None:
+    core = core_at(start)
+    following = event_after(start)
+    core.command(command(following), 100.0)
+    assert core.command(command(following, values=[-1.0, 0.3]), 100.0) == Absorbed(following)
+
+
+@ANY_START
+def test_a_repeat_of_the_current_event_gets_the_stored_feedback_again(start: int) -> None:
+    core = core_at(start)
+    following = event_after(start)
+    core.command(command(following), 100.0)
+    feedback = core.issue(MEASURED, 100.004)
+    assert core.command(command(following), 100.1) == Answered(feedback)
+    assert not core.issue_due(100.1)
+
+
+@ANY_START
+@pytest.mark.parametrize("offset", [-(2**29), -2, -1, 3, 10, 2**29])
+def test_any_other_event_is_out_of_order(start: int, offset: int) -> None:
+    event = (start + offset) % 2**31 or 4
+    outcome = core_at(start).command(command(event), 100.0)
+    assert isinstance(outcome, Refused)
+    assert outcome.refusal.reason == "out_of_order"
+    assert (outcome.refusal.event, outcome.refusal.current) == (event, start)
+
+
+def test_the_event_after_the_pending_one_is_out_of_order() -> None:
+    core = core_at()
+    core.command(command(2), 100.0)
+    assert reason(core.command(command(3), 100.0)) == "out_of_order"
+
+
+@pytest.mark.parametrize(("age", "expected"), [(0.0, "executed"), (MAX_AGE, "executed"), (MAX_AGE + 0.001, "late")])
+def test_a_command_may_answer_a_feedback_until_it_is_max_event_age_old(age: float, expected: str) -> None:
+    assert reason(core_at().command(command(2), 100.0 + age)) == expected
+
+
+def test_a_command_that_answers_an_unknown_issue_is_late() -> None:
+    assert reason(core_at().command(command(2, issue=2), 100.0)) == "late"
+
+
+def test_an_issue_of_the_event_before_does_not_count_for_this_one() -> None:
+    core = core_at()
+    core.issue(MEASURED, 100.1)
+    core.command(command(2, issue=2), 100.2)
+    core.issue(MEASURED, 100.2)
+    assert reason(core.command(command(3, issue=2), 100.2)) == "late"
+
+
+def test_a_late_refusal_is_followed_by_a_fresh_issue_that_can_be_answered() -> None:
+    core = core_at()
+    assert reason(core.command(command(2), 110.0)) == "late"
+    assert core.issue_due(110.0)
+    feedback = core.issue(MEASURED, 110.0)
+    assert (feedback.event, feedback.issue) == (1, 2)
+    assert reason(core.command(command(2, issue=2), 110.1)) == "executed"
+
+
+def test_frozen_copies_of_a_command_never_execute_whatever_was_issued_meanwhile() -> None:
+    core = core_at()
+    for copy in range(5):
+        now = 110.0 + copy * 0.01
+        assert reason(core.command(command(2), now)) == "late"
+        core.issue(MEASURED, now)
+    assert core.pending is None
+
+
+def test_an_older_issue_may_be_answered_while_it_is_young_enough() -> None:
+    core = core_at()
+    core.issue(MEASURED, 100.5)
+    assert reason(core.command(command(2, issue=1), 101.0)) == "executed"
+
+
+def test_a_flood_of_issues_forgets_the_oldest_first() -> None:
+    core = core_at()
+    for _ in range(MAX_REMEMBERED_ISSUES):
+        core.issue(MEASURED, 100.0)
+    assert reason(core.command(command(2, issue=1), 100.0)) == "late"
+    assert reason(core.command(command(2, issue=2), 100.0)) == "executed"
+
+
+def test_the_same_event_is_measured_again_twice_a_second() -> None:
+    core = core_at(now=100.0)
+    assert not core.issue_due(100.499)
+    assert core.issue_due(100.5)
+    assert core.issue(MEASURED, 100.5).issue == 2
+    assert not core.issue_due(100.999)
+
+
+def test_somebody_who_joins_gets_an_issue() -> None:
+    core = core_at()
+    core.want_issue()
+    assert core.issue_due(100.0)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_value_that_is_not_a_number_is_refused(bad: float) -> None:
+    assert reason(core_at().command(command(2, values=[0.0, bad]), 100.0)) == "not_a_number"
+
+
+@pytest.mark.parametrize("values", [[], [0.0], [0.0, 0.2, 0.0]])
+def test_anything_but_one_value_per_axis_is_refused(values: list[float]) -> None:
+    assert reason(core_at().command(command(2, values=values), 100.0)) == "wrong_size"
+
+
+def test_bad_values_are_refused_before_anything_else_is_said() -> None:
+    core = core_at()
+    core.stop("Ada", "")
+    assert reason(core.command(command(2, values=[math.nan, 0.0]), 100.0)) == "not_a_number"
+    assert reason(core.command(command(2, values=[]), 100.0)) == "wrong_size"
+
+
+def test_while_stopped_every_command_is_refused_neutral_and_repeated_ones_too() -> None:
+    core = core_at()
+    assert core.stop("Ada", "smoke")
+    for event, values in ((1, None), (2, None), (2, NEUTRAL), (7, None)):
+        outcome = core.command(command(event, values=values), 100.0)
+        assert isinstance(outcome, Refused)
+        assert (outcome.refusal.reason, outcome.refusal.detail) == ("stopped", "smoke")
+
+
+def test_the_stop_is_in_every_feedback_and_causes_one_at_once() -> None:
+    core = core_at()
+    core.stop("Ada", "smoke")
+    assert core.issue_due(100.0)
+    assert core.issue(MEASURED, 100.0).stop == StopState(stopped=True, by="Ada", reason="smoke")
+    assert core.stop_state.stopped
+
+
+def test_a_second_stop_changes_nothing() -> None:
+    core = core_at()
+    core.stop("Ada", "smoke")
+    assert not core.stop("Bob", "fire")
+    assert core.stop_state.by == "Ada"
+
+
+def test_an_event_that_was_pending_at_the_stop_still_gets_its_feedback() -> None:
+    core = core_at()
+    core.command(command(2), 100.0)
+    core.stop("Ada", "")
+    feedback = core.issue(MEASURED, 100.0)
+    assert (feedback.event, feedback.stop.stopped) == (2, True)
+
+
+def test_reset_releases_the_stop_and_causes_an_issue() -> None:
+    core = core_at()
+    core.stop("Ada", "")
+    core.issue(MEASURED, 100.0)
+    assert core.reset()
+    assert core.issue_due(100.0)
+    assert core.issue(MEASURED, 100.0).stop == StopState()
+    assert reason(core.command(command(2, issue=3), 100.0)) == "executed"
+
+
+def test_reset_without_a_stop_changes_nothing() -> None:
+    core = core_at()
+    assert not core.reset()
+    assert not core.issue_due(100.0)
+
+
+@ANY_START
+def test_a_rest_that_names_the_next_event_voids_it_when_it_moves(start: int) -> None:
+    core = core_at(start)
+    following = event_after(start)
+    assert core.rest(following)
+    assert reason(core.command(command(following), 100.0)) == "rested"
+    assert reason(core.command(command(following, values=NEUTRAL), 100.0)) == "executed"
+    core.issue(MEASURED, 100.0)
+    assert reason(core.command(command(event_after(following)), 100.0)) == "executed"
+
+
+@ANY_START
+def test_an_older_rest_that_arrives_later_does_not_take_back_a_newer_one(start: int) -> None:
+    core = core_at(start)
+    core.rest(event_after(start))
+    assert core.rest(start)
+    assert reason(core.command(command(event_after(start)), 100.0)) == "rested"
+
+
+@ANY_START
+def test_a_rest_that_names_the_current_event_voids_nothing(start: int) -> None:
+    core = core_at(start)
+    assert core.rest(start)
+    assert reason(core.command(command(event_after(start)), 100.0)) == "executed"
+
+
+@ANY_START
+def test_a_rest_that_names_an_older_event_than_the_executed_one_is_superseded(start: int) -> None:
+    core = core_at(start)
+    core.command(command(event_after(start)), 100.0)
+    assert not core.rest(start)
+    core.issue(MEASURED, 100.0)
+    assert not core.rest(start)
+    assert core.rest(event_after(start))
+
+
+@ANY_START
+@pytest.mark.parametrize("ahead", [5, 2**29, 2**30 - 1, 2**30])
+def test_a_rest_far_ahead_rests_but_voids_no_more_than_the_next_event(start: int, ahead: int) -> None:
+    core = core_at(start)
+    following = event_after(start)
+    assert core.rest((start + ahead) % 2**31 or 1)
+    assert reason(core.command(command(following), 100.0)) == "rested"
+    core.command(command(following, values=NEUTRAL), 100.0)
+    core.issue(MEASURED, 100.0)
+    assert reason(core.command(command(event_after(following)), 100.0)) == "executed"
+
+
+def test_a_late_command_is_called_late_even_when_rested() -> None:
+    core = core_at()
+    core.rest(2)
+    assert reason(core.command(command(2), 110.0)) == "late"
+
+
+def test_a_refusal_names_the_current_event_and_cuts_long_details() -> None:
+    refusal = core_at(41).refusal(0, "malformed", "x" * 600)
+    assert (refusal.event, refusal.current, len(refusal.detail)) == (0, 41, 500)

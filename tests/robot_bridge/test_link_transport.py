@@ -1,0 +1,170 @@
+"""One end of a link on a transport whose fullness the test decides."""
+
+import asyncio
+
+from robot_bridge.link_session import BadInput, BridgeSession
+from robot_bridge.link_transport import LinkTransport
+from robot_bridge.protocol.framing import FrameReader, frame
+from robot_bridge.protocol.messages import (
+    Feedback,
+    Goodbye,
+    Hello,
+    LinkMessage,
+    Media,
+    Ping,
+    Pong,
+    Stop,
+    decode_message,
+    encode_message,
+)
+
+HELLO = Hello(role="robot", epoch="e1")
+
+
+class FakeTransport(asyncio.Transport):
+    """Takes `room` bytes; buffers the rest."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reader = FrameReader(1 << 24)
+        self.buffered = 0
+        self.closed = False
+        self.aborts = 0
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        self.reader.feed(bytes(data))
+
+    def written(self) -> list[LinkMessage]:
+        return [decode_message(payload) for payload in self.reader.frames()]
+
+    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:
+        pass
+
+    def get_write_buffer_size(self) -> int:
+        return self.buffered
+
+    def close(self) -> None:
+        self.closed = True
+
+    def abort(self) -> None:
+        self.aborts += 1
+
+
+class Endpoint(LinkTransport):
+    """The bridge's side at a time the test sets."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        super().__init__(BridgeSession(0.0, lambda hello: HELLO), lambda: self.now)
+        self.events: list[LinkMessage | BadInput] = []
+        self.times_lost = 0
+        self.tcp = FakeTransport()
+        self.connection_made(self.tcp)
+
+    def received(self, event: LinkMessage | BadInput) -> None:
+        self.events.append(event)
+        if isinstance(event, Stop):
+            self.send(feedback(1))
+
+    def lost(self) -> None:
+        self.times_lost += 1
+
+    def hear(self, *messages: LinkMessage) -> None:
+        self.data_received(b"".join(frame(encode_message(message)) for message in messages))
+
+    def pass_time(self, seconds: float) -> None:
+        for _ in range(round(seconds / 0.05)):
+            self.now += 0.05
+            self.tick()
+
+
+def feedback(event: int) -> Feedback:
+    return Feedback(event=event, issue=1, time=0.0, axes=[])
+
+
+def picture(stamp: int) -> Media:
+    return Media(stream="a", codec="mjpeg", stamp=stamp, time=0.0, payload=b"")
+
+
+def opened() -> Endpoint:
+    end = Endpoint()
+    end.hear(Hello(role="operator"))
+    assert end.tcp.written() == [HELLO]
+    return end
+
+
+def test_our_hello_goes_before_the_answers_to_what_came_with_theirs() -> None:
+    end = Endpoint()
+    end.hear(Hello(role="operator"), Stop(), Ping(id=3))
+    assert end.tcp.written() == [HELLO, Pong(id=3), feedback(1)]
+
+
+def test_while_the_socket_is_full_only_the_newest_of_each_kind_waits() -> None:
+    end = opened()
+    end.pause_writing()
+    for event in range(1, 6):
+        end.send(feedback(event))
+        end.send_media(picture(event), lambda event=event: frame(encode_message(picture(event))))  # type: ignore[misc]
+    end.hear(Ping(id=1), Ping(id=2))
+    assert end.tcp.written() == []
+    end.resume_writing()
+    assert end.tcp.written() == [feedback(5), Pong(id=2), picture(5)]
+    assert end.drops == {"feedback": 4, "pong": 1, "a": 4}
+
+
+def test_a_peer_that_takes_nothing_for_a_second_is_dropped() -> None:
+    end = opened()
+    end.tcp.buffered = 100_000
+    end.pause_writing()
+    end.pass_time(0.5)
+    end.hear(Ping(id=1))
+    end.pass_time(0.45)
+    assert end.tcp.aborts == 0
+    end.pass_time(0.1)
+    assert end.tcp.aborts > 0
+    assert end.session.ended is not None
+    assert "did not read" in end.session.ended.detail
+
+
+def test_a_peer_that_takes_a_little_now_and_then_stays() -> None:
+    end = opened()
+    end.tcp.buffered = 100_000
+    end.pause_writing()
+    for _ in range(10):
+        end.tcp.buffered -= 1000
+        end.hear(Ping(id=1))
+        end.pass_time(0.5)
+    assert end.tcp.aborts == 0
+
+
+def test_the_goodbye_is_the_last_message_and_the_link_is_lost_once() -> None:
+    end = opened()
+    end.end("closing", "bye")
+    end.send(feedback(1))
+    end.send_media(picture(1), lambda: b"")
+    end.end("again")
+    assert end.tcp.written() == [Goodbye(error="closing", detail="bye")]
+    assert end.tcp.closed
+    end.connection_lost(None)
+    assert end.times_lost == 1
+
+
+def test_a_close_that_hangs_is_aborted_after_a_second() -> None:
+    end = opened()
+    end.end("closing")
+    end.pass_time(0.9)
+    assert end.tcp.aborts == 0
+    end.pass_time(0.2)
+    assert end.tcp.aborts > 0
+
+
+def test_after_the_connection_is_gone_nothing_is_sent_and_nothing_raises() -> None:
+    end = opened()
+    end.connection_lost(ConnectionResetError("reset"))
+    end.send(feedback(1))
+    end.tick()
+    end.abort()
+    end.pause_writing()
+    end.resume_writing()
+    assert end.tcp.written() == []
+    assert end.session.ended == Goodbye(error="lost", detail="reset")
