@@ -29,6 +29,7 @@ class Canvas:
         self._scene.flags[mujoco.mjtRndFlag.mjRND_CULL_FACE] = 1
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = DRAWN_GROUPS
+        self._options.sitegroup[:] = 0
         self._options.flags[:] = 0
         self._options.flags[mujoco.mjtVisFlag.mjVIS_STATIC] = 1
         self._options.flags[mujoco.mjtVisFlag.mjVIS_TEXTURE] = 1

@@ -46,16 +46,18 @@ class ContactSense:
 
     def read(self, data: Any) -> ContactReading:
         contact = data.contact
-        active = np.flatnonzero(contact.efc_address >= 0)
-        if not active.size:
-            return ContactReading(np.zeros(6), 0.0, 0.0)
+        rows = contact.efc_address  # of the normal force; -1 for a contact that is not active
+        normal = float(data.efc_force[rows[rows >= 0]].sum())
+        robot = self._is_robot[contact.geom]
+        felt = np.flatnonzero((rows >= 0) & (robot[:, 0] != robot[:, 1]))  # equal: none or both are the robot's
+        if not felt.size:
+            return ContactReading(np.zeros(6), normal, 0.0)
         # With elliptic cones a contact's rows are its force along the contact frame: normal, then two tangents.
-        local = data.efc_force[contact.efc_address[active][:, None] + np.arange(3)]
-        robot = self._is_robot[contact.geom[active]]
-        sign = robot[:, 1].astype(float) - robot[:, 0]  # the force acts on the second geom; 0 inside the robot
-        world = np.einsum("nij,ni->nj", contact.frame[active].reshape(-1, 3, 3), local) * sign[:, None]
-        lever = contact.pos[active] - data.xpos[self._mount]
+        local = data.efc_force[rows[felt][:, None] + np.arange(3)]
+        sign = np.where(robot[felt, 1], 1.0, -1.0)  # the force acts on the second geom
+        world = np.einsum("nij,ni->nj", contact.frame[felt].reshape(-1, 3, 3), local) * sign[:, None]
+        lever = contact.pos[felt] - data.xpos[self._mount]
         rotation = data.xmat[self._mount].reshape(3, 3)
         force, torque = world.sum(axis=0) @ rotation, np.cross(lever, world).sum(axis=0) @ rotation
-        rubbing = float(np.hypot(local[:, 1], local[:, 2]) @ np.abs(sign))
-        return ContactReading(np.concatenate((force, torque)), float(local[:, 0].sum()), rubbing)
+        rubbing = float(np.hypot(local[:, 1], local[:, 2]).sum())
+        return ContactReading(np.concatenate((force, torque)), normal, rubbing)

@@ -1,5 +1,6 @@
 """What of the physics can be heard, gathered tick by tick until a segment of sound is made of it."""
 
+import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -11,7 +12,8 @@ __all__ = ["Heard", "Hearing"]
 
 DRUM_RADIUS: Final = 0.31  # m, turns the base's turning into the speed of its wheels
 KNOCK: Final = 6.0  # N, smaller jumps of contact force make no sound
-MASS_PER_OBJECT: Final = 1.0  # kg, movable objects are heard sliding alike
+ARM_LENGTH: Final = 0.3  # m, turns joint speeds into a speed of the skin, roughly
+OBJECT_FRICTION: Final = 3.0  # N, movable objects are heard sliding alike
 
 
 class Heard(NamedTuple):
@@ -36,11 +38,12 @@ class Hearing:
         self._pressure: float | None = None  # N, of all contacts at the last tick
 
     def listen(self, data: Any, contacts: ContactReading) -> None:
-        base, arm = data.qvel[BASE], np.abs(data.qvel[ARM])
-        wheels = float(np.hypot(base[0], base[1]) + DRUM_RADIUS * abs(base[2]))
-        objects = float(np.linalg.norm(data.qvel[self._objects], axis=1).sum())
-        rubbing = contacts.rubbing * (wheels + 0.3 * arm.sum()) + objects * MASS_PER_OBJECT * 3.0
-        self._sums += (wheels, arm[:3].sum(), arm[3:].sum(), rubbing)
+        (vx, vy, wz), arm = data.qvel[BASE].tolist(), np.abs(data.qvel[ARM])
+        wheels = math.hypot(vx, vy) + DRUM_RADIUS * abs(wz)
+        large, small = float(arm[:3].sum()), float(arm[3:].sum())
+        objects = float(np.sqrt((data.qvel[self._objects] ** 2).sum(axis=1)).sum())
+        rubbing = contacts.rubbing * (wheels + ARM_LENGTH * (large + small)) + OBJECT_FRICTION * objects
+        self._sums += (wheels, large, small, rubbing)
         self._ticks += 1
         if self._pressure is not None:
             rise = contacts.normal - self._pressure
@@ -48,7 +51,7 @@ class Hearing:
         self._pressure = contacts.normal
 
     def take(self) -> Heard:
-        """What was heard since the last call; the speeds stay when there was no tick in between."""
+        """What was heard since the last call; nothing when there was no tick in between."""
         if not self._ticks:
             return Heard()
         wheels, arm, wrist, rubbing = (self._sums / self._ticks).tolist()

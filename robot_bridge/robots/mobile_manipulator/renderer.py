@@ -8,12 +8,13 @@ import av
 import mujoco
 import numpy as np
 import numpy.typing as npt
+from av.video.reformatter import VideoReformatter
 
 from robot_bridge.protocol.description import Camera
 from robot_bridge.robots.mobile_manipulator.canvas import Canvas
 from robot_bridge.robots.mobile_manipulator.graphics import graphics_unavailable
 
-__all__ = ["Renderer", "yuv420p"]
+__all__ = ["Converter", "Renderer"]
 
 
 class Renderer:
@@ -25,6 +26,7 @@ class Renderer:
         Raises:
             RobotUnavailable: OpenGL cannot be used here.
         """
+        self._converter = Converter()
         self._thread = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="render")
         try:
             self._canvas: Canvas | None = self._thread.submit(Canvas, model, width, height).result()
@@ -46,10 +48,15 @@ class Renderer:
     def _draw(self, camera: Camera, positions: npt.NDArray[np.float64]) -> bytes:
         if self._canvas is None:
             raise RuntimeError("the renderer is closed")
-        return yuv420p(self._canvas.draw(camera.name, camera.width, camera.height, positions))
+        return self._converter.yuv420p(self._canvas.draw(camera.name, camera.width, camera.height, positions))
 
 
-def yuv420p(rgb: npt.NDArray[np.uint8]) -> bytes:
-    """Planes Y, U, V without padding, BT.601 limited range."""
-    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(rgb), format="rgb24").reformat(format="yuv420p")
-    return frame.to_ndarray().tobytes()
+class Converter:
+    """From RGB rows to planes Y, U, V without padding, BT.601 limited range. For one thread."""
+
+    def __init__(self) -> None:
+        self._reformatter = VideoReformatter()  # kept: it holds the prepared conversion
+
+    def yuv420p(self, rgb: npt.NDArray[np.uint8]) -> bytes:
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(rgb), format="rgb24")
+        return self._reformatter.reformat(frame, format="yuv420p", threads=1).to_ndarray().tobytes()

@@ -3,6 +3,7 @@
 Every voice keeps its phase and lets its level and pitch glide, so that segments join without a click.
 """
 
+import math
 from typing import Final
 
 import numpy as np
@@ -46,7 +47,8 @@ class Motor:
         self._last = share
         if not glide.any():
             return np.zeros(len(steps))
-        tone = sum(np.sin(phase * (order + 1)) / (order + 1.5) for order in range(self._harmonics))
+        orders = np.arange(self._harmonics)
+        tone: Signal = (1.0 / (orders + 1.5)) @ np.sin(np.outer(orders + 1, phase))
         return self._level * np.sqrt(glide) * tone
 
 
@@ -106,7 +108,7 @@ class Sound:
         return FAN_LEVEL * (0.5 * np.sin(phase) + 0.6 * self._fan_noise.play(self._samples))
 
     def _rub(self, rubbing: float, steps: Signal) -> Signal:
-        level = min(0.14, 0.03 * np.sqrt(max(rubbing - 0.05, 0.0)))
+        level = min(0.14, 0.03 * math.sqrt(max(rubbing - 0.05, 0.0)))
         glide = self._rubbing + (level - self._rubbing) * steps
         self._rubbing = level
         return glide * self._rub_noise.play(self._samples)
