@@ -71,17 +71,19 @@ class CommandDesk:
         self._in_flight: Command | None = None
         self._sender = ""  # peer whose command is in flight
         self._resting: Rest | None = None  # forwarded and not yet followed by a feedback
-        self._stop_pending = False  # a stop was forwarded, no feedback has shown it yet
+        self._unconfirmed_stop: Stop | None = None  # asked for, no feedback has shown it yet; outlives the link
         self._last_stop_at = -math.inf
 
     @property
     def in_flight(self) -> Command | None:
         return self._in_flight
 
-    def link_up(self, description: RobotDescription) -> None:
+    def link_up(self, description: RobotDescription) -> Stop | None:
+        """Returns a stop that nobody knows to have arrived: send it first of all."""
         self._description = description
         self._link_is_up = True
         self._forget()
+        return self._unconfirmed_stop
 
     def link_down(self) -> None:
         self._link_is_up = False
@@ -97,7 +99,7 @@ class CommandDesk:
             return self._refuse(command, "wrong_size", f"{len(description.axes)} values are needed")
         if not all(map(math.isfinite, command.values)):
             return self._refuse(command, "not_a_number")
-        if self._stop_pending or feedback.stop.stopped:
+        if self._unconfirmed_stop is not None or feedback.stop.stopped:
             return self._refuse(command, "stopped")
         if command.event == feedback.event:
             return Answer(feedback)
@@ -121,19 +123,21 @@ class CommandDesk:
         return self._forward_rest(Rest(event=event_after(self._clock.event)))
 
     def stop(self, by: str, reason: str, now: float) -> Forward | Absorbed:
-        """Anyone's, past every gate, also when the link is down: the shell keeps it until it can be said."""
-        repeated = self._stop_pending or self._clock.stop.stopped
-        if repeated and now - self._last_stop_at < STOP_REPEAT:
+        """Anyone's, past every gate, also when the link is down: then `link_up` brings it up again."""
+        stop, stopped = Stop(by=by, reason=reason), self._clock.stop.stopped
+        if (stopped or self._unconfirmed_stop is not None) and now - self._last_stop_at < STOP_REPEAT:
             return Absorbed()
-        self._stop_pending = self._stop_pending or not self._clock.stop.stopped
+        if not stopped or not self._link_is_up:
+            self._unconfirmed_stop = self._unconfirmed_stop or stop
         self._last_stop_at = now
-        return Forward(Stop(by=by, reason=reason))
+        return Forward(stop)
 
     def reset(self, by: str) -> Outcome:
         """The caller has checked the role."""
         if not self._link_is_up:
             return self._refuse(None, "link_down")
         self._last_stop_at = -math.inf
+        self._unconfirmed_stop = None  # the link keeps order: the bridge stops, then resets
         return Forward(Reset(by=by))
 
     def feedback(self, feedback: Feedback) -> None:
@@ -142,7 +146,7 @@ class CommandDesk:
             self._in_flight = None
         self._resting = None
         if feedback.stop.stopped:
-            self._stop_pending = False
+            self._unconfirmed_stop = None
 
     def refused(self, refusal: Refusal) -> str:
         """The bridge refused something; returns the peer to tell, or "" for none."""
@@ -154,7 +158,6 @@ class CommandDesk:
     def _forget(self) -> None:
         self._in_flight = None
         self._resting = None
-        self._stop_pending = False
         self._last_stop_at = -math.inf
 
     def _forward_rest(self, rest: Rest) -> Outcome:

@@ -71,7 +71,6 @@ class Console:
         self._desk = CommandDesk(self.clock, self.seat)
         self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.operators, self.peers.observers)
         self._loop = asyncio.get_running_loop()
-        self._undelivered_stop: Stop | None = None  # asked for while no link lived
         self._forwarded_at = 0.0  # when the command in flight left
         self._shown_stop = StopState()  # what everyone was told last
         self._link_was_up = False
@@ -107,7 +106,6 @@ class Console:
         if not isinstance(stop, Stop):
             raise TypeError(stop)
         delivered = self.robot.send_stop(stop)
-        self._undelivered_stop = None if delivered else stop
         audit.warning("stop", by=by, where=where, reason=reason, reference=self.clock.event, delivered=delivered)
         return delivered
 
@@ -188,10 +186,10 @@ class Console:
             raise TypeError("a link is up only after its hello")
         self._link_was_up = True
         self._metrics.link_up.set(1)
-        self._desk.link_up(self.robot.description)
-        if self._undelivered_stop is not None:
-            stop, self._undelivered_stop = self._undelivered_stop, None
-            self.stop(stop.by, "kept", stop.reason)
+        stop = self._desk.link_up(self.robot.description)
+        if stop is not None:
+            self.robot.send_stop(stop)
+            audit.warning("stop sent again", by=stop.by, reason=stop.reason)
         self.peers.tell("session", self.state_of_robot(self.robot.description))
 
     def link_down(self, detail: str) -> None:

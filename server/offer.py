@@ -1,10 +1,12 @@
 """Checks a WHEP offer before anything is built on it, and takes out what aiortc should not see. No I/O."""
 
+from typing import NamedTuple
+
 from aiortc import sdp
 
 from server.errors import BadSdp, BadSdpFragment, IceRestartUnsupported
 
-__all__ = ["MAX_CANDIDATES", "MAX_SECTIONS", "Fragment", "FragmentCandidate", "parse_fragment", "prepare_offer"]
+__all__ = ["MAX_CANDIDATES", "MAX_SECTIONS", "FragmentCandidate", "parse_fragment", "prepare_offer"]
 
 MAX_SECTIONS = 40  # media sections
 MAX_CANDIDATES = 100
@@ -75,24 +77,17 @@ def _parsed(text: str) -> sdp.SessionDescription:
         raise BadSdp("the offer is not valid SDP") from error
 
 
-class FragmentCandidate:
+class FragmentCandidate(NamedTuple):
     """One candidate of a fragment, and the media section it is for."""
 
-    def __init__(self, mid: str, line: str) -> None:
-        self.mid = mid
-        self.line = line  # "candidate:..." without the "a="
+    mid: str
+    line: str  # "candidate:..." without the "a="
 
 
-class Fragment:
-    """An application/trickle-ice-sdpfrag (RFC 8840 9): candidates, and whether they were the last."""
+def parse_fragment(text: str, username: str, first_mid: str) -> list[FragmentCandidate]:
+    """The candidates in an application/trickle-ice-sdpfrag (RFC 8840 9).
 
-    def __init__(self) -> None:
-        self.candidates: list[FragmentCandidate] = []
-        self.ended = False
-
-
-def parse_fragment(text: str, username: str, first_mid: str) -> Fragment:
-    """The candidates in `text`.
+    Its a=end-of-candidates is not passed on: the peer may still be reached from an address that only its checks show.
 
     Args:
         username: the ice-ufrag of the peer's offer
@@ -102,18 +97,17 @@ def parse_fragment(text: str, username: str, first_mid: str) -> Fragment:
         IceRestartUnsupported: the fragment brings another ice-ufrag.
         BadSdpFragment: not a fragment.
     """
-    fragment, mid = Fragment(), first_mid
+    candidates: list[FragmentCandidate] = []
+    mid = first_mid
     for line in text.splitlines():
         if line.startswith("a=mid:"):
             mid = line[6:].strip()
         elif line.startswith("a=ice-ufrag:") and line[12:].strip() != username:
             raise IceRestartUnsupported("ICE restart is not supported: DELETE this resource and POST a new offer")
         elif line.startswith("a=candidate:"):
-            if len(fragment.candidates) == MAX_CANDIDATES:
+            if len(candidates) == MAX_CANDIDATES:
                 raise BadSdpFragment(f"more than {MAX_CANDIDATES} candidates")
-            fragment.candidates.append(FragmentCandidate(mid, line[2:]))
-        elif line == "a=end-of-candidates":
-            fragment.ended = True
+            candidates.append(FragmentCandidate(mid, line[2:]))
         elif line and line[1:2] != "=":
             raise BadSdpFragment("a line that is not SDP")
-    return fragment
+    return candidates

@@ -95,12 +95,20 @@ class Peers:
         for peer in self._sessions:
             peer.end(why)
 
+    async def all_gone(self) -> None:
+        """Returns when those who are here now have left."""
+        if self._sessions:
+            await asyncio.wait(self._sessions.values())
+
     async def close(self) -> None:
         """No more peers; the ones here end. Idempotent."""
         self._closing = True
         self.end_all("shutdown")
-        if self._sessions:
-            _, late = await asyncio.wait(self._sessions.values(), timeout=CLOSE_TIMEOUT)
+        try:
+            async with asyncio.timeout(CLOSE_TIMEOUT):
+                await self.all_gone()
+        except TimeoutError:
+            late = list(self._sessions.values())
             for task in late:
                 task.cancel()
             await asyncio.gather(*late, return_exceptions=True)

@@ -1,6 +1,7 @@
 """WHEP signalling (draft-ietf-wish-whep): POST an offer, PATCH candidates, DELETE to end."""
 
 import asyncio
+import ipaddress
 from typing import Annotated, Literal
 
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
@@ -48,12 +49,13 @@ async def trickle(resource: str, request: Request, identity: Annotated[Identity,
     peer = _own(here, resource, identity)
     text = await read_text(request, FRAGMENT, here.settings.max_sdp_bytes)
     first = SessionDescription.parse(peer.pc.remoteDescription.sdp).media[0]
-    fragment = parse_fragment(text, "" if first.ice is None else first.ice.usernameFragment or "", first.rtp.muxId)
-    for each in fragment.candidates:
+    candidates = parse_fragment(text, "" if first.ice is None else first.ice.usernameFragment or "", first.rtp.muxId)
+    for each in candidates:
         if ".local " in each.line:
             continue  # prepare_offer says why
         try:
             candidate = candidate_from_sdp(each.line.removeprefix("candidate:"))
+            ipaddress.ip_address(candidate.ip)
             candidate.sdpMid = each.mid
             await peer.pc.addIceCandidate(candidate)
         except Exception as error:

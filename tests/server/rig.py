@@ -93,9 +93,7 @@ class TestPeer:
             opened.append(self._until_open(channel))
             self.channels[label] = channel
         offer = await self.offer()
-        answer = await rig.http.post(
-            "/whep", content=offer, headers={**headers, "Content-Type": "application/sdp"}
-        )
+        answer = await rig.http.post("/whep", content=offer, headers={**headers, "Content-Type": "application/sdp"})
         assert answer.status_code == 201, answer.text
         self.location = answer.headers["location"]
         await self.pc.setRemoteDescription(RTCSessionDescription(answer.text, "answer"))

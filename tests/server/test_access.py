@@ -1,0 +1,93 @@
+import time
+
+import jwt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.access import Access, require_role
+from server.errors import NotAllowed, TokenInvalid, TokenMissing
+
+SECRET = "a secret of at least thirty-two bytes"
+ACCESS = Access(SECRET, 60, 60)
+CLAIMS = {"aud": "lockstep", "exp": 2**40, "role": "operator", "name": "x", "jti": "1"}
+
+
+def test_a_token_stands_for_its_role_and_name() -> None:
+    identity = ACCESS.verify(ACCESS.issue("observer", "Ada"))
+    assert (identity.role, identity.name) == ("observer", "Ada")
+    assert identity.token_id
+
+
+def test_every_token_has_an_id_of_its_own() -> None:
+    assert ACCESS.verify(ACCESS.issue("observer", "")).token_id != ACCESS.verify(ACCESS.issue("observer", "")).token_id
+
+
+@pytest.mark.parametrize(
+    "token",
+    [
+        "",
+        "x",
+        "a.b.c",
+        Access("another secret of thirty-two bytes", 60, 60).issue("operator", "x"),
+        Access(SECRET, -1, 60).issue("operator", "x"),
+        ACCESS.issue_ticket(),
+        jwt.encode(CLAIMS | {"role": "admin"}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"role": ["operator"]}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"name": 1}, SECRET, "HS256"),
+        jwt.encode({key: value for key, value in CLAIMS.items() if key != "exp"}, SECRET, "HS256"),
+        jwt.encode({key: value for key, value in CLAIMS.items() if key != "role"}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"aud": "another"}, SECRET, "HS256"),
+        jwt.encode(CLAIMS, "", "none"),
+        ACCESS.issue("operator", "x" * 4000),
+    ],
+)
+def test_any_other_token_is_refused_in_the_same_words(token: str) -> None:
+    with pytest.raises(TokenInvalid) as refused:
+        ACCESS.verify(token)
+    assert refused.value.detail == "the token is not valid"
+
+
+@given(st.text())
+def test_no_text_gets_in_or_raises_anything_else(text: str) -> None:
+    with pytest.raises(TokenInvalid):
+        ACCESS.verify(text)
+
+
+@given(st.integers(0, 400), st.characters())
+def test_a_token_with_one_character_changed_never_gives_another_role(place: int, character: str) -> None:
+    token = ACCESS.issue("observer", "x")
+    changed = token[: place % len(token)] + character + token[place % len(token) + 1 :]
+    try:
+        identity = ACCESS.verify(changed)
+    except TokenInvalid:
+        return
+    assert identity.role == "observer"  # the last character's spare bits do not count
+
+
+@pytest.mark.parametrize("header", [None, "", "Basic abc", "Bearer", "Bearer   "])
+def test_no_bearer_token_is_said_so(header: str | None) -> None:
+    with pytest.raises(TokenMissing):
+        ACCESS.bearer(header)
+
+
+def test_the_scheme_may_be_written_in_any_case() -> None:
+    assert ACCESS.bearer(f"bearer {ACCESS.issue('operator', 'x')}").role == "operator"
+
+
+def test_a_ticket_opens_the_scene_and_a_token_does_not() -> None:
+    ACCESS.verify_ticket(ACCESS.issue_ticket())
+    with pytest.raises(TokenInvalid):
+        ACCESS.verify_ticket(ACCESS.issue("operator", "x"))
+
+
+def test_a_ticket_expires() -> None:
+    ticket = jwt.encode({"aud": "lockstep-scene", "exp": time.time() - 1}, SECRET, "HS256")
+    with pytest.raises(TokenInvalid):
+        ACCESS.verify_ticket(ticket)
+
+
+def test_a_role_is_required_where_it_is() -> None:
+    require_role(ACCESS.verify(ACCESS.issue("operator", "x")), "operator")
+    with pytest.raises(NotAllowed):
+        require_role(ACCESS.verify(ACCESS.issue("observer", "x")), "operator")

@@ -1,0 +1,143 @@
+"""The HTTP API of a console that runs, with a real bridge."""
+
+import pytest
+
+from robot_bridge.protocol.console import StopStateNotice
+from robot_bridge.protocol.messages import StopState
+from tests.server.rig import Rig, running_console, running_rig
+
+
+async def _stop_state(rig: Rig, *, stopped: bool) -> StopState:
+    """What the bridge said last, once it says so."""
+    async with rig.peer("observer", "stop") as peer:
+        notice = await peer.until(lambda each: isinstance(each, StopStateNotice) and each.stop.stopped == stopped)
+        assert isinstance(notice, StopStateNotice)
+        return notice.stop
+
+
+async def test_without_a_valid_token_nothing_is_said() -> None:
+    async with running_rig() as rig:
+        for method, path in [
+            ("GET", "/api/session"),
+            ("POST", "/api/stop"),
+            ("POST", "/api/reset"),
+            ("POST", "/api/scene"),
+            ("POST", "/whep"),
+            ("PATCH", "/whep/x"),
+            ("DELETE", "/whep/x"),
+        ]:
+            for headers in ({}, {"Authorization": "Bearer x"}, {"Authorization": "Basic x"}):
+                answer = await rig.http.request(method, path, headers=headers)
+                assert (answer.status_code, answer.json()["error"]) == (401, "unauthorized"), (method, path)
+                assert answer.headers["www-authenticate"].startswith("Bearer")
+        assert rig.count("lockstep_bad_input_total", where="http", reason="unauthorized") == 21
+
+
+async def test_the_session_tells_what_is_going_on() -> None:
+    async with running_rig() as rig, rig.peer("operator") as peer:
+        await peer.feedback()
+        session = await rig.session()
+        assert session["epoch"]
+        assert session["event"] == 1
+        assert session["stopped"] is False
+        assert session["seat"]["holder"] == ""
+        assert [each["role"] for each in session["participants"]] == ["operator"]
+        assert session["link"] == {"up": True, "detail": ""}
+        assert session["you"] == {"role": "observer", "name": "observer"}
+        assert session["description"]["axes"]
+
+
+async def test_an_observer_can_stop_and_only_an_operator_can_reset() -> None:
+    async with running_rig() as rig:
+        answer = await rig.http.post("/api/stop", headers=rig.token("observer"), json={"reason": "dog in the room"})
+        assert (answer.status_code, answer.json()["delivered"]) == (200, True)
+        assert await _stop_state(rig, stopped=True) == StopState(stopped=True, by="observer", reason="dog in the room")
+        assert (await rig.session())["stopped"] is True
+        refused = await rig.http.post("/api/reset", headers=rig.token("observer"))
+        assert (refused.status_code, refused.json()["error"]) == (403, "not_allowed")
+        assert (await rig.session())["stopped"] is True
+        assert (await rig.http.post("/api/reset", headers=rig.token("operator"))).status_code == 200
+        await _stop_state(rig, stopped=False)
+        assert rig.count("lockstep_stops_total", where="http") == 1
+
+
+async def test_a_stop_needs_no_body() -> None:
+    async with running_rig() as rig:
+        assert (await rig.http.post("/api/stop", headers=rig.token("operator"))).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "name"),
+    [
+        (b"{", 400, "bad_json"),
+        (b'{"reason": 5}', 400, "bad_json"),
+        (b'{"reason": "' + b"x" * 501 + b'"}', 400, "bad_json"),
+        (b"\xff\xfe", 400, "bad_json"),
+        (b"[" * 3000, 400, "bad_json"),
+        (b"x" * 5000, 413, "too_large"),
+    ],
+)
+async def test_a_body_that_is_not_understood_is_refused_by_name(body: bytes, status: int, name: str) -> None:
+    async with running_rig() as rig:
+        answer = await rig.http.post("/api/stop", headers=rig.token("operator"), content=body)
+        assert (answer.status_code, answer.json()["error"]) == (status, name)
+        assert rig.count("lockstep_bad_input_total", where="http", reason=name) == 1
+        assert (await rig.session())["stopped"] is False
+
+
+async def test_unknown_paths_and_methods_are_refused_by_name() -> None:
+    async with running_rig() as rig:
+        for method, path, status, name in [
+            ("GET", "/nothing", 404, "not_found"),
+            ("GET", "/api/nothing", 404, "not_found"),
+            ("GET", "/%2e%2e/settings.py", 404, "not_found"),
+            ("GET", "/..%2fsettings.py", 404, "not_found"),
+            ("PUT", "/api/session", 405, "method_not_allowed"),
+        ]:
+            answer = await rig.http.request(method, path)
+            assert (answer.status_code, answer.json()["error"]) == (status, name), path
+
+
+async def test_pages_of_other_sites_are_refused() -> None:
+    async with running_rig(allowed_origins="https://friend.example") as rig:
+        headers = rig.token("operator")
+        for origin, status in [
+            (rig.url, 200),
+            ("https://friend.example", 200),
+            ("https://evil.example", 403),
+            ("null", 403),
+        ]:
+            answer = await rig.http.post("/api/stop", headers={**headers, "Origin": origin})
+            assert answer.status_code == status, origin
+        assert (await rig.http.get("/api/session", headers={**headers, "Origin": "https://evil.example"})).is_success
+
+
+async def test_every_answer_carries_the_security_headers() -> None:
+    async with running_rig() as rig:
+        for path in ("/", "/healthz", "/nothing", "/api/session"):
+            headers = (await rig.http.get(path)).headers
+            assert "frame-ancestors 'none'" in headers["content-security-policy"]
+            assert headers["referrer-policy"] == "no-referrer"
+            assert headers["x-content-type-options"] == "nosniff"
+            assert "server" not in headers
+
+
+async def test_health_and_metrics_need_no_token() -> None:
+    async with running_rig() as rig:
+        assert (await rig.http.get("/healthz")).json() == {"status": "ok", "robot_link": "up", "detail": ""}
+        text = (await rig.http.get("/metrics")).text
+        assert "lockstep_robot_link_up 1.0" in text
+        assert "lockstep_event 1.0" in text
+
+
+async def test_without_a_robot_the_console_runs_and_says_so() -> None:
+    async with running_console(1) as rig:
+        health = (await rig.http.get("/healthz")).json()
+        assert (health["status"], health["robot_link"]) == ("degraded", "down")
+        session = await rig.session()
+        assert (session["epoch"], session["description"]) == ("", None)
+        for path in ("/api/stop", "/api/reset"):
+            answer = await rig.http.post(path, headers=rig.token("operator"))
+            assert (answer.status_code, answer.json()["error"]) == (503, "link_down")
+        answer = await rig.http.post("/api/scene", headers=rig.token("operator"))
+        assert (answer.status_code, answer.json()["error"]) == (503, "scene_unavailable")

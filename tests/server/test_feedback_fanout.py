@@ -1,0 +1,80 @@
+import asyncio
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.feedback_fanout import SLICE, FeedbackFanout, FeedbackPace
+
+
+class FakePeer:
+    def __init__(self) -> None:
+        self.got: list[str] = []
+        self.news = asyncio.Event()
+
+    def send_feedback(self, text: str) -> None:
+        self.got.append(text)
+        self.news.set()
+
+
+def test_the_first_feedback_is_due_at_once() -> None:
+    pace = FeedbackPace(10)
+    assert pace.wait(5.0) is None
+    assert pace.take(5.0) is None
+    pace.offer("a")
+    assert pace.wait(5.0) == 0
+    assert pace.take(5.0) == "a"
+
+
+def test_in_between_the_newest_waits_its_turn() -> None:
+    pace = FeedbackPace(10)
+    pace.offer("a")
+    pace.take(5.0)
+    pace.offer("b")
+    assert pace.wait(5.05) == pytest.approx(0.05)
+    assert pace.take(5.05) is None
+    pace.offer("c")
+    assert pace.take(5.1001) == "c"
+
+
+@given(st.lists(st.floats(0, 0.3), min_size=2, max_size=60))
+def test_no_more_than_the_rate_leaves_and_the_newest_never_starves(gaps: list[float]) -> None:
+    pace, now, left = FeedbackPace(10), 1.0, []
+    for number, gap in enumerate(gaps):
+        now += gap
+        pace.offer(str(number))
+        if pace.take(now) is not None:
+            left.append(now)
+    for index in range(2, len(left)):
+        assert left[index] - left[index - 2] >= 0.1 - 1e-9  # a late one may be followed sooner, never two
+    assert pace.take(now + 0.2) is not None or left[-1] == now
+
+
+async def test_operators_are_served_at_once_and_observers_by_the_task() -> None:
+    operator, observers = FakePeer(), [FakePeer() for _ in range(2 * SLICE + 1)]
+    fanout = FeedbackFanout(1000, lambda: [operator], lambda: observers)
+    task = asyncio.create_task(fanout.run())
+    fanout.publish("a")
+    assert operator.got == ["a"]
+    assert observers[0].got == []
+    async with asyncio.timeout(5):
+        await observers[-1].news.wait()
+    assert all(observer.got == ["a"] for observer in observers)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+async def test_an_observer_gets_the_newest_of_a_burst() -> None:
+    observer = FakePeer()
+    fanout = FeedbackFanout(50, list, lambda: [observer])
+    task = asyncio.create_task(fanout.run())
+    async with asyncio.timeout(5):
+        fanout.publish("first")
+        await observer.news.wait()
+        observer.news.clear()
+        for number in range(10):
+            fanout.publish(str(number))
+        await observer.news.wait()
+    assert observer.got == ["first", "9"]
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)

@@ -1,0 +1,106 @@
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.errors import BadSdp, BadSdpFragment, ConsoleError, IceRestartUnsupported
+from server.offer import MAX_CANDIDATES, MAX_SECTIONS, parse_fragment, prepare_offer
+from tests.server.offers import FINGERPRINT, offer, section
+
+GOOD = offer(section("0"), section("1", "audio"), section("2", "application"))
+HOST = "a=candidate:1 1 udp 2130706431 192.0.2.7 5000 typ host\r\n"
+LOCAL = "a=candidate:1 1 udp 2130706431 0a1b2c3d.local 5000 typ host\r\n"
+
+
+def test_a_good_offer_is_kept_as_it_is() -> None:
+    good = offer(section("0", candidate=HOST))
+    assert prepare_offer(good) == good
+
+
+def test_a_data_channel_section_gets_the_default_message_size() -> None:
+    assert prepare_offer(GOOD).count("a=max-message-size:65536") == 1
+    told = offer(section("0", "application", "a=max-message-size:262144\r\n"))
+    assert prepare_offer(told) == told
+
+
+def test_mdns_candidates_are_taken_out_and_ice_waits_for_the_browsers_checks() -> None:
+    prepared = prepare_offer(offer(section("0", candidate=LOCAL, extra="a=end-of-candidates\r\n")))
+    assert ".local" not in prepared
+    assert "end-of-candidates" not in prepared
+
+
+def test_without_mdns_candidates_the_end_stays_the_end() -> None:
+    assert "a=end-of-candidates" in prepare_offer(offer(section("0", candidate=HOST + "a=end-of-candidates\r\n")))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "hello",
+        "v=0\r\n",
+        offer(),
+        offer(*[section(str(number)) for number in range(MAX_SECTIONS + 1)]),
+        offer(section("0", "application"), section("1", "application")),
+        offer(section("0"), section("0", "audio")),
+        offer(section("0"), section("1"), bundle="0"),
+        offer(section("0"), bundle=""),
+        offer(section("0").replace("a=mid:0\r\n", "")),
+        offer(section("0").replace("a=ice-ufrag:abcd\r\n", "")),
+        offer(section("0").replace("a=ice-pwd:0123456789abcdef0123456789\r\n", "")),
+        offer(section("0").replace(f"a=fingerprint:{FINGERPRINT}\r\n", "")),
+        offer(section("0").replace("a=setup:actpass\r\n", "")),
+        offer(section("0").replace("m=video", "m=smell")),
+        offer(section("0", "application").replace("a=sctp-port:5000\r\n", "")),
+        offer(section("0", candidate=HOST * (MAX_CANDIDATES + 1))),
+        offer(section("0").replace("96 VP8/90000", "VP8")),
+    ],
+)
+def test_an_offer_that_cannot_be_answered_is_refused(text: str) -> None:
+    with pytest.raises(BadSdp):
+        prepare_offer(text)
+
+
+@given(st.text())
+def test_no_text_raises_anything_else(text: str) -> None:
+    with pytest.raises(BadSdp):
+        prepare_offer(text)
+
+
+@given(st.lists(st.tuples(st.integers(0, len(GOOD)), st.integers(0, 30), st.text(max_size=8)), min_size=1, max_size=4))
+def test_no_mutation_raises_anything_else(cuts: list[tuple[int, int, str]]) -> None:
+    text = GOOD
+    for place, length, instead in cuts:
+        text = text[:place] + instead + text[place + length :]
+    with contextlib.suppress(BadSdp):
+        prepare_offer(text)
+
+
+@given(st.permutations(GOOD.splitlines()))
+def test_no_order_of_lines_raises_anything_else(lines: list[str]) -> None:
+    with contextlib.suppress(BadSdp):
+        prepare_offer("\r\n".join(lines))
+
+
+def test_a_fragment_gives_its_candidates_with_their_section() -> None:
+    text = f"a=ice-ufrag:abcd\r\na=ice-pwd:x\r\n{HOST}m=audio 9 RTP/AVP 0\r\na=mid:1\r\n{HOST}a=end-of-candidates\r\n"
+    found = parse_fragment(text, "abcd", "0")
+    assert [(each.mid, each.line[:10]) for each in found] == [("0", "candidate:"), ("1", "candidate:")]
+
+
+def test_a_fragment_with_another_ufrag_is_an_ice_restart() -> None:
+    with pytest.raises(IceRestartUnsupported):
+        parse_fragment("a=ice-ufrag:other\r\na=ice-pwd:x\r\n", "abcd", "0")
+
+
+@pytest.mark.parametrize("text", ["hello", HOST * (MAX_CANDIDATES + 1)])
+def test_what_is_no_fragment_is_refused(text: str) -> None:
+    with pytest.raises(BadSdpFragment):
+        parse_fragment(text, "abcd", "0")
+
+
+@given(st.text())
+def test_no_fragment_raises_anything_else(text: str) -> None:
+    with contextlib.suppress(ConsoleError):
+        parse_fragment(text, "abcd", "0")

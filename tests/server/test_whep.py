@@ -1,0 +1,198 @@
+"""WHEP over real HTTP."""
+
+import asyncio
+
+import httpx
+import pytest
+from aiortc import RTCConfiguration, RTCPeerConnection
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.server.offers import offer, section
+from tests.server.rig import PATIENCE, Rig, TestPeer, running_console, running_rig
+
+SDP = {"Content-Type": "application/sdp"}
+FRAGMENT = {"Content-Type": "application/trickle-ice-sdpfrag"}
+CANDIDATE = "a=candidate:1 1 udp 2130706431 127.0.0.1 5000 typ host\r\n"
+
+
+async def _post(rig: Rig, text: str | bytes, path: str = "/whep", **headers: str) -> httpx.Response:
+    return await rig.http.post(path, content=text, headers={**rig.token("observer"), **SDP, **headers})
+
+
+async def _real_offer(*, video: bool = False) -> str:
+    pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+    try:
+        pc.createDataChannel("control")
+        if video:
+            pc.addTransceiver("video", "recvonly")
+        await pc.setLocalDescription(await pc.createOffer())
+        return pc.localDescription.sdp
+    finally:
+        await pc.close()
+
+
+async def _until_no_peers(rig: Rig) -> None:
+    async with asyncio.timeout(PATIENCE):
+        await rig.services.console.peers.all_gone()
+    assert len(rig.services.console.peers) == 0
+
+
+async def test_an_offer_is_answered_and_the_resource_can_be_deleted() -> None:
+    async with running_rig() as rig:
+        answer = await _post(rig, await _real_offer(video=True))
+        assert answer.status_code == 201
+        assert answer.headers["content-type"].startswith("application/sdp")
+        assert answer.headers["accept-patch"] == "application/trickle-ice-sdpfrag"
+        assert answer.headers["cache-control"] == "no-store"
+        assert "m=video" in answer.text
+        location = answer.headers["location"]
+        assert location.startswith("/whep/")
+        gone = await rig.http.delete(location, headers=rig.token("observer"))
+        assert gone.status_code == 404, "another token's resource is as good as none"
+
+
+async def test_who_made_a_peer_can_trickle_to_it_and_end_it() -> None:
+    async with running_rig() as rig:
+        headers = rig.token("observer")
+        answer = await rig.http.post("/whep", content=await _real_offer(), headers={**headers, **SDP})
+        location = answer.headers["location"]
+        patch = await rig.http.patch(location, content=CANDIDATE, headers={**headers, **FRAGMENT})
+        assert patch.status_code == 204
+        local = CANDIDATE.replace("127.0.0.1", "0a1b.local")
+        patch = await rig.http.patch(location, content=local, headers={**headers, **FRAGMENT})
+        assert patch.status_code == 204
+        for content, content_type, status, name in [
+            ("a=ice-ufrag:new\r\n", FRAGMENT, 422, "ice_restart_unsupported"),
+            ("a=candidate:what\r\n", FRAGMENT, 400, "bad_sdp_fragment"),
+            (CANDIDATE.replace("5000", "x"), FRAGMENT, 400, "bad_sdp_fragment"),
+            (CANDIDATE.replace("127.0.0.1", "example"), FRAGMENT, 400, "bad_sdp_fragment"),
+            ("rubbish", FRAGMENT, 400, "bad_sdp_fragment"),
+            (CANDIDATE, SDP, 415, "wrong_media_type"),
+        ]:
+            patch = await rig.http.patch(location, content=content, headers={**headers, **content_type})
+            assert (patch.status_code, patch.json()["error"]) == (status, name), content
+        assert (await rig.http.delete(location, headers=headers)).status_code == 200
+        await _until_no_peers(rig)
+        assert (await rig.http.delete(location, headers=headers)).status_code == 404
+        assert rig.count("lockstep_peers_ended_total", why="deleted") == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "headers", "status", "name"),
+    [
+        ("v=0", {"Content-Type": "text/plain"}, 415, "wrong_media_type"),
+        ("v=0", {"Content-Type": ""}, 415, "wrong_media_type"),
+        (b"\xff\xfe", {}, 415, "wrong_media_type"),
+        ("", {}, 400, "bad_sdp"),
+        ("v=0\r\n", {}, 400, "bad_sdp"),
+        ("x" * (64 * 1024 + 1), {}, 413, "too_large"),
+        (offer(section("0").replace("VP8", "AV9")), {}, 400, "bad_sdp"),
+        (offer(section("0").replace("a=rtcp-mux\r\n", "")), {}, 400, "bad_sdp"),
+        (offer(section("0").replace("UDP/TLS/RTP/SAVPF", "what")), {}, 400, "bad_sdp"),
+    ],
+)
+async def test_what_is_no_offer_is_refused_by_name(
+    content: str | bytes, headers: dict[str, str], status: int, name: str
+) -> None:
+    async with running_rig() as rig:
+        answer = await _post(rig, content, **headers)
+        assert (answer.status_code, answer.json()["error"]) == (status, name)
+        assert rig.count("lockstep_bad_input_total", where="http", reason=name) == 1
+        assert len(rig.services.console.peers) == 0
+
+
+async def test_a_content_type_may_have_parameters_and_any_case() -> None:
+    async with running_rig() as rig:
+        answer = await _post(rig, await _real_offer(), **{"Content-Type": "Application/SDP; charset=utf-8"})
+        assert answer.status_code == 201
+
+
+async def test_an_unknown_stamp_is_refused() -> None:
+    async with running_rig() as rig:
+        answer = await _post(rig, await _real_offer(), "/whep?stamp=postcard")
+        assert (answer.status_code, answer.json()["error"]) == (422, "bad_parameter")
+
+
+async def test_while_the_robot_was_never_reached_there_is_nothing_to_offer() -> None:
+    async with running_console(1) as rig:
+        answer = await _post(rig, await _real_offer())
+        assert (answer.status_code, answer.json()["error"]) == (503, "robot_unreachable")
+        assert answer.headers["retry-after"] == "1"
+
+
+async def test_when_all_places_are_taken_the_next_is_refused_and_a_place_becomes_free_again() -> None:
+    async with running_rig(max_peers=1) as rig:
+        async with rig.peer("observer"):
+            answer = await _post(rig, await _real_offer())
+            assert (answer.status_code, answer.json()["error"]) == (503, "too_many_peers")
+        await _until_no_peers(rig)
+        async with rig.peer("observer"):
+            pass
+
+
+async def test_a_peer_that_never_connects_is_ended() -> None:
+    async with running_rig(peer_connect_timeout=0.1) as rig:
+        assert (await _post(rig, await _real_offer())).status_code == 201
+        await _until_no_peers(rig)
+        assert rig.count("lockstep_peers_ended_total", why="never connected") == 1
+
+
+async def test_a_peer_with_channels_that_says_nothing_is_ended() -> None:
+    async with running_rig(peer_silence=0.3) as rig, rig.peer("observer") as peer:
+        async with asyncio.timeout(PATIENCE):
+            await peer.closed.wait()
+        await _until_no_peers(rig)
+        assert rig.count("lockstep_peers_ended_total", why="silent") == 1
+
+
+async def test_a_player_without_channels_is_not_ended_for_its_silence() -> None:
+    async with running_rig(peer_silence=0.1) as rig:
+        player = TestPeer()
+        player.pc.addTransceiver("video", "recvonly")
+        connected = asyncio.Event()
+        player.pc.on("connectionstatechange", connected.set)
+        try:
+            await player.join(rig, rig.token("observer"), ())
+            async with asyncio.timeout(PATIENCE):
+                while player.pc.connectionState != "connected":
+                    connected.clear()
+                    await connected.wait()
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.5):
+                    await rig.services.console.peers.all_gone()
+        finally:
+            await player.close()
+
+
+def test_no_offer_gets_anything_but_an_answer_or_a_named_error() -> None:
+    """One console for all examples; what is left of them must not pile up."""
+    with asyncio.Runner() as runner:
+        good = runner.run(_real_offer(video=True))
+        context = running_rig(peer_connect_timeout=0.05, max_peers=1000)
+        rig = runner.run(context.__aenter__())
+        tasks = len(asyncio.all_tasks(runner.get_loop()))
+
+        @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+        @given(
+            st.lists(st.tuples(st.integers(0, len(good)), st.integers(0, 40), st.text(max_size=8)), max_size=3)
+            | st.lists(st.sampled_from(good.splitlines()), max_size=60)
+        )
+        def no_surprise(changes: list[tuple[int, int, str]] | list[str]) -> None:
+            text = good
+            if changes and isinstance(changes[0], str):
+                text = "\r\n".join(str(line) for line in changes)
+            else:
+                for place, length, instead in changes:  # type: ignore[misc]
+                    text = text[:place] + instead + text[place + length :]
+            answer = runner.run(_post(rig, text.encode("utf-8", "surrogatepass")))
+            assert answer.status_code in (201, 400, 413, 415), answer.text
+            if answer.status_code != 201:
+                assert answer.json()["error"] in ("bad_sdp", "wrong_media_type")
+
+        no_surprise()
+        runner.run(_until_no_peers(rig))
+        assert rig.count("lockstep_internal_errors_total", where="peer") == 0
+        runner.run(asyncio.sleep(0.2))
+        assert len(asyncio.all_tasks(runner.get_loop())) <= tasks + 3
+        runner.run(context.__aexit__(None, None, None))
