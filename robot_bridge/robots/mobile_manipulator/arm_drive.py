@@ -42,6 +42,7 @@ class ArmDrive:
     def drive(self, twist: Array, seconds: float) -> None:
         """Use `twist` (base frame, m/s and rad/s) for the coming `seconds`."""
         joints = self._simulation.joints[ARM]
+        self.faults = []
         velocities = self._resolve(twist, joints) if twist.any() else np.zeros(len(joints))
         posture = self._posture + velocities * seconds
         posture = np.clip(posture, joints - LEAD, joints + LEAD)
