@@ -31,7 +31,7 @@ export default defineConfig(
   {
     files: ["*.js", "scripts/*.js", "vite.config.ts"],
     extends: [tseslint.configs.disableTypeChecked],
-    languageOptions: { globals: { process: "readonly", console: "readonly" } },
+    languageOptions: { globals: { process: "readonly", console: "readonly", URL: "readonly" } },
     rules: { "no-restricted-syntax": "off" },
   },
 );

@@ -20,6 +20,7 @@ import { Controls, type ControlSample } from "./input/controls";
 import { Disposal } from "./input/disposal";
 import { Rumble } from "./input/rumble";
 import type { TouchSticks } from "./input/touch_sticks";
+import { AudioDesk } from "./media/audio_desk";
 import { MediaRoom } from "./media_room";
 import type { VideoStream } from "./media/video_stream";
 import { ContactTone } from "./media/contact_tone";
@@ -51,7 +52,7 @@ export class ConsoleApp {
   readonly stopping: StopSender;
   readonly controls: Controls;
   readonly events = createRateMeter();
-  readonly audio = new AudioContext({ latencyHint: "interactive" });
+  readonly audio = new AudioDesk();
   link: LinkState = { kind: "connecting" };
   driver: driver.Driver | null = null;
   layer = 0;
@@ -265,7 +266,7 @@ export class ConsoleApp {
 
   private welcomed(welcome: Welcome): void {
     this.link = { kind: "connected" };
-    if (this.peer !== null) this.room.open(this.peer, welcome.streams);
+    if (this.peer !== null) this.room.open(this.peer, welcome.streams, this.heardMs);
     if (this.name !== null) this.tell("session", { type: "rename", name: this.name });
     if (welcome.role === "operator") this.requestSeat();
   }

@@ -21,6 +21,5 @@ addEventListener("hashchange", () => location.reload());
 // Any first touch of the page lets it make sound, unless the operator turned it off.
 for (const type of ["pointerdown", "keydown"] as const)
   addEventListener(type, () => {
-    if (page.app.state.settings.soundWanted && page.app.audio.state === "suspended")
-      page.app.audio.resume().catch(() => undefined);
+    if (page.app.state.settings.soundWanted && !page.app.audio.isRunning()) page.app.audio.resume();
   });

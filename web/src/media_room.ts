@@ -1,10 +1,20 @@
 import type { GateContext } from "./core/medium_counts";
 import type { ConsoleState } from "./core/console_state";
+import type { AudioDesk } from "./media/audio_desk";
 import { SoundStream } from "./media/sound_stream";
 import { VideoStream } from "./media/video_stream";
-import type { Peer } from "./rtc/peer";
+import type { Peer, Section } from "./rtc/peer";
 import type { StampReader } from "./rtc/stamp_reader";
 import type { StreamInfo } from "./wire";
+
+/** Sound waits for the first picture, at most this long: opening it holds the page up. */
+const SOUND_WAIT_MS = 1000;
+
+interface WaitingSound {
+  readonly info: StreamInfo;
+  readonly section: Section;
+  readonly untilMs: number;
+}
 
 export interface MediaRoomEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;
@@ -15,21 +25,22 @@ export interface MediaRoomEvents {
 export class MediaRoom {
   readonly videos = new Map<string, VideoStream>();
   readonly sounds = new Map<string, SoundStream>();
+  private waitingSounds: WaitingSound[] = [];
 
   constructor(
     private readonly state: ConsoleState,
     private readonly reader: StampReader | null,
-    private readonly audio: AudioContext,
+    private readonly audio: AudioDesk,
     private readonly events: MediaRoomEvents,
   ) {}
 
   /** Opens the streams that the console named. */
-  open(peer: Peer, streams: readonly StreamInfo[]): void {
+  open(peer: Peer, streams: readonly StreamInfo[], now: number): void {
     for (const info of streams) {
       const section = peer.section(info.mid);
-      if (section === undefined || this.videos.has(info.stream) || this.sounds.has(info.stream)) continue;
-      if (info.kind === "audio") this.sounds.set(info.stream, new SoundStream(info, section, this.audio));
-      else this.videos.set(info.stream, this.openVideo(info, section));
+      if (section === undefined || this.videos.has(info.stream)) continue;
+      if (info.kind === "video") this.videos.set(info.stream, this.openVideo(info, section));
+      else this.waitingSounds.push({ info, section, untilMs: now + SOUND_WAIT_MS });
     }
     this.changed();
   }
@@ -43,13 +54,14 @@ export class MediaRoom {
 
   /** Judges the sound being played. */
   listen(): void {
+    this.openSounds();
     const context = this.context("audio");
     for (const sound of this.sounds.values()) sound.observe(context, this.isAudible());
   }
 
   /** Timers are slow on a hidden page, too slow to gate sound. */
   isAudible(): boolean {
-    return this.audio.state === "running" && this.state.settings.soundWanted && !document.hidden;
+    return this.audio.isRunning() && this.state.settings.soundWanted && !document.hidden;
   }
 
   context(kind: "audio" | "video"): GateContext {
@@ -65,9 +77,18 @@ export class MediaRoom {
     for (const stream of [...this.videos.values(), ...this.sounds.values()]) stream.close();
     this.videos.clear();
     this.sounds.clear();
+    this.waitingSounds = [];
   }
 
-  private openVideo(info: StreamInfo, section: NonNullable<ReturnType<Peer["section"]>>): VideoStream {
+  private openSounds(): void {
+    if (this.waitingSounds.length === 0) return;
+    const hasPicture = [...this.videos.values()].some((video) => video.lastDrawnMs !== null);
+    if (!hasPicture && this.waitingSounds.every((sound) => performance.now() < sound.untilMs)) return;
+    for (const { info, section } of this.waitingSounds.splice(0))
+      this.sounds.set(info.stream, new SoundStream(info, section, this.audio.open()));
+  }
+
+  private openVideo(info: StreamInfo, section: Section): VideoStream {
     return new VideoStream(info, section, this.events.canvas(info), {
       context: () => this.context("video"),
       drawn: (stream, stamp, at) => this.events.drawn(stream, stamp, at),

@@ -60,7 +60,8 @@ export class Page {
     const bar = createStatusBar(app, () => this.root.classList.toggle("shows-details"));
     const banner = createBanner(app);
     const event = createEventPanel(app);
-    const force = createForceGauge(app);
+    const force = createForceGauge(app, false);
+    const contact = createForceGauge(app, true);
     const radar = createRangeRadar(app);
     const overlay = createOverlay(app);
     const details = [
@@ -75,7 +76,8 @@ export class Page {
     const stop = createStopPanel(app);
     const announcer = createAnnouncer(app);
     board.element.append(
-      h("div", "stage", {}, h("div", "gauges", {}, force.element, radar.element), overlay.element),
+      h("div", "gauges", {}, force.element, radar.element),
+      h("div", "stage", {}, contact.element, overlay.element),
     );
     const rail = h(
       "aside",
@@ -86,7 +88,7 @@ export class Page {
     );
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
     this.root.append(bar.element, banner.element, board.element, rail, deck, announcer.element);
-    return [bar, banner, event, force, radar, overlay, ...details, arm, axes, stop, announcer];
+    return [bar, banner, event, force, contact, radar, overlay, ...details, arm, axes, stop, announcer];
   }
 
   private draw(now: number): void {

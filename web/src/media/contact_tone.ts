@@ -1,24 +1,32 @@
+import type { AudioDesk } from "./audio_desk";
+
 /** A tone that rises with the contact force, for operators who look elsewhere. */
 export class ContactTone {
-  private readonly oscillator: OscillatorNode;
-  private readonly gain: GainNode;
+  private voice: { oscillator: OscillatorNode; gain: GainNode } | null = null;
 
-  constructor(private readonly context: AudioContext) {
-    this.oscillator = new OscillatorNode(context, { type: "triangle", frequency: 220 });
-    this.gain = new GainNode(context, { gain: 0 });
-    this.oscillator.connect(this.gain).connect(context.destination);
-    this.oscillator.start();
-  }
+  constructor(private readonly audio: AudioDesk) {}
 
   /** `strength`: 0 (silent) to 1. */
   sound(strength: number): void {
-    const now = this.context.currentTime;
-    this.gain.gain.setTargetAtTime(strength > 0 ? 0.04 + 0.1 * strength : 0, now, 0.02);
-    if (strength > 0) this.oscillator.frequency.setTargetAtTime(220 + 660 * strength, now, 0.02);
+    if (strength <= 0 && this.voice === null) return;
+    this.voice ??= this.createVoice();
+    const { oscillator, gain } = this.voice;
+    const now = gain.context.currentTime;
+    gain.gain.setTargetAtTime(strength > 0 ? 0.04 + 0.1 * strength : 0, now, 0.02);
+    if (strength > 0) oscillator.frequency.setTargetAtTime(220 + 660 * strength, now, 0.02);
   }
 
   close(): void {
-    this.oscillator.stop();
-    this.gain.disconnect();
+    this.voice?.oscillator.stop();
+    this.voice?.gain.disconnect();
+  }
+
+  private createVoice(): { oscillator: OscillatorNode; gain: GainNode } {
+    const context = this.audio.open();
+    const oscillator = new OscillatorNode(context, { type: "triangle", frequency: 220 });
+    const gain = new GainNode(context, { gain: 0 });
+    oscillator.connect(gain).connect(context.destination);
+    oscillator.start();
+    return { oscillator, gain };
   }
 }

@@ -56,10 +56,10 @@ export class VideoStream {
 
   private readonly draw = (picture: Picture, stamp: number | null, gap: number | null): void => {
     const { canvas } = this;
-    if (canvas.width !== picture.width || canvas.height !== picture.height) {
-      canvas.width = this.width = picture.width;
-      canvas.height = this.height = picture.height;
-    }
+    this.width = picture.width;
+    this.height = picture.height;
+    if (canvas.width !== picture.width) canvas.width = picture.width;
+    if (canvas.height !== picture.height) canvas.height = picture.height;
     this.drawing?.drawImage(picture.image, 0, 0);
     const at = performance.now();
     this.lastDrawnMs = at;

@@ -49,5 +49,6 @@ function padWords(app: ConsoleApp): string {
   const { state } = app.controls.pad;
   if (state === null) return "No gamepad: press a button on it to wake it";
   if (!state.standard) return `${state.id} has no standard mapping: it cannot drive`;
-  return app.isArmed() ? `${state.id}: Y layer · LB slow · B STOP` : `${state.id} ready: START arms`;
+  const layer = (app.state.robot?.description.layers.length ?? 0) > 1 ? "Y layer · " : "";
+  return app.isArmed() ? `${layer}LB slow · B STOP` : `${state.id} ready: START arms`;
 }

@@ -63,7 +63,10 @@ function createBar(axis: Axis): AxisBar {
       fill.style.left = percent(Math.min(at, middle));
       fill.style.width = percent(Math.abs(at - middle));
       mark.style.left = percent(Math.min(1, Math.max(0, share(commanded ?? axis.rest))));
-      setText(value, measured === undefined ? "–" : `${measured.toFixed(2)} ${axis.unit}`);
+      setText(
+        value,
+        measured === undefined ? "–" : `${measured.toFixed(2).replace(/^-(0\.00)$/, "$1")} ${axis.unit}`,
+      );
     },
   };
 }

@@ -1,4 +1,5 @@
 import { gateState } from "../core/command_gate";
+import { holdsSeat, isOperator, robotIsUp } from "../core/console_state";
 import { rateOf } from "../core/samples";
 import { GATE_WORDS } from "../core/words";
 import type { ConsoleApp } from "../console_app";
@@ -26,15 +27,29 @@ export function createEventPanel(app: ConsoleApp): Panel {
   return {
     element,
     update(now) {
-      const { driver } = app;
-      const found = driver === null ? "no_feedback" : gateState(driver.gate, now);
+      const found = app.driver === null ? "no_feedback" : gateState(app.driver.gate, now);
       if (found === "open" || found === "rate") openMs = now;
-      const flows = now - openMs < STEADY_MS;
+      const blocked = blockedWords(app);
+      const flows = blocked === null && now - openMs < STEADY_MS;
       setText(number, app.state.feedback === null ? "–" : grouped(app.state.feedback.event));
       setText(rate, `${rateOf(app.events, now).toFixed(1)} /s`);
-      setData(gate, "tone", flows ? "good" : "wait");
-      setText(state, flows ? "Gate open" : "Gate shut");
-      setText(words, GATE_WORDS[flows ? "open" : found]);
+      const watches = app.state.welcome !== null && !isOperator(app.state);
+      setData(gate, "tone", watches ? "off" : flows ? "good" : "wait");
+      setText(state, watches ? "Watching" : flows ? "Gate open" : "Gate shut");
+      setText(words, watches ? driverWords(app) : (blocked ?? GATE_WORDS[flows ? "open" : found]));
     },
   };
+}
+
+/** What shuts the gate before its own rule is asked; null when nothing does. */
+function blockedWords(app: ConsoleApp): string | null {
+  if (app.state.welcome === null) return "Not connected";
+  if (!robotIsUp(app.state)) return "The robot cannot be reached";
+  if (app.state.stop.stopped) return "The robot is stopped";
+  return holdsSeat(app.state) ? null : "You do not hold the control seat";
+}
+
+function driverWords(app: ConsoleApp): string {
+  const name = app.state.seat?.name ?? "";
+  return name === "" ? "Nobody drives" : `${name} drives`;
 }

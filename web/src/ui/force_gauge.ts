@@ -4,8 +4,11 @@ import { h, setData, setHidden, setText, svg, type Panel } from "./dom";
 
 const REACH = 44; // of the arrow, in the drawing's units
 
-/** The contact force: an arrow seen from above (forward is up), and a meter. */
-export function createForceGauge(app: ConsoleApp): Panel {
+/**
+ * The contact force: an arrow seen from above (forward is up), and a meter.
+ * `onContact`: it shows only while there is contact, over the picture.
+ */
+export function createForceGauge(app: ConsoleApp, onContact: boolean): Panel {
   const drawing = svg("svg", { viewBox: "-56 -56 112 112", class: "gauge-drawing", "aria-hidden": "true" });
   const arrow = svg("path", { class: "force-arrow" });
   drawing.append(
@@ -21,7 +24,7 @@ export function createForceGauge(app: ConsoleApp): Panel {
   const meter = h("span", "meter", { "aria-hidden": "true" }, fill, threshold);
   const element = h(
     "div",
-    "gauge force",
+    onContact ? "gauge force contact" : "gauge force",
     { "aria-label": "Contact force" },
     h("span", "gauge-name", {}, "Force"),
     drawing,
@@ -33,10 +36,10 @@ export function createForceGauge(app: ConsoleApp): Panel {
     update() {
       const sensor = app.state.robot?.description.wrench ?? null;
       const wrench = app.state.feedback?.wrench ?? [];
-      setHidden(element, sensor === null || wrench.length < 3);
-      if (sensor === null) return;
       const force = forceOf(wrench);
-      const strength = contactStrength(force, sensor);
+      const strength = sensor === null ? 0 : contactStrength(force, sensor);
+      setHidden(element, sensor === null || wrench.length < 3 || (onContact && strength === 0));
+      if (sensor === null) return;
       setData(element, "tone", strength >= 0.7 ? "bad" : strength > 0 ? "wait" : "good");
       arrow.setAttribute("d", arrowPath(wrench[0] ?? 0, wrench[1] ?? 0, sensor.full_scale_force));
       setText(value, `${force.toFixed(force < 100 ? 1 : 0)} N`);

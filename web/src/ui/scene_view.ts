@@ -26,11 +26,11 @@ export class SceneView {
     );
   }
 
-  /** A new connection may mean a new scene. */
-  reset(): void {
-    this.frame?.remove();
-    this.frame = null;
-    this.show("off", "Robot, posed from its feedback");
+  /** Opens it anew if it is open. */
+  reload(): void {
+    if (this.state === "off") return;
+    this.state = "off";
+    this.load();
   }
 
   private embed(path: string): void {

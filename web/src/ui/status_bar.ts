@@ -50,7 +50,7 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void): Pan
 function toggleSound(app: ConsoleApp): void {
   const { settings } = app.state;
   settings.soundWanted = !app.room.isAudible();
-  if (settings.soundWanted) app.audio.resume().catch(() => undefined);
+  if (settings.soundWanted) app.audio.resume();
   app.settingsChanged();
 }
 

@@ -32,5 +32,9 @@ export function createStopPanel(app: ConsoleApp): Panel {
 function stopWords(app: ConsoleApp): string {
   if (app.stopping.isPending) return "telling the robot…";
   if (app.state.stop.stopped) return "robot is stopped";
-  return app.stopping.failed ? "NOT CONFIRMED: press again" : "Esc";
+  return app.stopping.failed
+    ? "NOT CONFIRMED: press again"
+    : document.documentElement.dataset["touch"] === "true"
+      ? ""
+      : "Esc";
 }

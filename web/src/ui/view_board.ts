@@ -23,6 +23,7 @@ export class ViewBoard {
   readonly element = h("main", "views", { "aria-label": "Views" });
   private readonly views = new Map<string, View>();
   private main: string | null = null;
+  private epoch: string | null = null;
 
   constructor(private readonly scene: SceneView) {
     this.addView(SCENE, "3D scene", null, scene.element);
@@ -46,7 +47,15 @@ export class ViewBoard {
 
   update(app: ConsoleApp, now: number): void {
     this.element.classList.toggle("is-locked", app.isArmed());
+    this.followEpoch(app.state.robot?.epoch ?? null);
     for (const view of this.views.values()) if (view.canvas !== null) showVeil(app, view, now);
+  }
+
+  /** The scene lives as long as the bridge whose robot it shows. */
+  private followEpoch(epoch: string | null): void {
+    if (epoch === null || epoch === this.epoch) return;
+    if (this.epoch !== null) this.scene.reload();
+    this.epoch = epoch;
   }
 
   private addView(name: string, label: string, canvas: HTMLCanvasElement | null, content: HTMLElement): void {
