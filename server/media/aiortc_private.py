@@ -177,20 +177,18 @@ class MediaSender(RTCRtpSender):
             self._send_control(self._packets.goodbye(time.time()))
         self._on_stopped()
 
-    def congested(self) -> bool:
-        """Whether the socket still holds so much that another frame would only queue."""
-        path = self._path()
-        if path is None:
-            return False
-        backlog: Callable[[], int] | None = getattr(path[0], "get_write_buffer_size", None)
-        return backlog is not None and backlog() > SOCKET_BACKLOG_BYTES
+    def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
+        """Send a frame now: packets and bytes handed to the network, (0, 0) when the transport is gone.
 
-    def transmit(self, frame: EncodedFrame) -> tuple[int, int]:
-        """Send a frame now. Returns packets and bytes handed to the network; (0, 0) when the transport is gone."""
+        None, and nothing is sent, while the socket holds so much that another frame would only queue.
+        """
         path = self._path()
         if path is None or self._packets is None:
             return 0, 0
-        sendto, address = path[0].sendto, path[1]
+        transport, address = path
+        if _backlog(transport) > SOCKET_BACKLOG_BYTES:
+            return None
+        sendto = transport.sendto
         protect = self.transport._tx_srtp.protect
         packets = self._packets.packets(frame, time.time())
         octets = 0
@@ -262,6 +260,12 @@ class MediaSender(RTCRtpSender):
             packet = self._packets.retransmission(sequence_number, now)
             if packet is not None:
                 path[0].sendto(self.transport._tx_srtp.protect(packet), path[1])
+
+
+def _backlog(transport: Any) -> int:
+    """Bytes that wait for the socket; the transports of TURN cannot tell."""
+    size: Callable[[], int] | None = getattr(transport, "get_write_buffer_size", None)
+    return 0 if size is None else size()
 
 
 class _BoundedReceiveQueue(asyncio.Queue[Any]):

@@ -14,9 +14,8 @@ __all__ = ["FrameSender", "PeerStream"]
 class FrameSender(Protocol):
     """What sends frames over RTP."""
 
-    def congested(self) -> bool: ...
-
-    def transmit(self, frame: EncodedFrame) -> tuple[int, int]: ...
+    def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
+        """Send a frame: packets and bytes handed to the network. None, and nothing sent, while the socket is full."""
 
 
 class PeerStream:
@@ -56,10 +55,12 @@ class PeerStream:
 
     def send_next(self) -> bool:
         frame = self._outbox.peek()
-        if frame is None or self.sender is None or self.sender.congested():
+        if frame is None or self.sender is None:
             return False
-        packets, octets = self.sender.transmit(frame)
+        sent = self.sender.transmit(frame)
+        if sent is None:
+            return False
         self._outbox.pop()
-        self._packets.inc(packets)
-        self._octets.inc(octets)
+        self._packets.inc(sent[0])
+        self._octets.inc(sent[1])
         return self._outbox.peek() is not None

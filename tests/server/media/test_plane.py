@@ -386,3 +386,58 @@ async def test_a_new_epoch_gets_new_streams_and_starts_its_stamps_afresh() -> No
 
 async def test_a_plane_that_was_never_configured_closes() -> None:
     await MediaPlane(MediaSettings(), CollectorRegistry()).close()
+
+
+def block(viewer: Viewer) -> Callable[[], None]:
+    """Make the server's socket to a viewer look full; returns what makes it look free again."""
+    connection = cast(Any, viewer.server.getTransceivers()[0].receiver.transport).transport._connection
+    transport = connection._nominated[1].protocol.transport
+    original = transport.get_write_buffer_size
+    transport.get_write_buffer_size = lambda: 10**9
+
+    def free() -> None:
+        transport.get_write_buffer_size = original
+
+    return free
+
+
+async def test_a_blocked_observer_delays_nobody_and_goes_on_with_a_keyframe() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane())
+        operator = await stack.enter_async_context(viewing(plane, ["video"], priority=True))
+        observer = await stack.enter_async_context(viewing(plane, ["video"], uris={EVENT_REFERENCE_URI: 9}))
+        await stream(plane, operator, "video", picture, 2)
+        await observer.until(lambda: timestamps(observer, "video") == 2)
+        free = block(observer)
+        await stream(plane, operator, "video", picture, 10, first=3)
+        assert timestamps(observer, "video") == 2
+        assert observer.media.dropped > 0
+        assert operator.media.dropped == 0
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="peer_busy") == observer.media.dropped
+        free()
+        await stream(plane, operator, "video", picture, 30, first=13)
+        await observer.until(lambda: read_stamp("native", observer.received[-1]) == 42)
+        resumed = next(r for r in observer.of("video") if cast(int, read_stamp("native", r)) > 2)
+        assert resumed.packet.payload[0] & 0x1F == 24  # parameter sets: a keyframe
+        numbers = [received.packet.sequence_number for received in observer.of("video")]
+        assert [(n - numbers[0]) % 65536 for n in numbers] == list(range(len(numbers)))
+
+
+async def test_the_operators_packets_leave_before_feed_of_the_next_picture_and_before_observers() -> None:
+    sent: list[str] = []
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane())
+        viewers = [await stack.enter_async_context(viewing(plane, ["video"], priority=i == 3)) for i in range(4)]
+        for i, viewer in enumerate(viewers):
+            sender = cast(Any, viewer.media._deliveries[0].sender)
+
+            def spy(frame: Any, i: int = i, transmit: Any = sender.transmit) -> Any:
+                sent.append("operator" if i == 3 else "observer")
+                return transmit(frame)
+
+            sender.transmit = spy
+        for i in range(1, 6):
+            await stream(plane, viewers[0], "video", noise, 1, first=i)
+            for viewer in viewers:
+                await viewer.until(lambda viewer=viewer, i=i: timestamps(viewer, "video") == i)  # type: ignore[misc]
+        assert sent == ["operator", "observer", "observer", "observer"] * 5
