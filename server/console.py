@@ -76,15 +76,16 @@ class Console:
         self._link_was_up = False
 
     async def run(self) -> None:
-        """Until cancelled."""
-        try:
-            async with asyncio.TaskGroup() as tasks:
-                tasks.create_task(self._guard("feedback", self._fanout.run))
-                tasks.create_task(self._guard("seat", self._watch_seat))
-                tasks.create_task(self._guard("participants", self._share_participants))
-                tasks.create_task(self._guard("robot", self.robot.run))
-        finally:
-            await self.peers.close()
+        """Until cancelled. The peers end before the links: the last thing that leaves is the rest."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._guard("feedback", self._fanout.run))
+            tasks.create_task(self._guard("seat", self._watch_seat))
+            tasks.create_task(self._guard("participants", self._share_participants))
+            tasks.create_task(self._guard("robot", self.robot.run))
+            try:
+                await asyncio.Event().wait()
+            finally:
+                await self.peers.close()
 
     def state_of_robot(self, description: RobotDescription) -> RobotState:
         return RobotState(

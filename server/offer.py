@@ -50,8 +50,8 @@ def _check(text: str) -> None:
     if not all(mids) or len(set(mids)) != len(mids):
         raise BadSdp("every media section needs a mid of its own (RFC 9143 7.2.1)")
     bundles = [group.items for group in description.group if group.semantic == "BUNDLE"]
-    if not set(mids) <= {mid for items in bundles for mid in items}:
-        raise BadSdp("all media sections have to be in one BUNDLE group")
+    if len(bundles) != 1 or sorted(map(str, bundles[0])) != sorted(mids):
+        raise BadSdp("exactly the media sections have to be in one BUNDLE group (RFC 9143 7.2.1)")
     for media in description.media:
         _check_media(media)
 

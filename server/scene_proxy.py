@@ -31,6 +31,7 @@ ALLOWED_UP = frozenset({"ViewerCameraMessage"})
 TRY_AGAIN_LATER = 1013  # RFC 6455 7.4.1 and the IANA registry
 POLICY_VIOLATION = 1008
 GOING_AWAY = 1001
+UNSUPPORTED_DATA = 1003
 
 router = APIRouter()
 
@@ -123,7 +124,9 @@ async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> 
             else:
                 here.metrics.bad_input.labels("scene", "not_allowed").inc()
     except KeyError:
-        here.metrics.bad_input.labels("scene", "text").inc()  # starlette: a text message has no bytes
+        # starlette: a text message has no bytes
+        here.metrics.bad_input.labels("scene", "text").inc()
+        await websocket.close(UNSUPPORTED_DATA)
     except (WebSocketDisconnect, ConnectionClosed):
         return
 

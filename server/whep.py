@@ -4,6 +4,7 @@ import asyncio
 import ipaddress
 from typing import Annotated, Literal
 
+import structlog
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 from aiortc.sdp import SessionDescription, candidate_from_sdp
 from fastapi import APIRouter, Depends, Request, Response
@@ -21,6 +22,7 @@ SDP = "application/sdp"
 FRAGMENT = "application/trickle-ice-sdpfrag"
 NEGOTIATION_TIMEOUT = 10.0  # s for all that aiortc does between offer and answer
 
+log = structlog.get_logger(__name__)
 router = APIRouter()
 
 
@@ -93,13 +95,21 @@ async def _negotiate(here: Services, identity: Identity, offer: str, *, trailer:
                 await media.close()
                 raise
     except ConsoleError:
-        await pc.close()
+        await _discard(pc)
         raise
     except Exception as error:
         # Whatever aiortc trips over here was in the offer: it has no error of its own for that.
-        await pc.close()
+        await _discard(pc)
         raise BadSdp("the offer cannot be answered") from error
     except BaseException:
-        await pc.close()
+        await _discard(pc)
         raise
     return peer, pc.localDescription.sdp
+
+
+async def _discard(pc: RTCPeerConnection) -> None:
+    """Closes what negotiation may have left half made."""
+    try:
+        await pc.close()
+    except Exception:
+        log.exception("a failed negotiation could not be cleaned up")

@@ -14,5 +14,5 @@ async def no_task_is_left() -> AsyncIterator[None]:
     yield
     left = asyncio.all_tasks() - before - {asyncio.current_task()}
     if left:
-        _, left = await asyncio.wait(left, timeout=SETTLE)  # type: ignore[type-var]
+        _, left = await asyncio.wait(left, timeout=SETTLE)
     assert not left, f"tasks left behind: {left}"

@@ -1,7 +1,6 @@
 """A real console on a real bridge with the planar robot, and peers to talk to it."""
 
 import asyncio
-import json
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from server.serve import bind, running
 from server.services import Services
 from server.settings import Settings
 
-__all__ = ["PATIENCE", "Rig", "TestPeer", "running_bridge", "running_console", "running_rig"]
+__all__ = ["PATIENCE", "Rig", "TestPeer", "eventually", "running_bridge", "running_console", "running_rig"]
 
 PATIENCE = 10.0  # s; a busy machine, never waited for in full
 
@@ -142,6 +141,13 @@ class TestPeer:
             await opened.wait()
 
 
+async def eventually(state: Callable[[], bool]) -> None:
+    """Returns once `state` holds; for metrics and other values that have no event to wait for."""
+    async with asyncio.timeout(PATIENCE):
+        while not state():  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+
+
 @asynccontextmanager
 async def running_bridge(port: int = 0) -> AsyncIterator[Bridge]:
     async with Bridge(create_robot("planar"), BridgeSettings(port=port)) as bridge:
@@ -170,8 +176,3 @@ async def running_rig(**settings: Any) -> AsyncIterator[Rig]:
         async with asyncio.timeout(PATIENCE):
             await rig.services.console.robot.reached.wait()
         yield rig
-
-
-def as_json(text: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(text)
-    return found

@@ -46,6 +46,7 @@ def test_without_mdns_candidates_the_end_stays_the_end() -> None:
         offer(section("0"), section("0", "audio")),
         offer(section("0"), section("1"), bundle="0"),
         offer(section("0"), bundle=""),
+        offer(section("0"), bundle="0 1"),
         offer(section("0").replace("a=mid:0\r\n", "")),
         offer(section("0").replace("a=ice-ufrag:abcd\r\n", "")),
         offer(section("0").replace("a=ice-pwd:0123456789abcdef0123456789\r\n", "")),

@@ -1,0 +1,50 @@
+"""Start and shutdown of the whole console."""
+
+import asyncio
+
+from robot_bridge.protocol.console import Seat, SeatRequest
+from robot_bridge.protocol.messages import Command
+from robot_bridge.protocol.serial import event_after
+from server.app import create_app
+from server.settings import Settings
+from tests.server.rig import PATIENCE, TestPeer, running_bridge, running_console
+
+
+async def test_a_console_that_ends_with_peers_connected_ends_them_and_rests_the_robot() -> None:
+    """That no task is left is checked for every test here."""
+    async with running_bridge() as bridge:
+        peers = [TestPeer(), TestPeer()]
+        try:
+            async with running_console(bridge.address[1], scene=True) as rig:
+                async with asyncio.timeout(PATIENCE):
+                    await rig.services.console.robot.reached.wait()
+                for peer, role in zip(peers, ("operator", "observer"), strict=True):
+                    await peer.join(rig, rig.token(role), ("control", "session", "stop"))  # type: ignore[arg-type]
+                driver = peers[0]
+                driver.send("session", SeatRequest())
+                now = await driver.feedback()
+                values = [0.2] + [0.0] * (len(now.axes) - 1)
+                await driver.until(lambda each: isinstance(each, Seat) and each.holder != "")  # the seat
+                driver.send("control", Command(event=event_after(now.event), issue=now.issue, values=values))
+                await driver.feedback(lambda each: each.event == event_after(now.event))
+            async with asyncio.timeout(PATIENCE):
+                for peer in peers:
+                    await peer.closed.wait()
+            assert rig.count("lockstep_peers_ended_total", why="shutdown") == 2
+            assert rig.count("lockstep_rests_total", why="disconnected") == 1
+            assert len(rig.services.console.peers) == 0
+        finally:
+            for peer in peers:
+                await peer.close()
+
+
+async def test_one_process_can_run_several_consoles_one_after_the_other() -> None:
+    async with running_bridge() as bridge:
+        for _ in range(2):
+            async with running_console(bridge.address[1]) as rig:
+                async with asyncio.timeout(PATIENCE):
+                    await rig.services.console.robot.reached.wait()
+
+
+def test_an_app_is_made_without_touching_anything() -> None:
+    assert create_app(Settings()).title == "Lockstep"

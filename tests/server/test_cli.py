@@ -1,0 +1,99 @@
+"""The command line, as real processes."""
+
+import asyncio
+import os
+import signal
+import socket
+import sys
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.support.stack import running_stack
+
+LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
+PATIENCE = 30.0  # s
+
+
+async def _run(*arguments: str) -> tuple[int, str, str]:
+    """Exit code, output, errors of a command that ends by itself."""
+    process = await asyncio.create_subprocess_exec(
+        LOCKSTEP, *arguments, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+    )
+    try:
+        async with asyncio.timeout(PATIENCE):
+            out, err = await process.communicate()
+    except TimeoutError:
+        process.kill()
+        await process.wait()
+        raise
+    return process.returncode or 0, out.decode(), err.decode()
+
+
+def _child_of(process: int) -> int:
+    return int(Path(f"/proc/{process}/task/{process}/children").read_text().split()[0])
+
+
+async def _is_back(http: httpx.AsyncClient, old_epoch: str) -> bool:
+    session = (await http.get("/api/session")).json()
+    return bool(session["link"]["up"] and session["epoch"] != old_epoch)
+
+
+async def test_up_prints_one_line_that_works_and_leaves_nothing_running(tmp_path: Path) -> None:
+    async with running_stack(tmp_path, extra=("--robot-port", "0")) as stack:
+        token = stack.operator.partition("#token=")[2]
+        assert stack.operator.startswith(stack.console)
+        async with httpx.AsyncClient(base_url=stack.console, trust_env=False) as http:
+            session = await http.get("/api/session", headers={"Authorization": f"Bearer {token}"})
+            assert session.json()["link"]["up"] is True
+            assert session.json()["you"]["role"] == "operator"
+        assert list(stack.events("start"))
+        assert stack.process.stdout is not None
+    assert await stack.process.stdout.read() == b"", "nothing but the one line"
+    assert stack.process.returncode == 0
+    port = int(stack.robot.rpartition(":")[2])
+    with socket.socket() as probe:
+        assert probe.connect_ex(("127.0.0.1", port)) != 0
+
+
+async def test_a_bridge_that_dies_is_started_again_on_the_same_port(tmp_path: Path) -> None:
+    async with running_stack(tmp_path, extra=("--robot-port", "0")) as stack:
+        token = stack.operator.partition("#token=")[2]
+        headers = {"Authorization": f"Bearer {token}"}
+        bridge = _child_of(stack.process.pid)
+        async with httpx.AsyncClient(base_url=stack.console, trust_env=False, headers=headers) as http:
+            before = (await http.get("/api/session")).json()["epoch"]
+            os.kill(bridge, signal.SIGKILL)
+            async with asyncio.timeout(PATIENCE):
+                while not (await _is_back(http, before)):  # noqa: ASYNC110
+                    await asyncio.sleep(0.1)
+        assert any("the robot bridge ended (signal 9)" in line for line in stack.output)
+        assert any(stack.robot in line for line in stack.output)
+
+
+async def test_a_port_in_use_is_said_clearly() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        code, out, err = await _run("serve", "--port", str(port))
+    assert (code, out) == (3, "")
+    assert f"cannot listen on 127.0.0.1:{port}" in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("serve", "--robot", "nonsense"), 2, "is not tcp://host:port"),
+        (("serve", "--ice-host", "example"), 2, "ice_hosts"),
+        (("up", "--robot", "teapot", "--port", "0", "--robot-port", "0"), 4, "teapot"),
+        (("serve", "--port", "70000"), 2, "65535"),
+    ],
+)
+async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], code: int, words: str) -> None:
+    result, out, err = await _run(*arguments)
+    assert (result, out) == (code, "")
+    assert words in err
+    assert "Traceback" not in err

@@ -1,0 +1,59 @@
+"""The robot link breaks and comes back."""
+
+import asyncio
+
+from robot_bridge.protocol.console import RobotState
+from robot_bridge.protocol.messages import StopState
+from tests.server.rig import PATIENCE, eventually, running_bridge, running_console
+
+
+async def test_a_bridge_that_dies_shows_as_down_and_comes_back_by_itself() -> None:
+    async with running_bridge() as bridge:
+        port, first_epoch = bridge.address[1], bridge.epoch
+        async with running_console(port) as rig:
+            console = rig.services.console
+            async with asyncio.timeout(PATIENCE):
+                await console.robot.reached.wait()
+            async with rig.peer("observer") as peer:
+                await peer.until(lambda each: isinstance(each, RobotState) and each.link == "up")
+                await bridge.close()
+                await peer.until(
+                    lambda each: isinstance(each, RobotState) and each.link == "down" and bool(each.detail)
+                )
+                assert (await rig.http.get("/healthz")).json()["status"] == "degraded"
+                assert rig.count("lockstep_robot_link_losses_total") == 1
+                assert (await rig.session())["epoch"] == first_epoch
+                async with running_bridge(port) as second:
+                    async with asyncio.timeout(PATIENCE):
+                        await console.robot.reached.wait()
+                        await peer.closed.wait()
+                    assert (await rig.session())["epoch"] == second.epoch != first_epoch
+                    assert (await rig.http.get("/healthz")).json()["status"] == "ok"
+                    await console.peers.all_gone()
+                    assert rig.count("lockstep_peers_ended_total", why="new epoch") == 1
+                    async with rig.peer("observer") as again:
+                        await again.feedback()
+
+
+async def test_a_stop_while_no_link_lives_is_sent_first_when_one_does() -> None:
+    async with running_bridge() as bridge:
+        port = bridge.address[1]
+    async with running_console(port) as rig:
+        answer = await rig.http.post("/api/stop", headers=rig.token("observer"), json={"reason": "dog"})
+        assert (answer.status_code, answer.json()["error"]) == (503, "link_down")
+        async with running_bridge(port):
+            console = rig.services.console
+            await eventually(lambda: console.clock.stop.stopped)
+            assert console.clock.stop == StopState(stopped=True, by="observer", reason="dog")
+
+
+async def test_a_second_console_waits_until_the_operator_link_is_free() -> None:
+    async with running_bridge() as bridge, running_console(bridge.address[1]) as first:
+        async with asyncio.timeout(PATIENCE):
+            await first.services.console.robot.reached.wait()
+        async with running_console(bridge.address[1]) as second:
+            console = second.services.console
+            await eventually(lambda: "taken" in console.robot.detail)
+            answer = await second.http.post("/api/stop", headers=second.token("observer"))
+            assert answer.status_code == 200, "a stop passes on the media link"
+            await eventually(lambda: first.services.console.clock.stop.stopped)
