@@ -32,9 +32,14 @@ export function restValues(axes: readonly Axis[]): number[] {
 function inputOf(binding: Binding, held: HeldInputs): number {
   const pad = binding.pad !== null && held.pad !== null ? held.pad[binding.pad] : 0;
   const touch = binding.touch !== null && held.touch !== null ? held.touch[binding.touch] : 0;
-  const keys = Number(held.keys.has(binding.key_positive)) - Number(held.keys.has(binding.key_negative));
+  const keys = keyOf(held, binding.key_positive) - keyOf(held, binding.key_negative);
   const sum = (binding.invert_pad ? -pad : pad) + (binding.invert_touch ? -touch : touch) + keys;
   return clamp(sum, -1, 1);
+}
+
+/** An empty name binds nothing; some virtual keyboards send keys without a name. */
+function keyOf(held: HeldInputs, code: string): number {
+  return Number(code !== "" && held.keys.has(code));
 }
 
 function valueOf(axis: Axis, input: number): number {

@@ -1,0 +1,89 @@
+import { describe, expect, it } from "vitest";
+import {
+  applyMessage,
+  createConsoleState,
+  forgetConnection,
+  holdsSeat,
+  isOperator,
+  note,
+  robotIsUp,
+} from "../../src/core/console_state";
+import { axisOf, descriptionOf, feedbackOf, refusalOf, seatOf, welcomeOf } from "../messages";
+
+const robot = {
+  type: "robot",
+  link: "up",
+  epoch: "e",
+  description: descriptionOf([axisOf("x")]),
+  detail: "",
+} as const;
+
+describe("the console's state", () => {
+  it("knows who we are and whether we may drive", () => {
+    const state = createConsoleState();
+    expect([isOperator(state), holdsSeat(state), robotIsUp(state)]).toEqual([false, false, false]);
+    applyMessage(state, welcomeOf("operator"), 0);
+    applyMessage(state, seatOf("me", "somebody"), 0);
+    applyMessage(state, robot, 0);
+    expect([isOperator(state), holdsSeat(state), robotIsUp(state)]).toEqual([true, true, true]);
+    applyMessage(state, seatOf("", ""), 0);
+    applyMessage(state, { ...robot, link: "down", detail: "silent" }, 0);
+    expect([holdsSeat(state), robotIsUp(state)]).toEqual([false, false]);
+    expect(state.log.map((line) => line.level)).toContain("error");
+  });
+
+  it("keeps the newest feedback and its stop state", () => {
+    const state = createConsoleState();
+    const stop = { stopped: true, by: "Ada", reason: "test" };
+    applyMessage(state, feedbackOf(5, { issue: 2, stop }), 0);
+    applyMessage(state, feedbackOf(4, { issue: 9 }), 0);
+    applyMessage(state, feedbackOf(5, { issue: 1 }), 0);
+    expect(state.feedback).toMatchObject({ event: 5, issue: 2 });
+    expect(state.stop).toEqual(stop);
+    applyMessage(state, feedbackOf(5, { issue: 3 }), 0);
+    expect(state.stop.stopped).toBe(false);
+  });
+
+  it("takes stop states, participants and pongs", () => {
+    const state = createConsoleState();
+    applyMessage(state, { type: "stop_state", stop: { stopped: true, by: "x", reason: "" }, event: 3 }, 0);
+    applyMessage(state, { type: "participants", participants: [] }, 0);
+    applyMessage(state, { type: "pong", id: 1 }, 0);
+    expect(state.stop.by).toBe("x");
+  });
+
+  it("logs refusals and notices in words, and counts the same ones up", () => {
+    const state = createConsoleState();
+    applyMessage(state, refusalOf(4, "late"), 1);
+    applyMessage(state, refusalOf(5, "late"), 2);
+    applyMessage(state, { ...refusalOf(5, "wrong_size"), detail: "3 values are needed" }, 3);
+    applyMessage(state, { type: "notice", level: "info", text: "hello" }, 4);
+    expect(state.log.map(({ text, count }) => [text, count])).toEqual([
+      ["hello", 1],
+      ["Refused: It did not have one value for each axis (3 values are needed)", 1],
+      ["Refused: It came too late: the feedback it answers is too old", 2],
+    ]);
+  });
+
+  it("says why a seat changed hands", () => {
+    const state = createConsoleState();
+    applyMessage(state, { ...seatOf("", ""), why: "heartbeat lost" }, 0);
+    expect(state.log[0]?.text).toBe("The control seat is free (heartbeat lost)");
+  });
+
+  it("keeps only the newest lines of the log", () => {
+    const state = createConsoleState();
+    for (let index = 0; index < 100; index++) note(state, "info", `line ${index}`, index);
+    expect(state.log).toHaveLength(40);
+    expect(state.log[0]?.text).toBe("line 99");
+  });
+
+  it("forgets a connection that ended, but not that the robot is stopped", () => {
+    const state = createConsoleState();
+    applyMessage(state, welcomeOf("operator"), 0);
+    applyMessage(state, feedbackOf(5, { stop: { stopped: true, by: "x", reason: "" } }), 0);
+    forgetConnection(state);
+    expect(state).toMatchObject({ welcome: null, feedback: null, seat: null, robot: null });
+    expect(state.stop.stopped).toBe(true);
+  });
+});

@@ -1,0 +1,52 @@
+import type { Axis, Feedback, Refusal, RobotDescription, Seat, Welcome } from "../src/wire";
+
+export function feedbackOf(event: number, rest: Partial<Feedback> = {}): Feedback {
+  return {
+    type: "feedback",
+    event,
+    issue: 1,
+    time: 0,
+    axes: [0, 0],
+    joints: [],
+    wrench: [],
+    ranges: [],
+    at_rest: true,
+    stop: { stopped: false, by: "", reason: "" },
+    faults: [],
+    ...rest,
+  };
+}
+
+export function refusalOf(event: number, reason: Refusal["reason"]): Refusal {
+  return { type: "refusal", event, reason, current: 1, detail: "" };
+}
+
+export function axisOf(name: string, rest: Partial<Axis> = {}): Axis {
+  return { name, label: name, unit: "m/s", minimum: -1, maximum: 2, slew: 1, brake: 1, rest: 0, ...rest };
+}
+
+export function descriptionOf(axes: readonly Axis[]): RobotDescription {
+  return {
+    name: "test",
+    label: "Test robot",
+    axes,
+    joints: [],
+    layers: [],
+    cameras: [],
+    microphones: [],
+    wrench: null,
+    ranges: null,
+    bodies: [],
+    hold: 0.3,
+    max_event_age: 2,
+    max_event_rate: 25,
+  };
+}
+
+export function welcomeOf(role: Welcome["role"]): Welcome {
+  return { type: "welcome", peer: "me", role, name: "somebody", streams: [] };
+}
+
+export function seatOf(holder: string, name = ""): Seat {
+  return { type: "seat", holder, name, why: "" };
+}
