@@ -5,6 +5,7 @@ import contextlib
 import logging
 import secrets
 import time
+from collections import Counter
 from collections.abc import Callable
 from types import TracebackType
 from typing import Self
@@ -65,6 +66,11 @@ class Bridge:
     def links(self) -> int:
         """Open connections."""
         return self._links.links
+
+    @property
+    def drops(self) -> Counter[str]:
+        """What slow links have missed, by message kind or stream."""
+        return self._links.drops()
 
     async def start(self) -> None:
         """Returns when listening.
@@ -274,7 +280,7 @@ class Bridge:
             counters.skipped_ticks,
             dict(counters.refusals),
             dict(counters.bad_input),
-            dict(self._links.drops()),
+            dict(self.drops),
             dict(counters.endings),
         )
 

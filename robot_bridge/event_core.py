@@ -104,7 +104,7 @@ class EventCore:
             return Answered(self._feedback)
         if command.event == self._pending:
             return Absorbed(command.event)
-        if self._pending is not None or command.event != event_after(self._current):
+        if command.event != event_after(self._current):  # also while an event is pending: that is the one after s
             return self._refuse(command, "out_of_order")
         return self._next_command(command, now)
 

@@ -1,11 +1,14 @@
 """The whole bridge over real TCP."""
 
 import asyncio
+import logging
 import signal
 import socket
 import sys
 from pathlib import Path
+from random import Random
 
+import msgspec
 import pytest
 
 from robot_bridge.bridge import Bridge
@@ -39,6 +42,8 @@ from tests.robot_bridge.bridge_helpers import (
     raw_link,
     running_bridge,
 )
+
+MARGIN = 0.05  # s between the bridge's reading of the clock and the test's, on a busy machine
 
 
 def speed(robot: RecordingRobot) -> float:
@@ -91,8 +96,24 @@ async def test_without_commands_the_robot_is_at_rest_within_hold_while_the_link_
         hold = bridge.description.hold
     executed = log_lines(log, "executed")[-1]["time"]
     assert isinstance(executed, float)
-    assert all(values == NEUTRAL for when, values in robot.applied if when >= executed + hold + 0.01)
+    assert all(values == NEUTRAL for when, values in robot.applied if when >= executed + hold + MARGIN)
     assert any(values != NEUTRAL for when, values in robot.applied if when >= executed)
+
+
+async def test_when_the_operator_link_ends_the_robot_comes_to_rest_long_before_hold() -> None:
+    class PatientRobot(RecordingRobot):
+        def describe(self) -> RobotDescription:
+            return msgspec.structs.replace(super().describe(), hold=5.0)
+
+    robot = PatientRobot()
+    async with running_bridge(robot) as bridge:
+        async with operator(bridge) as driver:
+            for _ in range(20):
+                await driver.drive()
+            assert speed(robot) > 0.1
+        ended = asyncio.get_running_loop().time()
+        await robot.until(lambda: robot.applied[-1][1] == NEUTRAL, "at rest")
+        assert asyncio.get_running_loop().time() - ended < 1.0
 
 
 DRIVE_FOREVER = """
@@ -133,7 +154,7 @@ async def test_a_client_process_that_dies_leaves_the_robot_at_rest_within_hold(
         hold = bridge.description.hold
     executed = log_lines(log, "executed")[-1]["time"]
     assert isinstance(executed, float)
-    assert all(values == NEUTRAL for when, values in robot.applied if when >= executed + hold + 0.01)
+    assert all(values == NEUTRAL for when, values in robot.applied if when >= executed + hold + MARGIN)
 
 
 async def test_rest_brings_the_axes_to_rest_and_voids_the_command_in_flight() -> None:
@@ -295,10 +316,49 @@ async def test_a_media_peer_that_does_not_read_is_dropped_and_disturbs_nobody() 
                     slowest = max(slowest, loop.time() - started)
                 assert bridge.counters.endings == {"lost": 1}
                 assert bridge.counters.drops["overview"] > 5
-                assert driver.feedback.event > 100
-                assert slowest < 0.2
+                assert driver.feedback.event > 20
+                assert slowest < 0.5
         finally:
             greedy.close()
+
+
+async def test_whatever_bytes_strangers_send_the_operator_drives_on() -> None:
+    random = Random(1)
+    hello = frame(encode_message(Hello(role="media")))
+    stop = frame(encode_message(Stop(by="x" * 40)))
+    async with running_bridge() as bridge, operator(bridge) as driver:
+        for attempt in range(40):
+            garbage = bytearray(hello + stop * 3 if attempt % 2 else random.randbytes(300))
+            for _ in range(3):
+                garbage[random.randrange(len(hello) if attempt % 4 == 1 else len(garbage))] = random.randrange(256)
+            async with raw_link(bridge) as stranger:
+                stranger.writer.write(bytes(garbage))
+                driver.link.send(Reset())
+                await driver.heard(lambda feedback: not feedback.stop.stopped)
+                driver.link.send(driver.command())
+                await driver.next(Feedback)
+        assert sum(bridge.counters.bad_input.values()) > 10
+
+
+async def test_closing_does_not_wait_long_for_a_peer_that_does_not_read() -> None:
+    robot = RecordingRobot(media=True)
+    async with running_bridge(robot) as bridge:
+        greedy = socket.create_connection(bridge.address)
+        try:
+            greedy.sendall(frame(encode_message(Hello(role="media"))))
+            await robot.until(lambda: bridge.drops["overview"] > 0, "the peer is full")
+            async with asyncio.timeout(3):
+                await bridge.close()
+        finally:
+            greedy.close()
+
+
+async def test_the_counters_are_logged_at_intervals(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "robot_bridge.bridge")
+    robot = RecordingRobot()
+    async with Bridge(robot, BridgeSettings(port=0, log_interval=0.01)) as bridge, operator(bridge) as driver:
+        await driver.refused(driver.command([0.0]))
+        await robot.until(lambda: "'wrong_size': 1" in caplog.text, "a line with the counters")
 
 
 async def test_closing_the_bridge_says_so_and_leaves_the_robot_at_rest() -> None:

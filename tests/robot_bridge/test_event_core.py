@@ -210,6 +210,16 @@ def test_a_rest_that_names_the_next_event_voids_it_when_it_moves(start: int) -> 
     assert reason(core.command(command(event_after(following)), 100.0)) == "executed"
 
 
+def test_a_rest_is_forgotten_once_its_event_executed_or_half_a_ring_later_it_would_void_again() -> None:
+    core = core_at()
+    core.rest(2)
+    core.command(command(2, values=NEUTRAL), 100.0)
+    core.issue(MEASURED, 100.0)
+    core._current = 2**30 + 10  # as if so many events had passed
+    core.issue(MEASURED, 100.0)
+    assert reason(core.command(command(2**30 + 11, issue=2), 100.0)) == "executed"
+
+
 @ANY_START
 def test_an_older_rest_that_arrives_later_does_not_take_back_a_newer_one(start: int) -> None:
     core = core_at(start)
