@@ -127,7 +127,7 @@ def _tap(receiver: Any, tap: _PacketTap, sink: PacketSink) -> None:
         await handle(packet, arrival_time_ms=arrival_time_ms)
         missing = sink.missing()
         if missing and tap.ssrc is not None:
-            await receiver._send_rtcp_nack(tap.ssrc, missing)
+            await receiver._send_rtcp_nack(tap.ssrc, sorted(missing))  # aiortc cannot pack them in another order
 
     async def receive(self: RTCRtpReceiver, parameters: Any) -> None:
         await begin(parameters)

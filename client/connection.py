@@ -170,6 +170,7 @@ class Connection:
         self._changed = asyncio.Event()
 
     async def _heartbeat(self) -> None:
+        await self._until(lambda: self._driver is not None)
         while True:
             now = self._loop.time()
             if now - self._heard_at > self.options.silence_seconds:

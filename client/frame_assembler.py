@@ -14,6 +14,7 @@ SEQUENCES = 1 << 16
 WINDOW = 1024  # packets that may wait for a missing one
 PATIENCE = 0.3  # s to wait for a missing packet
 RETRY = 0.06  # s between two requests for the same missing packets
+MOST_ASKED = 128  # sequence numbers after the first missing one that one request covers
 KEYFRAME_RETRY = 0.4  # s between two keyframe requests
 
 
@@ -103,7 +104,7 @@ class VideoAssembler:
         elif self._offset(packet.sequence) >= WINDOW or self._waited_too_long(now):
             self._give_up(packet.sequence)
         self._packets[packet.sequence] = packet
-        if self._offset(packet.sequence) > self._offset(self._highest):
+        if (packet.sequence - self._highest) % SEQUENCES < SEQUENCES // 2:
             self._highest = packet.sequence
         frames = self._complete()
         self._note_gap(now)
@@ -114,7 +115,7 @@ class VideoAssembler:
         if self._start is None or self._gap_since is None or now - max(self._gap_since, self._asked_at) < RETRY:
             return []
         self._asked_at = now
-        count = (self._highest - self._end) % SEQUENCES
+        count = min((self._highest - self._end) % SEQUENCES, MOST_ASKED)
         absent = ((self._end + offset) % SEQUENCES for offset in range(count))
         return [sequence for sequence in absent if sequence not in self._packets]
 

@@ -69,7 +69,7 @@ class Peer:
         self._resource = ""
         self._closing = False
         self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
-        self._open = {name: asyncio.Event() for name in CHANNELS}
+        self._stepped = asyncio.Event()  # a channel opened, or the connection ended
         for _ in range(video):
             transceiver = self._pc.addTransceiver("video", direction="recvonly")
             if codec is not None:
@@ -84,7 +84,7 @@ class Peer:
             channel = self._pc.createDataChannel(name, ordered=False, maxRetransmits=0)
         else:
             channel = self._pc.createDataChannel(name)
-        channel.on("open", self._open[name].set)
+        channel.on("open", self._stepped.set)
         channel.on("message", self._on_message)
         channel.on("close", lambda: self.lose(f"the console closed the channel {name}"))
         return channel
@@ -98,6 +98,7 @@ class Peer:
         if not self._closing and not self.ended.is_set():
             self.why = why
             self.ended.set()
+            self._stepped.set()
 
     async def negotiate(self) -> list[Section]:
         """Offer, and take the answer: its media sections.
@@ -143,11 +144,14 @@ class Peer:
             raise ConnectFailed(f"the console's answer cannot be read: {error}") from error
         try:
             async with asyncio.timeout(seconds):
-                for opened in self._open.values():
-                    await opened.wait()
+                while not self.ended.is_set() and any(each.readyState != "open" for each in self._channels.values()):
+                    self._stepped.clear()
+                    await self._stepped.wait()
         except TimeoutError:
             detail = f"no data channel after {seconds:g} s: is UDP between here and the console blocked?"
             raise ConnectFailed(detail) from None
+        if self.ended.is_set():
+            raise ConnectFailed(self.why)
 
     def send(self, channel: ChannelName, message: ClientMessage) -> None:
         """Send; on `control`, unless others still wait: an old command must not leave behind a newer one."""

@@ -27,6 +27,7 @@ IDLE = 0.2  # s; 5 Hz
 ECHO = 0.020  # s; longer than the console's own path to the robot and back
 LOSSY_SPELL = 60.0  # s to go on doubling after the last loss that was seen
 PATIENT_REASONS = {"late", "out_of_order", "rested"}  # another try, on fresh feedback, can succeed
+NEEDLESS = 0.25  # an answer that follows the last repeat within this part of the whole wait answers an earlier sending
 NEVER = float("inf")
 
 
@@ -242,10 +243,10 @@ class Pilot:
         self._flight = None
         taken = now - flight.first_sent_at
         self.samples.append(taken)
-        if flight.sends == 1:  # Karn; an echo makes a sample at most ECHO too long, which is the safe side
-            self.timer.sample(taken)
-        elif now - flight.last_sent_at > (self.timer.round_trip or 0.0) / 2:  # sooner: the repeat was needless
-            self.loss(now)
+        if flight.sends == 1 or now - flight.last_sent_at < NEEDLESS * taken:
+            self.timer.sample(taken)  # an echo makes a sample at most ECHO too long, which is the safe side
+        else:
+            self.loss(now)  # and no sample, by Karn's rule
         if flight.ticket:
             self._outcomes.append(Outcome(flight.ticket, feedback, None))
 
