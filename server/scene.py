@@ -98,7 +98,8 @@ class SceneView:
 
 
 def _start_viser() -> viser.ViserServer:
-    server = viser.ViserServer(host="127.0.0.1", port=0, label="Lockstep", verbose=False)
+    server = viser.ViserServer(host="127.0.0.1", port=0, label="Scene", verbose=False)
+    server.gui.main_panel.minimize()
     server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
     return server
 

@@ -17,9 +17,11 @@ GRID = (44, 52, 64)
 GRID_SECTION = (66, 78, 94)
 ARROW = (255, 176, 32)
 RANGES = (64, 200, 255)
+LABEL_LIFT = 0.4  # m above the highest joint
+FLOOR_LIFT = 0.004  # m, so that the grid shows on a floor of the robot's own
 STOPPED = " · STOPPED"
 ARROW_LENGTH = 0.6  # m at full scale
-MIN_VIEW, MAX_VIEW = 0.8, 6.0  # m, how far the first look stands off
+MIN_VIEW, MAX_VIEW = 1.6, 6.0  # m, how far the first look stands off
 
 Triple = tuple[float, float, float]
 
@@ -43,7 +45,7 @@ class SceneModel:
                 _add_geom(server, f"{self._paths[body.name]}/geom{number}", geom)
         self._moving = [body for body in description.bodies if body.joints and body.name in self._paths]
         self._place_fixed_bodies()
-        self._label = server.scene.add_label("/event", "", position=self._label_position(), anchor="bottom-center")
+        self._label = self._add_label()
         self._arrow = self._add_arrow()
         self._points = self._add_points()
 
@@ -69,6 +71,7 @@ class SceneModel:
             cell_color=GRID,
             section_color=GRID_SECTION,
             fade_distance=14.0,
+            position=(0.0, 0.0, FLOOR_LIFT),
         )
         x, y, z = self._center()
         distance = self._radius() * 1.9
@@ -99,9 +102,14 @@ class SceneModel:
                 self._frames[body.name].position = body.position
                 self._frames[body.name].wxyz = body.orientation
 
-    def _label_position(self) -> Triple:
-        x, y, z = self._center()
-        return (x, y, z + self._radius())
+    def _add_label(self) -> viser.LabelHandle:
+        """The event reference, above what moves first, and moving with it."""
+        positions = world_positions(self._description, {})
+        top = max((z for _, _, z in positions), default=0.0) + LABEL_LIFT
+        root = next((self._paths[body.name] for body in self._moving), "/robot")
+        return self._server.scene.add_label(
+            f"{root}/event", "", position=(0.0, 0.0, top), anchor="bottom-center", font_screen_scale=1.4
+        )
 
     def _add_arrow(self) -> viser.ArrowsHandle | None:
         sensor = self._description.wrench
