@@ -53,12 +53,15 @@ __all__ = [
     "keep_extensions",
     "offered_direction",
     "offered_extensions",
+    "own_addresses",
     "restrict_ice_hosts",
 ]
 
 SOCKET_BACKLOG_BYTES = 64 * 1024  # a peer with more unsent bytes than this gets no more frames for now
 RECEIVE_QUEUE_DATAGRAMS = 1024
 DATAGRAM_MAX = 1500  # bytes, what pylibsrtp takes
+
+_gather_host_addresses = aioice.ice.get_host_addresses  # aioice's own, before `restrict_ice_hosts`
 
 
 def restrict_ice_hosts(addresses: Sequence[str]) -> None:
@@ -69,6 +72,11 @@ def restrict_ice_hosts(addresses: Sequence[str]) -> None:
         return [address for address in chosen if (use_ipv6 if ":" in address else use_ipv4)]
 
     aioice.ice.get_host_addresses = get_host_addresses
+
+
+def own_addresses() -> list[str]:
+    """The addresses of this machine's interfaces that ICE would gather by itself: all but loopback and link-local."""
+    return list(_gather_host_addresses(use_ipv4=True, use_ipv6=True))
 
 
 def create_peer_connection() -> RTCPeerConnection:
@@ -258,8 +266,11 @@ class MediaSender(RTCRtpSender):
         now = time.monotonic()
         for sequence_number in lost:
             packet = self._packets.retransmission(sequence_number, now)
-            if packet is not None:
-                path[0].sendto(self.transport._tx_srtp.protect(packet), path[1])
+            try:
+                if packet is not None:
+                    path[0].sendto(self.transport._tx_srtp.protect(packet), path[1])
+            except (pylibsrtp.Error, ValueError, OSError):
+                self._packets.stats.failed += 1
 
 
 def _backlog(transport: Any) -> int:

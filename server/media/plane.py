@@ -35,6 +35,7 @@ from server.media.video_stream import VideoStream
 
 __all__ = ["MediaPlane", "MediaSettings", "PeerMedia"]
 
+MAX_LINK_TIME = 1e9  # s; no monotonic clock gets there, and NaN is not below it
 REPORT_SECONDS = 1.0  # between sender reports of a peer, on average
 
 AnyStream = VideoStream | AudioStream
@@ -86,6 +87,9 @@ class MediaPlane:
         stream = self._streams.get(media.stream)
         if stream is None:
             self._metrics.dropped.labels("", "unknown_stream").inc()
+            return
+        if not 0 <= media.time <= MAX_LINK_TIME:
+            self._metrics.dropped.labels(stream.name, "bad_time").inc()
             return
         self._capture_clock.observe(media.time, self._wall_clock())
         stream.feed(media, now, self._capture_clock.wall_time(media.time))

@@ -1,6 +1,7 @@
 """One camera or microphone: what is common to both."""
 
 import asyncio
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,6 +19,8 @@ from server.media.peer_stream import PeerStream
 from server.media.settings import MediaSettings
 
 __all__ = ["Encoded", "Stream"]
+
+logger = logging.getLogger(__name__)
 
 Job = TypeVar("Job")
 
@@ -52,6 +55,7 @@ class Stream(ABC, Generic[Job]):
         self._fan_out = fan_out
         self._metrics = metrics
         self._last_stamp: int | None = None
+        self._reported = False  # that the worker failed
         self._wake = asyncio.Event()
         self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"media-{name}")
         self._peers = metrics.peers.labels(name)
@@ -102,14 +106,28 @@ class Stream(ABC, Generic[Job]):
                 await self._wake.wait()
                 self._wake.clear()
                 while (job := self._next_job()) is not None:
-                    for encoded in await loop.run_in_executor(self._thread, self._work, job):
+                    try:
+                        results = await loop.run_in_executor(self._thread, self._work, job)
+                    except Exception:  # a codec library did what it never should; the stream must go on
+                        self._failed()
+                        continue
+                    for encoded in results:
                         self._finish(encoded)
         finally:
             await asyncio.to_thread(self._thread.shutdown)
 
+    def _failed(self) -> None:
+        if not self._reported:
+            logger.exception("stream %s: the worker failed; further failures are only counted", self.name)
+        self._reported = True
+        self._drop("worker_failed")
+        for output in self.outputs.values():
+            output.keyframes.request()
+
     def _finish(self, encoded: Encoded) -> None:
         if encoded.error is not None:
             self._drop(encoded.error.name)
+            encoded.output.keyframes.request()  # it may have been a keyframe that somebody waits for
         else:
             encoded.output.encode_seconds.observe(encoded.seconds)
         for frame in encoded.frames:

@@ -8,7 +8,7 @@ import av
 
 from robot_bridge.protocol.description import Camera
 from robot_bridge.protocol.messages import Media
-from server.media.errors import MediaError, UnsupportedCodecError
+from server.media.errors import MediaError, PayloadError, UnsupportedCodecError
 from server.media.fanout import FanOut
 from server.media.frame import EncodedFrame
 from server.media.media_clock import PictureClock
@@ -77,7 +77,9 @@ class VideoStream(Stream[PictureJob]):
             capture_time=output.monotone(capture_time),
             media_time=self._clock.timestamp(media.time),
         )
-        if output.targets and frame.payloads(trailer=False):
+        if not frame.payloads(trailer=False):
+            self._drop(PayloadError.name)
+        elif output.targets:
             self._publish(output, frame)
 
     def _next_job(self) -> PictureJob | None:

@@ -1,0 +1,63 @@
+"""What tests of the whole media path do with a plane and its viewers."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, cast
+
+from robot_bridge.protocol.carriers import (
+    CAPTURE_TIME_URI,
+    EVENT_REFERENCE_URI,
+    Carrier,
+    unpack_capture_time,
+    unpack_event_reference,
+)
+from robot_bridge.protocol.messages import Media
+from server.media.plane import MediaPlane
+from tests.server.media.viewer import (
+    TIMEOUT,
+    Received,
+    Viewer,
+)
+
+Make = Callable[[int, float], Media]
+
+
+async def stream(plane: MediaPlane, viewer: Viewer, kind: str, make: Make, count: int, first: int = 1) -> None:
+    """Feed media one by one, each when the one before was received; event i is captured at i / 50 s."""
+    for i in range(first, first + count):
+        before = timestamps(viewer, kind)
+        plane.feed(make(i, i / 50), i / 50)
+        if kind == "video" or i > first + 1:  # a resampler keeps some of the first sound back
+            await viewer.until(lambda before=before: timestamps(viewer, kind) > before)  # type: ignore[misc]
+
+
+def timestamps(viewer: Viewer, kind: str) -> int:
+    return len({received.packet.timestamp for received in viewer.of(kind) if received.packet.marker or kind == "audio"})
+
+
+def value(plane: MediaPlane, name: str, **labels: str) -> float:
+    """A metric of the plane; 0 before it first counted."""
+    registry = cast(Any, plane).registry
+    return registry.get_sample_value(f"lockstep_media_{name}", labels) or 0.0
+
+
+async def refused(plane: MediaPlane, media: Media) -> None:
+    """Feed a medium and wait until the stream's worker is through with it."""
+    stream = cast(Any, plane)._streams[media.stream]
+    finish, finished = stream._finish, asyncio.Event()
+
+    def spy(encoded: Any) -> None:
+        finish(encoded)
+        finished.set()
+
+    stream._finish = spy
+    plane.feed(media, media.time)
+    async with asyncio.timeout(TIMEOUT):
+        await finished.wait()
+    stream._finish = finish
+
+
+def read_stamp(carrier: Carrier, received: Received) -> int | None:
+    if carrier == "native":
+        return unpack_event_reference(received.extensions[EVENT_REFERENCE_URI])
+    return unpack_capture_time(received.extensions[CAPTURE_TIME_URI])

@@ -1,0 +1,219 @@
+"""The whole media path with real peers on loopback: bad input and failures are counted, and media flow on."""
+
+import asyncio
+from contextlib import AsyncExitStack
+from typing import Any, NoReturn, cast
+
+import pylibsrtp
+import pytest
+from aiortc.rtp import RtcpPsfbPacket, RtcpRtpfbPacket
+
+from robot_bridge.protocol.carriers import (
+    EVENT_REFERENCE_URI,
+)
+from server.media.aiortc_private import MediaSender, create_peer_connection
+from server.media.frame import EncodedFrame
+from server.media.packetise import packetise_sound
+from server.media.picture_encoder import H264Encoder
+from server.media.sound_encoder import OpusEncoder
+from tests.server.media.feeding import read_stamp, refused, stream, value
+from tests.server.media.viewer import (
+    TIMEOUT,
+    picture,
+    running_plane,
+    sound,
+    viewing,
+)
+
+
+async def test_a_medium_older_than_the_one_before_is_dropped_and_counted() -> None:
+    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
+        await stream(plane, viewer, "video", picture, 2, first=5)
+        plane.feed(picture(4, 1.0), 1.0)
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="stale_stamp") == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "stage"),
+    [
+        ({"payload": b"short"}, "bad_payload"),
+        ({"width": 0}, "bad_payload"),
+        ({"codec": "mjpeg", "payload": b"\xff\xd8 no picture"}, "bad_payload"),
+        ({"codec": "pcm_s16le"}, "unsupported_codec"),
+    ],
+)
+async def test_bad_pictures_are_counted_and_the_next_good_one_passes(changes: dict[str, Any], stage: str) -> None:
+    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
+        await refused(plane, picture(1, 0.0, **changes))
+        await stream(plane, viewer, "video", picture, 1, first=2)
+        assert value(plane, "frames_dropped_total", stream="camera0", stage=stage) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "stage"),
+    [
+        ({"payload": b"odd"}, "bad_payload"),
+        ({"channels": 3}, "bad_payload"),
+        ({"sample_rate": 10}, "bad_payload"),
+        ({"codec": "mjpeg"}, "unsupported_codec"),
+    ],
+)
+async def test_bad_sound_is_counted_and_the_next_good_one_passes(changes: dict[str, Any], stage: str) -> None:
+    async with running_plane() as plane, viewing(plane, ["audio"]) as viewer:
+        await refused(plane, sound(1, 0.0, **changes))
+        await stream(plane, viewer, "audio", sound, 4, first=2)
+        assert value(plane, "frames_dropped_total", stream="microphone0", stage=stage) == 1
+
+
+@pytest.mark.parametrize("time", [float("nan"), float("inf"), -1.0, 1e300])
+async def test_an_impossible_capture_time_is_counted(time: float) -> None:
+    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
+        plane.feed(picture(1, time), 0.0)
+        await stream(plane, viewer, "video", picture, 1, first=2)
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="bad_time") == 1
+
+
+async def test_a_keyframe_that_failed_is_tried_again() -> None:
+    async with running_plane(keyframe_spacing_seconds=0.0) as plane, viewing(plane, ["video"]) as viewer:
+        await stream(plane, viewer, "video", picture, 1)
+        async with viewing(plane, ["video"]) as second:
+            await refused(plane, picture(2, 0.04, payload=b"short"))  # would have been the joiner's keyframe
+            await stream(plane, second, "video", picture, 1, first=3)
+
+
+async def test_a_worker_that_fails_is_reported_once_counted_and_goes_on(caplog: pytest.LogCaptureFixture) -> None:
+    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
+        camera = cast(Any, plane)._streams["camera0"]
+        work, failed = camera._work, camera._failed
+        failures = asyncio.Queue[None]()
+
+        def fail(job: Any) -> Any:
+            raise MemoryError
+
+        def count() -> None:
+            failed()
+            failures.put_nowait(None)
+
+        camera._work, camera._failed = fail, count
+        for i in range(1, 4):
+            plane.feed(picture(i, i / 30), i / 30)
+            async with asyncio.timeout(TIMEOUT):
+                await failures.get()
+        camera._work = work
+        await stream(plane, viewer, "video", picture, 2, first=50)
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="worker_failed") == 3
+        assert len([record for record in caplog.records if record.name == "server.media.stream"]) == 1
+
+
+async def test_an_unknown_stream_is_counted() -> None:
+    async with running_plane() as plane:
+        plane.feed(picture(1, 0.0, "no such camera"), 0.0)
+        assert value(plane, "frames_dropped_total", stream="", stage="unknown_stream") == 1
+
+
+async def test_pictures_encoded_at_the_robot_reach_h264_peers_and_are_refused_for_vp8() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane())
+        viewer = await stack.enter_async_context(viewing(plane, ["video"], uris={EVENT_REFERENCE_URI: 9}))
+        await stack.enter_async_context(viewing(plane, ["video"], codecs=["VP8"]))
+        delta = picture(1, 0.0, codec="h264", payload=b"\x00\x00\x00\x01\x61delta", keyframe=False)
+        key = picture(2, 0.1, codec="h264", payload=b"\x00\x00\x00\x01\x65key", keyframe=True)
+        empty = picture(1, 0.0, codec="h264", payload=b"no start code")
+        for medium in (empty, delta, key):
+            plane.feed(medium, medium.time)
+        await viewer.until(lambda: bool(viewer.of("video")))
+        assert [(r.packet.payload, read_stamp("native", r)) for r in viewer.of("video")] == [(b"\x65key", 2)]
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="unsupported_codec") == 3
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="bad_payload") == 1
+
+
+async def test_malformed_packets_of_a_peer_are_counted_and_media_flow_on() -> None:
+    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
+        await stream(plane, viewer, "video", picture, 2)
+        peer = cast(Any, viewer.pc.getTransceivers()[0].receiver.transport)
+        # REMB that announces more sources than it has: aiortc's router does not expect it.
+        short = RtcpPsfbPacket(fmt=15, ssrc=1, media_ssrc=0, fci=b"REMB\x05\x00\x00\x00")
+        await peer._send_rtp(bytes(short))
+        theirs = cast(Any, viewer.server.getTransceivers()[0].receiver.transport).transport._connection
+        theirs._nominated[1].protocol.datagram_received(b"", ("127.0.0.1", 9))
+        await peer.transport._send(b"\x80" + bytes(1600))
+        await peer.transport._send(b"\x80" + bytes(40))  # not SRTP
+        sender = viewer.media._deliveries[0].sender
+        nack = RtcpRtpfbPacket(fmt=1, ssrc=1, media_ssrc=sender._ssrc, lost=[1, 2, 3])
+        await peer._send_rtp(bytes(nack))
+        await viewer.until(lambda: viewer.media.stats[viewer.media.streams[0].mid].not_retransmitted == 3)
+        assert value(plane, "malformed_from_peers_total", kind="malformed") == 1
+        assert value(plane, "malformed_from_peers_total", kind="datagram_size") == 2
+        await stream(plane, viewer, "video", picture, 2, first=3)
+
+
+async def test_a_picture_encoder_that_fails_starts_afresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
+        with monkeypatch.context() as patch:
+            patch.setattr(H264Encoder, "_open", refuse)
+            await refused(plane, picture(1, 0.0))
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="encode_failed") == 1
+        await stream(plane, viewer, "video", picture, 2, first=30)
+
+
+async def test_a_sound_encoder_that_fails_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with running_plane() as plane, viewing(plane, ["audio"]) as viewer:
+        with monkeypatch.context() as patch:
+            patch.setattr(OpusEncoder, "_compress", refuse)
+            await refused(plane, sound(1, 0.0))
+            await refused(plane, sound(1, 0.02))
+        assert value(plane, "frames_dropped_total", stream="microphone0", stage="encode_failed") == 1
+        await stream(plane, viewer, "audio", sound, 4, first=3)
+
+
+def refuse(*args: Any) -> NoReturn:
+    raise ValueError("no")
+
+
+async def test_a_sender_without_a_connected_transport_sends_nothing() -> None:
+    frame = EncodedFrame(b"x", packetise_sound, keyframe=True, marker=True, stamp=1, capture_time=0.0, media_time=0)
+    async with running_plane() as plane:
+        async with viewing(plane, ["video"]) as viewer:
+            sender = viewer.media._deliveries[0].sender
+        assert sender.transmit(frame) == (0, 0)
+        sender.report()
+        sender._retransmit_all([1])
+        await sender._handle_rtcp_packet(RtcpRtpfbPacket(fmt=1, ssrc=1, media_ssrc=sender._ssrc, lost=[1]))
+        await sender.stop()
+        pc = create_peer_connection()
+        try:
+            new = MediaSender(
+                pc.addTransceiver("video"),
+                "camera0",
+                trailer=False,
+                on_ready=refuse,
+                on_keyframe_request=refuse,
+                on_stopped=lambda: None,
+            )
+            assert new.transmit(frame) == (0, 0)
+            assert new.stats.packets == 0
+            new.report()
+            await new._handle_rtcp_packet(RtcpPsfbPacket(fmt=1, ssrc=1, media_ssrc=1))
+            await new.stop()
+        finally:
+            await pc.close()
+
+
+async def test_what_encryption_refuses_is_counted_and_the_next_frame_passes() -> None:
+    async with running_plane() as plane, viewing(plane, ["video"], priority=True) as viewer:
+        await stream(plane, viewer, "video", picture, 2)
+        sender = viewer.media._deliveries[0].sender
+        session = cast(Any, sender.transport)._tx_srtp
+        sent = viewer.received[-1].packet.sequence_number
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(session, "protect", refuse)
+            patch.setattr(session, "protect_rtcp", refuse_srtp)
+            await refused(plane, picture(3, 1.0))
+            sender._retransmit_all([sent])
+            sender.report()
+            assert sender.stats.failed == 3
+        await stream(plane, viewer, "video", picture, 2, first=60)
+
+
+def refuse_srtp(*args: Any) -> NoReturn:
+    raise pylibsrtp.Error("no")
