@@ -16,7 +16,7 @@ from server import api, scene_proxy, whep
 from server.access import Access
 from server.console import Console
 from server.errors import ConsoleError, http_error
-from server.media.aiortc_private import restrict_ice_hosts
+from server.media.aiortc_private import own_addresses, restrict_ice_hosts
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
 from server.page import page_router
@@ -88,11 +88,15 @@ def make_access(settings: Settings) -> Access:
 
 
 def _restrict_ice(settings: Settings) -> None:
-    """A console that only this machine can reach offers only loopback to its peers."""
+    """A console bound to loopback offers loopback, which aioice never gathers, and this machine's own addresses.
+
+    Firefox pairs loopback with nothing unless a hidden preference says so; it reaches the console by an own address.
+    Only who got ICE credentials over the loopback-bound signalling can use either.
+    """
     if settings.ice_hosts:
         restrict_ice_hosts(settings.ice_hosts)
     elif settings.bound_to_loopback:
-        restrict_ice_hosts([settings.host if settings.host != "localhost" else LOOPBACK])
+        restrict_ice_hosts([settings.host if settings.host != "localhost" else LOOPBACK, *own_addresses()])
 
 
 async def _start_scene(settings: Settings, metrics: Metrics) -> SceneView | None:

@@ -25,7 +25,7 @@ class Settings(BaseSettings):
     host: str = "127.0.0.1"  # address that HTTP listens on
     port: Annotated[int, Field(ge=0, le=65535)] = 8000  # 0: any free port
     robot: str = "tcp://127.0.0.1:5600"  # the robot bridge
-    ice_hosts: Addresses = ()  # addresses offered to peers; empty: loopback when bound to it, else all interfaces
+    ice_hosts: Addresses = ()  # addresses offered to peers; empty: all interfaces, and loopback when bound to it
     allowed_origins: Addresses = ()  # other origins whose pages may use the HTTP API, "https://example.org"
     secret: SecretStr = Field(default_factory=lambda: SecretStr(secrets.token_urlsafe(MIN_SECRET_BYTES)))
     token_seconds: Annotated[float, Field(gt=0)] = 7 * 24 * 3600.0

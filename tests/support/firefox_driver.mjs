@@ -11,7 +11,6 @@ const browser = await puppeteer.launch({
   headless: true,
   args: ["--no-sandbox"],
   extraPrefsFirefox: {
-    "media.peerconnection.ice.loopback": true,
     "media.autoplay.default": 0,
     "media.autoplay.blocking_policy": 0,
     "app.update.enabled": false,
@@ -27,11 +26,21 @@ page.on("pageerror", (error) => errors.push(String(error)));
 const verbs = {
   open: ({ url }) => page.goto(url).then(() => null),
   evaluate: ({ expression }) => page.evaluate(expression),
-  wait: ({ expression, timeout }) => page.waitForFunction(expression, { timeout }).then(() => null),
+  wait: ({ expression, timeout }) => waitFor(expression, timeout),
   key: ({ code, down }) => (down ? page.keyboard.down(code) : page.keyboard.up(code)).then(() => null),
   screenshot: ({ path }) => page.screenshot({ path }).then(() => null),
   errors: async () => errors,
 };
+
+// Asks again and again from here: the page's content security policy forbids evaluating strings inside it.
+async function waitFor(expression, timeout) {
+  const end = Date.now() + timeout;
+  while (!(await page.evaluate(expression))) {
+    if (Date.now() > end) throw new Error(`never came true: ${expression}`);
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+  return null;
+}
 
 for await (const line of createInterface({ input: process.stdin })) {
   const request = JSON.parse(line);

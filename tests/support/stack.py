@@ -15,6 +15,7 @@ __all__ = ["Stack", "running_stack"]
 
 START_SECONDS = 40.0  # a loaded two-core machine importing everything and opening GL
 STOP_SECONDS = 15.0
+SECRET = "only for tests, only on loopback, 32 bytes or more"
 
 
 @dataclass
@@ -37,6 +38,13 @@ class Stack:
     event_log: Path
     output: list[str] = field(default_factory=list)  # its last lines on standard error
 
+    def bridge_pid(self) -> int:
+        """The bridge's process: the one child of `lockstep up`."""
+        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        if len(children) != 1:
+            raise RuntimeError(f"expected one child process, found {children}")
+        return int(children[0])
+
     def events(self, kind: str) -> Iterator[dict[str, Any]]:
         """The bridge's records of one kind so far."""
         for line in self.event_log.read_text().splitlines():
@@ -53,9 +61,10 @@ async def running_stack(
     event_log = directory / "events.jsonl"
     command = [
         *(str(Path(sys.executable).with_name("lockstep")), "up", "--json", "--robot", robot),
-        *("--port", str(port), "--event-log", str(event_log), *extra),
+        *("--port", str(port), "--robot-port", "0", "--event-log", str(event_log), *extra),
     ]
-    environment = os.environ | {"PYTHONWARNINGS": "default"}
+    # One secret for all runs of a test, so that a page's token outlives a restart of the console.
+    environment = os.environ | {"PYTHONWARNINGS": "default", "LOCKSTEP_SECRET": SECRET}
     process = await asyncio.create_subprocess_exec(
         *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, env=environment
     )

@@ -1,0 +1,72 @@
+"""What breaks comes back by itself, without a reload, at the event that then holds."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser
+
+from tests.e2e.console_page import LEFT_Y, RB, open_console
+from tests.support.stack import Stack, running_stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+
+
+async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.arm()
+        await console.drive_forward()
+        await console.until("s.event > 10")
+        epoch = (await console.stats())["epoch"]
+        os.kill(stack.bridge_pid(), signal.SIGKILL)
+        await console.until("!s.armed")
+        await console.press(RB, False)
+        await console.tilt(LEFT_Y, 0)
+        await console.until(f"s.connected && s.epoch !== {epoch!r} && s.streams.overview?.rendered > 3", 60)
+        assert (await console.stats())["event"] < 10, "references start anew with the epoch"
+        await console.arm()
+        await console.drive_forward()
+
+
+async def test_a_frozen_bridge_counts_as_a_dead_link_and_resumes_in_the_same_epoch(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.arm()
+        await console.drive_forward()
+        pid = stack.bridge_pid()
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            await console.until("!s.armed")
+            await console.page.get_by_text("robot link", exact=False).first.wait_for()
+        finally:
+            os.kill(pid, signal.SIGCONT)
+        await console.press(RB, False)
+        await console.tilt(LEFT_Y, 0)
+        await console.until("s.connected && s.at_rest === true && s.seat && s.seat.mine", 60)
+        await console.arm()
+        await console.drive_forward()
+
+
+async def test_a_restarted_console_is_found_again_without_a_reload(tmp_path: Path, chromium: Browser) -> None:
+    async with running_stack(tmp_path) as first:
+        port = int(first.console.rsplit(":", 1)[1])
+        page = open_console(chromium, first.operator)
+        console = await page.__aenter__()
+        await console.until_live()
+    try:
+        await console.until("!s.connected")
+        await console.page.evaluate("window.notReloaded = true")
+        async with running_stack(tmp_path, port=port):
+            await console.until_live()
+            assert await console.page.evaluate("window.notReloaded")
+            await console.arm()
+            await console.drive_forward()
+            await console.press(RB, False)
+    finally:
+        await page.__aexit__(None, None, None)
