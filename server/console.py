@@ -1,6 +1,7 @@
 """The console: the one owner of its state. Hears the robot and the peers, decides by the cores, tells everyone."""
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
@@ -70,7 +71,6 @@ class Console:
         self._viewer = viewer
         self._desk = CommandDesk(self.clock, self.seat)
         self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.operators, self.peers.observers)
-        self._loop = asyncio.get_running_loop()
         self._forwarded_at = 0.0  # when the command in flight left
         self._shown_stop = StopState()  # what everyone was told last
         self._link_was_up = False
@@ -100,7 +100,7 @@ class Console:
     def stop(self, by: str, where: str, reason: str) -> bool:
         """Latch the stop. False when no link lives: then it is sent as soon as one does, before all else."""
         self._metrics.stops.labels(where).inc()
-        outcome = self._desk.stop(by, reason, self._loop.time())
+        outcome = self._desk.stop(by, reason, time.monotonic())
         if isinstance(outcome, Absorbed):
             return True
         stop = outcome.message
@@ -138,7 +138,7 @@ class Console:
             peer.send("session", self.peers.participants())
 
     def message_received(self, peer: Peer, channel: ChannelName, message: ClientMessage) -> None:
-        self.seat.heard(peer.id, self._loop.time())
+        self.seat.heard(peer.id, time.monotonic())
         match message:
             case Command():
                 self._settle(peer, "control", self._desk.command(peer.id, message), command=True)
@@ -151,7 +151,7 @@ class Console:
             case Reset():
                 self._reset_by(peer)
             case SeatRequest():
-                self._seat_step(peer, self.seat.request(peer.id, peer.name, peer.role, self._loop.time()))
+                self._seat_step(peer, self.seat.request(peer.id, peer.name, peer.role, time.monotonic()))
             case SeatRelease():
                 self._seat_step(peer, self.seat.release(peer.id))
             case Rename():
@@ -203,7 +203,7 @@ class Console:
             self.peers.tell("session", self.state_of_robot(self.robot.description))
 
     def feedback_received(self, feedback: Feedback) -> None:
-        now = self._loop.time()
+        now = time.monotonic()
         if not self.clock.observe(feedback, now):
             return
         answered = self._desk.in_flight
@@ -227,7 +227,7 @@ class Console:
             peer.send("control", refusal)
 
     def media_received(self, media: Media) -> None:
-        self._media.feed(media, self._loop.time())
+        self._media.feed(media, time.monotonic())
 
     # what follows from the cores' outcomes
 
@@ -248,7 +248,7 @@ class Console:
         if isinstance(message, Stop):
             return self.robot.send_stop(message)
         if isinstance(message, Command):
-            self._forwarded_at = self._loop.time()
+            self._forwarded_at = time.monotonic()
         return self.robot.send(message)
 
     def _reset_by(self, peer: Peer) -> None:
@@ -296,7 +296,7 @@ class Console:
     async def _watch_seat(self) -> None:
         while True:
             await asyncio.sleep(self._settings.seat_timeout / SEAT_CHECKS)
-            self._seat_step(None, self.seat.expire(self._loop.time()))
+            self._seat_step(None, self.seat.expire(time.monotonic()))
 
     async def _share_participants(self) -> None:
         shown = Participants(participants=[])
