@@ -1,0 +1,1 @@
+"""What Lockstep's figures are, measured: `python -m bench`."""

@@ -1,0 +1,99 @@
+"""Events, one by one: sent, executed by the robot, answered."""
+
+import asyncio
+import math
+import random
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+from client import Console
+from robot_bridge.link_client import RobotLink
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Command, Feedback
+from robot_bridge.protocol.serial import event_after
+
+__all__ = ["Pause", "Trip", "console_trips", "link_trips", "round_and_round"]
+
+SPEEDS = {"base.vx": 0.15, "base.wz": 0.6, "tool.vz": 0.03}  # the base drives a circle of 0.25 m; the tool nods
+TICK = 0.004  # s, the robot's control tick
+MARGIN = 0.0005  # s on top of the shortest interval between two events
+
+
+class Trip(NamedTuple):
+    """One event as the operator's side saw it."""
+
+    event: int
+    sent: float  # s, monotonic
+    answered: float
+
+    @property
+    def seconds(self) -> float:
+        return self.answered - self.sent
+
+
+def round_and_round(description: RobotDescription) -> Callable[[float], list[float]]:
+    """Values of each axis at a time; a robot that follows them stays where it is."""
+
+    def values(now: float) -> list[float]:
+        nod = math.cos(now)
+        found = {"base.vx": 1.0, "base.wz": 1.0, "tool.vz": nod}
+        return [SPEEDS.get(axis.name, 0.0) * found.get(axis.name, 0.0) for axis in description.axes]
+
+    return values
+
+
+class Pause:
+    """Between two commands: what the event rate demands, and up to a tick more.
+
+    Without that the commands would all meet the control tick at the same phase.
+    """
+
+    def __init__(self, description: RobotDescription, seed: int) -> None:
+        self._interval = 1 / description.max_event_rate + MARGIN
+        self._spread = random.Random(seed)
+
+    async def after(self, sent: float) -> None:
+        until = sent + self._interval + self._spread.random() * TICK
+        await asyncio.sleep(max(0.0, until - time.monotonic()))
+
+
+async def console_trips(console: Console, count: int, *, seconds: float = 60.0, seed: int = 1) -> list[Trip]:
+    """Drive `count` events, or for `seconds`, as fast as the robot's highest event rate allows.
+
+    Each command is asked for only when the gate is open, so that waiting for the event rate is no part of the trip:
+    it is sent by the call itself. The very first, which may meet a gate that is still shut, is not counted.
+    """
+    values, pause = round_and_round(console.description), Pause(console.description, seed)
+    await console.drive(values(time.monotonic()))
+    await pause.after(time.monotonic())
+    trips: list[Trip] = []
+    end = time.monotonic() + seconds
+    while len(trips) < count and time.monotonic() < end:
+        sent = time.monotonic()
+        feedback = await console.drive(values(sent))
+        trips.append(Trip(feedback.event, sent, time.monotonic()))
+        await pause.after(sent)
+    return trips
+
+
+async def link_trips(link: RobotLink, description: RobotDescription, count: int, *, seed: int = 1) -> list[Trip]:
+    """The same straight to the bridge, without a console between."""
+    values, pause = round_and_round(description), Pause(description, seed)
+    newest = await _feedback_of(link, None)
+    trips: list[Trip] = []
+    while len(trips) < count:
+        sent = time.monotonic()
+        event = event_after(newest.event)
+        link.send(Command(event=event, issue=newest.issue, values=values(sent)))
+        newest = await _feedback_of(link, event)
+        trips.append(Trip(event, sent, time.monotonic()))
+        await pause.after(sent)
+    return trips
+
+
+async def _feedback_of(link: RobotLink, event: int | None) -> Feedback:
+    async for message in link:
+        if isinstance(message, Feedback) and event in (None, message.event):
+            return message
+    raise RuntimeError("the robot link was closed")

@@ -1,0 +1,134 @@
+"""Processes that a measurement needs: started, ready, measured, ended."""
+
+import asyncio
+import json
+import os
+import shutil
+import signal
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+__all__ = ["ProcessFailed", "Running", "running_process"]
+
+READY_SECONDS = 60.0
+STOP_SECONDS = 15.0
+LINE_LIMIT = 1 << 20  # bytes
+KEPT_LINES = 30
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+class ProcessFailed(Exception):
+    """A process ended, or said nothing in time; its last lines of output say why."""
+
+    def __init__(self, command: Sequence[str], output: Sequence[str]) -> None:
+        super().__init__(command, output)
+        self.command = command
+        self.output = output
+
+    def __str__(self) -> str:
+        return "\n".join([f"{' '.join(self.command)} did not do its work", *self.output])
+
+
+class Running:
+    """A process that speaks JSON lines on its standard output."""
+
+    def __init__(self, process: asyncio.subprocess.Process, command: Sequence[str]) -> None:
+        self.output: list[str] = []  # last lines on standard error
+        self._process = process
+        self._command = command
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def cpu_seconds(self) -> float:
+        """Processor time used so far, all threads, user and system (proc(5), fields 14 and 15)."""
+        fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / TICKS
+
+    async def read(self, seconds: float) -> dict[str, Any]:
+        """The next line of its output.
+
+        Raises:
+            ProcessFailed: it ended, or `seconds` passed.
+        """
+        if self._process.stdout is None:
+            raise ProcessFailed(self._command, self.output)
+        try:
+            async with asyncio.timeout(seconds):
+                line = await self._process.stdout.readline()
+        except TimeoutError as error:
+            raise ProcessFailed(self._command, self.output) from error
+        if not line:
+            await self._process.wait()
+            raise ProcessFailed(self._command, self.output)
+        found: dict[str, Any] = json.loads(line)
+        return found
+
+    async def ask(self, question: str, seconds: float) -> dict[str, Any]:
+        """Write a line, read one; raises as `read`."""
+        if self._process.stdin is not None:
+            self._process.stdin.write(question.encode() + b"\n")
+        return await self.read(seconds)
+
+    def pause(self) -> None:
+        """Stop it where it is."""
+        self._signal(signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        """After `pause`."""
+        self._signal(signal.SIGCONT)
+
+    async def keep_output(self) -> None:
+        """Read its standard error until it ends."""
+        if self._process.stderr is None:
+            return
+        async for line in self._process.stderr:
+            self.output.append(line.decode(errors="replace").rstrip())
+            del self.output[:-KEPT_LINES]
+
+    async def end(self) -> None:
+        """End it, gently first."""
+        self._signal(signal.SIGTERM)
+        self._signal(signal.SIGCONT)  # a paused process takes no other signal
+        try:
+            async with asyncio.timeout(STOP_SECONDS):
+                await self._process.wait()
+        except TimeoutError:
+            self._process.kill()
+            await self._process.wait()
+
+    def _signal(self, number: signal.Signals) -> None:
+        """Past the process object: its `send_signal` may reap the child, which its watcher then misses."""
+        if self._process.returncode is None:
+            with suppress(ProcessLookupError):
+                os.kill(self.pid, number)
+
+
+@asynccontextmanager
+async def running_process(
+    *command: str, ready_seconds: float = READY_SECONDS
+) -> AsyncIterator[tuple[Running, dict[str, Any]]]:
+    """The process and the line with which it says that it is ready. Ended on leaving, and when we are killed.
+
+    Raises:
+        ProcessFailed: it did not become ready.
+    """
+    setpriv = shutil.which("setpriv")
+    process = await asyncio.create_subprocess_exec(
+        *(() if setpriv is None else (setpriv, "--pdeathsig", "TERM")),
+        *command,
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+        limit=LINE_LIMIT,
+    )
+    running = Running(process, command)
+    reader = asyncio.get_running_loop().create_task(running.keep_output())
+    try:
+        yield running, await running.read(ready_seconds)
+    finally:
+        await running.end()
+        await reader

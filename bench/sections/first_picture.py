@@ -1,0 +1,63 @@
+"""From opening the page to its first picture: a new Chromium with an empty cache each time.
+
+The time runs from the start of the navigation (the page's time origin) to the first picture that passed the gate and
+was drawn. The baseline is a bare page on a plain aiortc server: one inline script, one video element.
+"""
+
+import sys
+
+from bench.browser import open_probed_page
+from bench.context import Context
+from bench.processes import running_process
+from bench.results import Result
+from bench.samples import median
+from bench.stack import running_stack
+from tests.support.chromium import running_chromium
+
+__all__ = ["run"]
+
+SECTION = "first_picture"
+OPENINGS, QUICK_OPENINGS = 7, 3
+LIMIT_MS = 1000.0
+TIMEOUT_MS = 20_000.0
+OURS = "() => window.lockstep?.stats().first_picture_ms ?? 0"
+THEIRS = "() => window.drawProbe?.firstMs ?? 0"
+BARE = "plain aiortc and a bare page with one <video>"
+
+
+async def run(context: Context) -> list[Result]:
+    count = context.scale(OPENINGS, QUICK_OPENINGS)
+    results: list[Result] = []
+    for robot in context.robots:
+        async with running_stack(robot) as stack:
+            ours = [await _open(stack.operator, OURS) for _ in range(count)]
+            command = (sys.executable, "-m", "bench.baseline_server", stack.bridge.address)
+            async with running_process(*command) as (_, ready):
+                theirs = [await _open(ready["console"], THEIRS) for _ in range(count)]
+        results += _rows(robot, ours, theirs)
+    return results
+
+
+async def _open(link: str, first_picture: str) -> float:
+    """Milliseconds."""
+    async with running_chromium() as browser, open_probed_page(browser, link) as page:
+        found = await page.wait_for_function(first_picture, timeout=TIMEOUT_MS, polling=50)
+        milliseconds: float = await found.json_value()
+        return milliseconds
+
+
+def _rows(robot: str, ours: list[float], theirs: list[float]) -> list[Result]:
+    def row(name: str, value: float, baseline: float) -> Result:
+        return Result(
+            section=SECTION,
+            name=f"{robot}: {name}",
+            value=value,
+            unit="ms",
+            target=LIMIT_MS,
+            baseline=baseline,
+            baseline_name=BARE,
+            samples=len(ours),
+            conditions="operator's page, a new headless Chromium with an empty cache for each opening",
+        )
+
+    return [row("median", median(ours), median(theirs)), row("worst", max(ours), max(theirs))]

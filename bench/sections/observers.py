@@ -1,0 +1,175 @@
+"""A hundred observers besides one operator: does each get every picture, what does one cost, is the operator slowed?
+
+The observers are headless clients in a process of their own; they receive all cameras and the sound, count RTP and
+decode nothing. The operator drives from a third process, before they come and while they are there.
+
+Every picture: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while
+the pictures are counted, at the console's encoder and at each observer. Both counts must grow by the same number.
+Cost: processor time of the console's process (proc(5)) with the observers less that without, shared out among them.
+The baseline is the main camera alone on `bench/baseline_server.py`: aiortc encodes it for each peer.
+"""
+
+import asyncio
+import sys
+import time
+from dataclasses import dataclass
+
+from bench.context import Context
+from bench.driving import console_trips
+from bench.processes import Running, running_process
+from bench.results import Result
+from bench.samples import median, quantile
+from bench.stack import Bridge, Stack, running_stack
+from client import Console
+
+__all__ = ["run"]
+
+SECTION = "observers"
+OBSERVERS, QUICK_OBSERVERS = 100, 10
+EVENTS, QUICK_EVENTS = 400, 60
+BARE_PEERS = 8
+BARE_SECONDS, QUICK_BARE_SECONDS = 8, 3
+CONNECT_SECONDS = 150.0
+ANSWER_SECONDS = 10.0
+SETTLE = 2.0  # s after somebody came
+DRAIN = 0.4  # s until nothing is on its way; the console gives its robot up after 1 s of silence
+ROBOT = "planar"  # the lightest: the machine's cores are for the console and the observers
+CPU_TARGET, SLOWDOWN_TARGET = 0.5, 2.0
+
+
+@dataclass(frozen=True)
+class Spell:
+    """While the operator drives."""
+
+    trips: list[float]  # ms
+    console_cpu: float  # share of a core, in %
+    audience_cpu: float
+
+
+@dataclass(frozen=True)
+class Counts:
+    """With the bridge held still."""
+
+    encoded: dict[str, int]  # pictures, by camera
+    dropped: float  # frames that did not fit an observer's outbox
+    received: list[dict[str, list[int]]]  # by observer: per stream, frames and packets lost
+
+
+async def run(context: Context) -> list[Result]:
+    count = context.scale(OBSERVERS, QUICK_OBSERVERS)
+    events = context.scale(EVENTS, QUICK_EVENTS)
+    async with running_stack(ROBOT) as stack:
+        async with Console(stack.operator, name="operator", decode=False) as operator:
+            await operator.take_seat()
+            await asyncio.sleep(SETTLE)
+            alone = await _drive(stack, None, operator, events)
+            audience_command = (sys.executable, "-m", "bench.audience", stack.observer, str(count))
+            async with running_process(*audience_command, ready_seconds=CONNECT_SECONDS) as (audience, ready):
+                context.say(f"{count} observers connected within {ready['seconds']} s")
+                await asyncio.sleep(SETTLE)
+                before = await _count(stack, audience)
+                await asyncio.sleep(SETTLE)
+                watched = await _drive(stack, audience, operator, events)
+                after = await _count(stack, audience)
+        bare = await _bare(stack.bridge, context.scale(BARE_SECONDS, QUICK_BARE_SECONDS))
+    return _results(count, alone, watched, before, after, bare)
+
+
+async def _drive(stack: Stack, audience: Running | None, operator: Console, events: int) -> Spell:
+    processes = [stack.console] if audience is None else [stack.console, audience]
+    began, used = time.monotonic(), [process.cpu_seconds() for process in processes]
+    trips = await console_trips(operator, events)
+    seconds = time.monotonic() - began
+    shares = [(process.cpu_seconds() - before) / seconds * 100 for process, before in zip(processes, used, strict=True)]
+    await operator.rest()
+    return Spell([trip.seconds * 1000 for trip in trips], shares[0], shares[-1] if audience is not None else 0.0)
+
+
+async def _count(stack: Stack, audience: Running) -> Counts:
+    stack.bridge.process.pause()
+    try:
+        await asyncio.sleep(DRAIN)
+        encoded, dropped, answer = await asyncio.gather(
+            stack.counts("lockstep_media_frames_encoded_total", "stream", codec="VP8"),
+            stack.counts("lockstep_media_frames_dropped_total", "stream", stage="peer_busy"),
+            audience.ask("count", ANSWER_SECONDS),
+        )
+    finally:
+        stack.bridge.process.go_on()
+    return Counts({camera: int(count) for camera, count in encoded.items()}, sum(dropped.values()), answer["counts"])
+
+
+async def _bare(bridge: Bridge, seconds: float) -> dict[int, float]:
+    """Processor time per peer in % of a core, by number of peers."""
+    async with running_process(sys.executable, "-m", "bench.baseline_server", bridge.address) as (server, ready):
+        nobody = await _share(server, seconds)
+        found: dict[int, float] = {}
+        for peers in (1, BARE_PEERS):
+            command = (sys.executable, "-m", "bench.audience", ready["console"], str(peers), "plain")
+            async with running_process(*command):
+                await asyncio.sleep(SETTLE)
+                found[peers] = (await _share(server, seconds) - nobody) / peers
+        return found
+
+
+async def _share(process: Running, seconds: float) -> float:
+    before, began = process.cpu_seconds(), time.monotonic()
+    await asyncio.sleep(seconds)
+    return (process.cpu_seconds() - before) / (time.monotonic() - began) * 100
+
+
+def missed_pictures(before: Counts, after: Counts) -> list[int]:
+    """By observer: pictures of all cameras that were encoded between the counts and did not come.
+
+    Raises:
+        ValueError: none were encoded, so that nothing can be said.
+    """
+    due = {camera: after.encoded[camera] - count for camera, count in before.encoded.items()}
+    if not due or min(due.values()) <= 0:
+        raise ValueError(f"a camera without pictures: {due}")
+    missed = []
+    for earlier, later in zip(before.received, after.received, strict=True):
+        missed.append(sum(abs(due[camera] - (later[camera][0] - earlier[camera][0])) for camera in due))
+    return missed
+
+
+def _results(
+    count: int, alone: Spell, watched: Spell, before: Counts, after: Counts, bare: dict[int, float]
+) -> list[Result]:
+    missed = missed_pictures(before, after)
+    pictures = sum(after.encoded[camera] - encoded for camera, encoded in before.encoded.items())
+    each = (watched.console_cpu - alone.console_cpu) / count
+    conditions = (
+        f"{count} observers of all cameras and sound, {pictures} pictures each, "
+        f"{after.dropped - before.dropped:.0f} drops at the console; {sum(missed)} pictures missed in all; "
+        f"console {watched.console_cpu:.0f} % of a core, {alone.console_cpu:.0f} % without observers; "
+        f"the observers' own process {watched.audience_cpu:.0f} %"
+    )
+    per_peer = f"plain aiortc, main camera only, encoded per peer, {BARE_PEERS} peers ({bare[1]:.1f} % with 1 peer)"
+
+    def row(name: str, value: float, unit: str, **fields: object) -> Result:
+        known = {"section": SECTION, "samples": len(watched.trips), "conditions": conditions}
+        return Result(name=name, value=value, unit=unit, **known, **fields)  # type: ignore[arg-type]
+
+    without = {"baseline_name": "the same operator without observers"}
+    ours, theirs = median(watched.trips), median(alone.trips)
+    return [
+        row("observers that got every picture", missed.count(0) / count * 100, "%", target=100.0, bound="at least"),
+        row(
+            "console's processor time per observer",
+            each,
+            "% of a core",
+            target=CPU_TARGET,
+            baseline=bare[BARE_PEERS],
+            baseline_name=per_peer,
+        ),
+        row("operator's command → feedback, median", ours, "ms", baseline=theirs, **without),
+        row(
+            "p99",
+            quantile(watched.trips, 0.99),
+            "ms",
+            baseline=quantile(alone.trips, 0.99),
+            **without,
+        ),
+        row("median with observers to median without", ours / theirs, "×", target=SLOWDOWN_TARGET),
+    ]

@@ -1,0 +1,82 @@
+"""A robot bridge and a console, each a process of its own, so that the time of each can be told."""
+
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from urllib.parse import urlsplit
+
+import httpx
+from prometheus_client.parser import text_string_to_metric_families
+
+from bench.processes import ProcessFailed, Running, running_process
+
+__all__ = ["DEFAULT_ROBOT", "Bridge", "Stack", "available_robots", "running_bridge", "running_stack"]
+
+DEFAULT_ROBOT = "mobile-manipulator"
+ROBOTS = (DEFAULT_ROBOT, "planar")
+
+
+@dataclass(frozen=True)
+class Bridge:
+    robot: str
+    process: Running
+    address: str  # "tcp://127.0.0.1:5600"
+    event_log: Path
+
+    @property
+    def port(self) -> int:
+        return urlsplit(self.address).port or 0
+
+
+@dataclass(frozen=True)
+class Stack:
+    bridge: Bridge
+    console: Running
+    url: str  # "http://127.0.0.1:8000"
+    operator: str  # links with a token
+    observer: str
+
+    async def counts(self, name: str, by: str, **where: str) -> dict[str, float]:
+        """One of the console's counters: a value for each value of the label `by`, other labels as in `where`."""
+        async with httpx.AsyncClient(trust_env=False) as http:
+            text = (await http.get(f"{self.url}/metrics")).text
+        return {
+            sample.labels[by]: sample.value
+            for family in text_string_to_metric_families(text)
+            for sample in family.samples
+            if sample.name == name and where.items() <= sample.labels.items()
+        }
+
+
+@asynccontextmanager
+async def running_bridge(robot: str) -> AsyncIterator[Bridge]:
+    """Raises ProcessFailed when the robot lacks something here."""
+    with TemporaryDirectory(prefix="lockstep-bench-") as directory:
+        log = Path(directory) / "events.jsonl"
+        command = (sys.executable, "-m", "robot_bridge", robot, "--port", "0", "--event-log", str(log), "--json")
+        async with running_process(*command) as (process, ready):
+            yield Bridge(robot, process, ready["robot"], log)
+
+
+@asynccontextmanager
+async def running_stack(robot: str) -> AsyncIterator[Stack]:
+    async with running_bridge(robot) as bridge:
+        lockstep = str(Path(sys.executable).with_name("lockstep"))
+        command = (lockstep, "serve", "--robot", bridge.address, "--port", "0", "--json", "--quiet")
+        async with running_process(*command) as (console, links):
+            yield Stack(bridge, console, links["console"], links["operator"], links["observer"])
+
+
+async def available_robots() -> list[str]:
+    """Those that start here: the default robot needs OpenGL."""
+    found = []
+    for robot in ROBOTS:
+        try:
+            async with running_bridge(robot):
+                found.append(robot)
+        except ProcessFailed:
+            continue
+    return found

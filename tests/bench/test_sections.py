@@ -1,0 +1,61 @@
+"""Short runs of what needs no browser: that they measure at all, and not how much."""
+
+import pytest
+
+from bench.cli import SECTIONS, measure
+from bench.context import Context
+from bench.driving import console_trips, link_trips
+from bench.event_log import robot_times
+from bench.sections import command_to_feedback
+from bench.stack import running_bridge, running_stack
+from client import Console
+from robot_bridge.link_client import RobotLink
+
+
+async def test_every_trip_through_a_console_is_one_event_that_the_robot_executed() -> None:
+    async with running_stack("planar") as stack:
+        async with Console(stack.operator, video=False, audio=False) as console:
+            await console.take_seat()
+            trips = await console_trips(console, 20)
+        robot = robot_times(stack.bridge.event_log)
+    events = [trip.event for trip in trips]
+    assert events == list(range(events[0], events[0] + 20))
+    assert all(0 < robot[trip.event] < trip.seconds for trip in trips)
+
+
+async def test_every_trip_over_the_bare_link_is_one_event_that_the_robot_executed() -> None:
+    async with running_bridge("planar") as bridge:
+        async with RobotLink("127.0.0.1", bridge.port, "operator") as link:
+            assert link.hello.description is not None
+            trips = await link_trips(link, link.hello.description, 20)
+        robot = robot_times(bridge.event_log)
+    assert all(0 < robot[trip.event] < trip.seconds for trip in trips)
+
+
+async def test_command_to_feedback_reports_each_figure_with_its_baseline(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command_to_feedback, "QUICK_EVENTS", 20)
+    results = await command_to_feedback.run(Context(quick=True, robots=["planar"], say=lambda _: None))
+    assert [result.target for result in results] == [8.0, 20.0, 2.0, None]
+    assert all(result.value and result.baseline and result.samples == 20 for result in results)
+    total, _, own, _ = results
+    assert own.value is not None
+    assert total.value is not None
+    assert own.value < total.value
+
+
+async def test_a_section_that_fails_is_named_and_the_others_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def fail(context: Context) -> list[object]:
+        raise RuntimeError("no such luck")
+
+    async def nothing() -> list[str]:
+        return []
+
+    monkeypatch.setattr("bench.cli.available_robots", nothing)
+    monkeypatch.setattr("bench.sections.lossy.run", fail)
+    results, failed = await measure(["lossy", "command_to_feedback"], quick=True)
+    assert failed == {"lossy": "RuntimeError: no such luck"}
+    assert results == []
+
+
+def test_the_sections_are_the_figures_of_the_console() -> None:
+    assert SECTIONS == ("command_to_feedback", "lossy", "capture_to_shown", "first_picture", "observers")
