@@ -126,7 +126,9 @@ async def healthz(request: Request) -> Response:
 
 @router.get("/metrics")
 async def metrics(request: Request) -> Response:
-    text = services(request).metrics.text()
+    here = services(request)
+    here.metrics.collect(here.console.robot.bad_input(), here.console.robot.drops())
+    text = here.metrics.text()
     return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})
 
 

@@ -9,6 +9,7 @@ import structlog
 
 from robot_bridge.protocol.console import (
     ClientMessage,
+    Notice,
     Participants,
     Rename,
     RobotState,
@@ -40,6 +41,7 @@ audit = structlog.get_logger("lockstep.audit")
 
 SEAT_CHECKS = 12  # within one seat timeout
 CROWD = 10  # peers; the list of participants goes out at most once a second, ten times more rarely to 100
+UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
 
@@ -107,6 +109,8 @@ class Console:
         if not isinstance(stop, Stop):
             raise TypeError(stop)
         delivered = self.robot.send_stop(stop)
+        if not delivered:
+            self.peers.tell("session", Notice(level="error", text=UNDELIVERED))
         audit.warning("stop", by=by, where=where, reason=reason, reference=self.clock.event, delivered=delivered)
         return delivered
 

@@ -1,6 +1,7 @@
 """Keeps one robot link: connects, reads, and connects again when it breaks."""
 
 import asyncio
+from collections import Counter
 from typing import Protocol
 
 import structlog
@@ -34,6 +35,8 @@ class LinkKeeper:
         self._sink = sink
         self._backoff = backoff
         self._link: RobotLink | None = None  # None while down
+        self._bad_input: Counter[str] = Counter()  # of links that ended
+        self._drops: Counter[str] = Counter()
 
     def send(self, message: LinkMessage) -> bool:
         """Whether it was handed to a link that lives."""
@@ -44,6 +47,16 @@ class LinkKeeper:
         except LinkError:
             return False
         return True
+
+    def bad_input(self) -> Counter[str]:
+        """What the bridge sent that could not be read, by name, on all links so far."""
+        return self._bad_input + (self._link.bad_input if self._link is not None else Counter())
+
+    def drops(self) -> Counter[str]:
+        """Messages that came faster than they were read, by kind or stream, on all links so far."""
+        if self._link is None:
+            return self._drops
+        return self._drops + self._link.drops + self._link.media_drops
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -68,6 +81,8 @@ class LinkKeeper:
                     self._sink.link_received(self._role, message)
             finally:
                 self._link = None
+                self._bad_input += link.bad_input
+                self._drops += link.drops + link.media_drops
                 if loop.time() - since > HEALTHY_AFTER:
                     self._backoff.healthy()
         raise LinkLost("the link was closed")

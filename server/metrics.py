@@ -1,5 +1,7 @@
 """Counters and gauges of the console, in a registry of their own. Names: docs/console-api.md."""
 
+from collections import Counter as Totals
+
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
 __all__ = ["Metrics"]
@@ -10,6 +12,8 @@ class Metrics:
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
+        self._robot_bad_input: Totals[str] = Totals()
+        self._robot_drops: Totals[str] = Totals()
         registry = self.registry
         self.bad_input = Counter(
             "lockstep_bad_input", "Input refused, by where and why", ["where", "reason"], registry=registry
@@ -20,7 +24,6 @@ class Metrics:
         self.stops = Counter("lockstep_stops", "Stops asked for, by where", ["where"], registry=registry)
         self.resets = Counter("lockstep_resets", "Resets forwarded", registry=registry)
         self.feedback = Counter("lockstep_feedback", "Feedback from the robot", registry=registry)
-        self.feedback_sent = Counter("lockstep_feedback_sent", "Feedback sent to peers", ["role"], registry=registry)
         self.dropped = Counter("lockstep_dropped", "Messages dropped by a full queue", ["queue"], registry=registry)
         self.peers = Gauge("lockstep_peers", "Peers connected", ["role"], registry=registry)
         self.peers_ended = Counter("lockstep_peers_ended", "Peers gone, by why", ["why"], registry=registry)
@@ -36,6 +39,14 @@ class Metrics:
             buckets=(0.001, 0.002, 0.004, 0.006, 0.008, 0.012, 0.02, 0.05, 0.1, 0.5, 1.0),
             registry=registry,
         )
+
+    def collect(self, bad_input: Totals[str], drops: Totals[str]) -> None:
+        """Bring up to date what the robot links count for themselves, as totals."""
+        for name, total in bad_input.items():
+            self.bad_input.labels("robot", name).inc(total - self._robot_bad_input[name])
+        for name, total in drops.items():
+            self.dropped.labels(f"robot {name}").inc(total - self._robot_drops[name])
+        self._robot_bad_input, self._robot_drops = bad_input.copy(), drops.copy()
 
     def text(self) -> bytes:
         """The exposition format, version 0.0.4."""

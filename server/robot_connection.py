@@ -2,6 +2,7 @@
 
 import asyncio
 import random
+from collections import Counter
 from typing import Protocol
 
 import structlog
@@ -84,6 +85,14 @@ class RobotConnection:
     def send_stop(self, stop: Stop) -> bool:
         """As `send`, over whichever link lives: the bridge takes a stop from both."""
         return self._keepers["operator"].send(stop) or self._keepers["media"].send(stop)
+
+    def bad_input(self) -> Counter[str]:
+        """What the bridge sent that could not be read, by name."""
+        return sum((keeper.bad_input() for keeper in self._keepers.values()), Counter())
+
+    def drops(self) -> Counter[str]:
+        """Messages from the bridge that came faster than they were read, by kind or stream."""
+        return sum((keeper.drops() for keeper in self._keepers.values()), Counter())
 
     # the keepers' events
 

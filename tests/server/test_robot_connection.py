@@ -2,8 +2,8 @@
 
 import asyncio
 
-from robot_bridge.protocol.console import RobotState
-from robot_bridge.protocol.messages import StopState
+from robot_bridge.protocol.console import Notice, RobotState
+from robot_bridge.protocol.messages import Stop, StopState
 from tests.server.rig import PATIENCE, eventually, running_bridge, running_console
 
 
@@ -22,6 +22,8 @@ async def test_a_bridge_that_dies_shows_as_down_and_comes_back_by_itself() -> No
                 )
                 assert (await rig.http.get("/healthz")).json()["status"] == "degraded"
                 assert rig.count("lockstep_robot_link_losses_total") == 1
+                peer.send("stop", Stop(reason="dog"))
+                await peer.until(lambda each: isinstance(each, Notice) and each.level == "error")
                 assert (await rig.session())["epoch"] == first_epoch
                 async with running_bridge(port) as second:
                     async with asyncio.timeout(PATIENCE):
@@ -29,6 +31,7 @@ async def test_a_bridge_that_dies_shows_as_down_and_comes_back_by_itself() -> No
                         await peer.closed.wait()
                     assert (await rig.session())["epoch"] == second.epoch != first_epoch
                     assert (await rig.http.get("/healthz")).json()["status"] == "ok"
+                    await eventually(lambda: console.clock.stop.stopped)
                     await console.peers.all_gone()
                     assert rig.count("lockstep_peers_ended_total", why="new epoch") == 1
                     async with rig.peer("observer") as again:

@@ -1,0 +1,19 @@
+from collections import Counter
+
+from server.metrics import Metrics
+
+
+def test_what_the_links_count_is_added_once() -> None:
+    metrics = Metrics()
+    for total in (2, 2, 5):
+        metrics.collect(Counter(malformed=total), Counter(overview=total))
+    found = metrics.registry.get_sample_value
+    assert found("lockstep_bad_input_total", {"where": "robot", "reason": "malformed"}) == 5
+    assert found("lockstep_dropped_total", {"queue": "robot overview"}) == 5
+
+
+def test_two_consoles_in_one_process_count_apart() -> None:
+    first, second = Metrics(), Metrics()
+    first.resets.inc()
+    assert b"lockstep_resets_total 1.0" in first.text()
+    assert b"lockstep_resets_total 0.0" in second.text()
