@@ -57,6 +57,7 @@ class RobotConnection:
         self.reached = asyncio.Event()
         self.detail = "not connected yet"
         self._host = host
+        self._epochs: dict[LinkRole, str] = {}  # of each link, open now or last
         self._keepers = {
             role: LinkKeeper(
                 settings.robot_host,
@@ -97,6 +98,7 @@ class RobotConnection:
     # the keepers' events
 
     def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None:
+        self._epochs[role] = epoch
         if epoch != self.epoch:
             self.epoch, self.description = epoch, description
             self._host.epoch_began(epoch, description)
@@ -116,6 +118,8 @@ class RobotConnection:
             self._host.link_down(detail)
 
     def link_received(self, role: LinkRole, message: LinkMessage) -> None:
+        if self._epochs.get(role) != self.epoch:
+            return  # what the old bridge said last, while the other link has met the new one already
         if isinstance(message, Media):
             self._host.media_received(message)
         elif isinstance(message, Feedback):

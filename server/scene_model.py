@@ -35,7 +35,7 @@ class SceneModel:
         self._paths = scene_paths(description)
         self._joint_names = [joint.name for joint in description.joints]
         self._build_surroundings()
-        self._frames = {
+        self.frames = {
             body.name: server.scene.add_frame(self._paths[body.name], show_axes=False)
             for body in sorted(description.bodies, key=lambda body: self._paths.get(body.name, "").count("/"))
             if body.name in self._paths
@@ -45,17 +45,17 @@ class SceneModel:
                 _add_geom(server, f"{self._paths[body.name]}/geom{number}", geom)
         self._moving = [body for body in description.bodies if body.joints and body.name in self._paths]
         self._place_fixed_bodies()
-        self._label = self._add_label()
-        self._arrow = self._add_arrow()
-        self._points = self._add_points()
+        self.label = self._add_label()
+        self.arrow = self._add_arrow()
+        self.points = self._add_points()
 
     def pose(self, feedback: Feedback) -> None:
         joints = dict(zip(self._joint_names, feedback.joints, strict=False))
         with self._server.atomic():
             for body in self._moving:
-                frame, pose = self._frames[body.name], body_pose(body, joints)
+                frame, pose = self.frames[body.name], body_pose(body, joints)
                 frame.position, frame.wxyz = pose.position, pose.orientation
-            self._label.text = f"s {feedback.event}{STOPPED if feedback.stop.stopped else ''}"
+            self.label.text = f"s {feedback.event}{STOPPED if feedback.stop.stopped else ''}"
             self._pose_arrow(feedback.wrench)
             self._pose_points(feedback.ranges)
 
@@ -98,9 +98,9 @@ class SceneModel:
 
     def _place_fixed_bodies(self) -> None:
         for body in self._description.bodies:
-            if body.name in self._frames and not body.joints:
-                self._frames[body.name].position = body.position
-                self._frames[body.name].wxyz = body.orientation
+            if body.name in self.frames and not body.joints:
+                self.frames[body.name].position = body.position
+                self.frames[body.name].wxyz = body.orientation
 
     def _add_label(self) -> viser.LabelHandle:
         """The event reference, above what moves first, and moving with it."""
@@ -120,15 +120,15 @@ class SceneModel:
 
     def _pose_arrow(self, wrench: list[float]) -> None:
         sensor = self._description.wrench
-        if self._arrow is None or sensor is None:
+        if self.arrow is None or sensor is None:
             return
         force = np.array(wrench[:3], dtype=np.float32)
         felt = force.shape == (3,) and float(np.linalg.norm(force)) >= sensor.threshold_force
         if felt:
             tip = force / max(sensor.full_scale_force, 1e-6) * ARROW_LENGTH
-            self._arrow.points = np.array([[np.zeros(3), tip]], dtype=np.float32)
-        if self._arrow.visible != felt:
-            self._arrow.visible = felt
+            self.arrow.points = np.array([[np.zeros(3), tip]], dtype=np.float32)
+        if self.arrow.visible != felt:
+            self.arrow.visible = felt
 
     def _add_points(self) -> viser.PointCloudHandle | None:
         ring = self._description.ranges
@@ -145,7 +145,7 @@ class SceneModel:
 
     def _pose_points(self, ranges: list[float]) -> None:
         ring = self._description.ranges
-        if self._points is None or ring is None:
+        if self.points is None or ring is None:
             return
         seen = [
             (distance * math.cos(angle), distance * math.sin(angle), 0.0)
@@ -154,9 +154,9 @@ class SceneModel:
             for angle in (ring.angle_min + number * ring.angle_increment,)
         ]
         if seen:
-            self._points.points = np.array(seen, dtype=np.float32)
-        if self._points.visible != bool(seen):
-            self._points.visible = bool(seen)
+            self.points.points = np.array(seen, dtype=np.float32)
+        if self.points.visible != bool(seen):
+            self.points.visible = bool(seen)
 
 
 def _add_geom(server: viser.ViserServer, path: str, geom: Geom) -> None:

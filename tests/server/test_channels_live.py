@@ -76,6 +76,40 @@ async def test_an_operator_takes_the_seat_and_drives() -> None:
         assert rig.count("lockstep_robot_turnaround_seconds_count") == 21
 
 
+async def test_what_the_bridge_refuses_reaches_the_sender_and_the_way_is_free_again() -> None:
+    async with running_rig() as rig, rig.peer("operator") as peer, rig.peer("observer") as other:
+        await _take_seat(peer)
+        now = await peer.feedback()
+        following = event_after(now.event)
+        unknown = Command(event=following, issue=now.issue + 1000, values=[0.0] * len(now.axes))
+        peer.send("control", unknown)
+        assert (await _refused(peer, "late")).event == following
+        assert rig.count("lockstep_refusals_total", reason="late") == 1
+        await _drive(peer, 0.0)
+        assert not any(isinstance(each, Refusal) for each in other.heard)
+
+
+async def test_a_repeat_of_the_current_event_is_answered_again_and_executes_nothing() -> None:
+    async with running_rig() as rig, rig.peer("operator") as peer:
+        await _take_seat(peer)
+        last = await _drive(peer, 0.0)
+        peer.heard.clear()
+        peer.send("control", Command(event=last.event, issue=last.issue, values=[1.0] * len(last.axes)))
+        await peer.feedback(lambda each: each.event == last.event)
+        assert rig.count("lockstep_commands_total", outcome="answer") == 1
+        assert (await rig.session())["event"] == last.event
+
+
+async def test_letting_go_brings_the_robot_to_rest() -> None:
+    async with running_rig() as rig, rig.peer("operator") as peer:
+        await _take_seat(peer)
+        await _drive(peer, 0.0)
+        moving = await _drive(peer, 0.3, count=5)
+        assert not moving.at_rest
+        peer.send("control", Rest(event=event_after(moving.event)))
+        await peer.feedback(lambda each: each.issue > moving.issue and each.at_rest)
+
+
 async def test_a_second_operator_gets_the_seat_only_when_it_is_given_back() -> None:
     async with running_rig() as rig, rig.peer("operator") as first, rig.peer("operator") as second:
         await _take_seat(first)

@@ -1,0 +1,118 @@
+"""A robot in viser, built from its description and posed from feedback."""
+
+from collections.abc import Iterator
+
+import pytest
+import rich
+import viser
+
+from robot_bridge.protocol.description import (
+    Body,
+    BodyJoint,
+    Geom,
+    Joint,
+    RangeRing,
+    RobotDescription,
+    WrenchSensor,
+)
+from robot_bridge.protocol.messages import Feedback, StopState
+from server.scene_model import SceneModel
+
+Z = (0.0, 0.0, 1.0)
+ROBOT = RobotDescription(
+    name="r",
+    label="R",
+    axes=(),
+    joints=(Joint(name="turn", unit="rad"), Joint(name="lift", unit="m")),
+    bodies=(
+        Body(name="room", parent="", position=(1.0, 0.0, 0.0), geoms=(Geom(shape="box", size=(1, 2, 3)),)),
+        Body(
+            name="arm",
+            parent="",
+            joints=(
+                BodyJoint(joint="turn", kind="revolute", axis=Z),
+                BodyJoint(joint="lift", kind="prismatic", axis=Z),
+            ),
+            geoms=(
+                Geom(shape="sphere", size=(0.1, 0, 0)),
+                Geom(shape="cylinder", size=(0.1, 0.5, 0)),
+                Geom(shape="capsule", size=(0.1, 0.5, 0), rgba=(1, 0, 0, 0.5)),
+            ),
+        ),
+    ),
+    wrench=WrenchSensor(name="w", body="arm", threshold_force=1, full_scale_force=10, full_scale_torque=1),
+    ranges=RangeRing(
+        name="ring", body="arm", count=3, angle_min=0.0, angle_increment=1.0, range_min=0.1, range_max=5.0
+    ),
+)
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    rich.get_console().quiet = True
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+def _feedback(**values: object) -> Feedback:
+    return Feedback(**{"event": 7, "issue": 1, "time": 0.0, "axes": [], "joints": [0.0, 0.0], **values})  # type: ignore[arg-type]
+
+
+def test_bodies_move_with_their_joints(server: viser.ViserServer) -> None:
+    model = SceneModel(server, ROBOT)
+    model.pose(_feedback(joints=[0.0, 0.75]))
+    assert tuple(model.frames["arm"].position) == pytest.approx((0, 0, 0.75))
+    assert tuple(model.frames["room"].position) == pytest.approx((1, 0, 0))
+
+
+def test_the_label_shows_the_event_and_the_stop(server: viser.ViserServer) -> None:
+    model = SceneModel(server, ROBOT)
+    texts = []
+    for feedback in (_feedback(), _feedback(event=8, stop=StopState(stopped=True))):
+        model.pose(feedback)
+        texts.append(model.label.text)
+    assert texts == ["s 7", "s 8 · STOPPED"]
+
+
+def test_a_force_is_an_arrow_and_a_small_one_is_none(server: viser.ViserServer) -> None:
+    model = SceneModel(server, ROBOT)
+    assert model.arrow is not None
+    model.pose(_feedback(wrench=[0.0, 10.0, 0.0, 0.0, 0.0, 0.0]))
+    shown = [model.arrow.visible]
+    assert tuple(model.arrow.points[0, 1]) == pytest.approx((0, 0.6, 0))
+    for wrench in ([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], []):
+        model.pose(_feedback(wrench=wrench))
+        shown.append(model.arrow.visible)
+    assert shown == [True, False, False]
+
+
+def test_what_the_ring_sees_are_points_and_nothing_seen_is_none(server: viser.ViserServer) -> None:
+    model = SceneModel(server, ROBOT)
+    assert model.points is not None
+    model.pose(_feedback(ranges=[2.0, 5.0, 0.01]))
+    shown = [model.points.visible]
+    assert model.points.points.shape == (1, 3)
+    model.pose(_feedback(ranges=[5.0, 5.0, 5.0]))
+    shown.append(model.points.visible)
+    assert shown == [True, False]
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        RobotDescription(name="r", label="R", axes=()),
+        RobotDescription(name="r", label="R", axes=(), bodies=(Body(name="a", parent=""),)),
+        RobotDescription(
+            name="r",
+            label="R",
+            axes=(),
+            wrench=WrenchSensor(name="w", body="?", threshold_force=1, full_scale_force=1, full_scale_torque=1),
+            ranges=RangeRing(name="q", body="?", count=1, angle_min=0, angle_increment=0, range_min=0, range_max=1),
+        ),
+    ],
+)
+def test_a_robot_that_describes_little_is_shown_as_far_as_it_goes(
+    server: viser.ViserServer, robot: RobotDescription
+) -> None:
+    SceneModel(server, robot).pose(_feedback(wrench=[1.0] * 6, ranges=[0.5]))
