@@ -1,5 +1,6 @@
 """The physics: the model, its state, and where the robot's parts are in MuJoCo's arrays."""
 
+import logging
 from importlib.resources import files
 from typing import Any, Final
 
@@ -10,6 +11,8 @@ import numpy.typing as npt
 __all__ = ["ARM", "BASE", "MOUNT", "TOOL_TIP", "Simulation", "load_model"]
 
 Array = npt.NDArray[np.float64]
+
+_logger = logging.getLogger(__name__)
 
 # The robot's joints come first in the model, and its actuators have the joints' order: these index qpos, qvel and ctrl.
 BASE: Final = slice(0, 3)  # x, y (m, world frame), yaw (rad)
@@ -28,6 +31,7 @@ class Simulation:
     """Steps the physics. `restarts` counts how often a diverged state had to be put back to its beginning."""
 
     def __init__(self) -> None:
+        mujoco.set_mju_user_warning(warn)  # else MuJoCo writes a file into the working directory
         self.model = load_model()
         self.data = mujoco.MjData(self.model)
         self.restarts = 0
@@ -79,6 +83,10 @@ class Simulation:
     def tool_twist(self) -> Array:
         """The tool's measured twist against the base, in the base frame."""
         return self.tool_jacobian() @ self.data.qvel[ARM]  # type: ignore[no-any-return]
+
+
+def warn(text: str) -> None:
+    _logger.warning("MuJoCo: %s", text)
 
 
 def base_from_world(yaw: float) -> Array:
