@@ -71,6 +71,16 @@ def test_at_rest_neither_arm_nor_base_drift(driver: Driver) -> None:
     assert after.joints == pytest.approx(before.joints, abs=1e-4)
 
 
+def test_a_resting_base_that_is_pushed_stays_where_it_is(driver: Driver) -> None:
+    driver.run(0.5, base_vx=0.2)
+    before = driver.run(1.0).joints
+    base = driver.robot.simulation.model.body("base").id
+    driver.data.xfrc_applied[base, :2] = (60.0, -40.0)  # N, as hard as the arm can push
+    measured = driver.run(5.0)
+    assert measured.joints[:3] == pytest.approx(before[:3], abs=0.005)
+    assert measured.at_rest
+
+
 def test_from_full_speed_the_robot_is_at_rest_soon(driver: Driver) -> None:
     assert not driver.run(1.0, base_vx=0.6, base_wz=0.5, tool_vz=0.2).at_rest
     assert driver.run(0.6).at_rest
