@@ -8,7 +8,9 @@ Why each is needed:
   the next one begins;
 - aioice never gathers loopback;
 - its SCTP waits at least one second before it repeats a lost message, three while it connects, and then sends one
-  packet at a time.
+  packet at a time;
+- its DTLS takes one record from OpenSSL for each datagram that comes in. A record that waits there, as one that
+  overtook the end of the handshake does, is never caught up with: from then on every message is one datagram late.
 """
 
 import struct
@@ -20,14 +22,16 @@ from aiortc import RTCPeerConnection, RTCRtpReceiver
 from aiortc.rtcdtlstransport import RTCDtlsTransport
 from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH
 from aiortc.rtp import HeaderExtensions, HeaderExtensionsMap, RtpPacket
+from OpenSSL import SSL
 
 from client.frame_assembler import MediaPacket
 from client.rtp_header import find_extension
 
-__all__ = ["PacketSink", "gather_only_on", "hasten_sctp", "take_packets", "take_raw_rtp"]
+__all__ = ["PacketSink", "drain_dtls", "gather_only_on", "hasten_sctp", "take_packets", "take_raw_rtp"]
 
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
+RECORD = 1500  # bytes, the most that a DTLS record carries here
 WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
 
 
@@ -152,6 +156,29 @@ def take_raw_rtp(pc: RTCPeerConnection, take: Callable[[bytes], None]) -> None:
     for transceiver in pc.getTransceivers():
         receiver: Any = transceiver.receiver
         receiver.receive = receive
+
+
+def drain_dtls(pc: RTCPeerConnection) -> None:
+    """With every datagram, take all records that OpenSSL has, not only the first."""
+    sctp: Any = pc.sctp
+    handle = sctp._handle_data
+
+    async def handle_all(data: bytes) -> None:
+        await handle(data)
+        while (more := _next_record(sctp.transport)) is not None:
+            await handle(more)
+
+    sctp._handle_data = handle_all
+
+
+def _next_record(transport: Any) -> bytes | None:
+    try:
+        record: bytes = transport._ssl.recv(RECORD)
+    except SSL.ZeroReturnError as error:
+        raise ConnectionError("the remote closed DTLS") from error
+    except SSL.Error:
+        return None  # nothing more
+    return record or None
 
 
 def hasten_sctp(pc: RTCPeerConnection) -> None:

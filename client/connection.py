@@ -35,6 +35,8 @@ from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Reset,
 __all__ = ["Connection", "ConnectionOptions"]
 
 HEARTBEAT = 0.5  # s between two reports, and between two pings
+EARLY_PINGS = 5  # to know the path before the first command
+EARLY_PING = 0.05  # s between them
 ANSWER_SECONDS = 5.0  # for the console to answer a request
 STOP_SECONDS = 0.3  # for the stop to be confirmed before HTTP is tried as well
 RETRY_SECONDS = 1.0  # while the robot is not reached yet; what the console's Retry-After says
@@ -171,6 +173,7 @@ class Connection:
 
     async def _heartbeat(self) -> None:
         await self._until(lambda: self._driver is not None)
+        early_pings = EARLY_PINGS
         while True:
             now = self._loop.time()
             if now - self._heard_at > self.options.silence_seconds:
@@ -178,6 +181,10 @@ class Connection:
             if self._pings.lost(now):
                 self.driver.loss()
             self._peer.send("control", Ping(id=self._pings.send(now)))
+            if early_pings:
+                early_pings -= 1
+                await asyncio.sleep(EARLY_PING)
+                continue
             self._peer.send("control", self._report())
             await asyncio.sleep(HEARTBEAT)
 
@@ -196,7 +203,9 @@ class Connection:
             case Refusal():
                 self._take_refusal(message)
             case Pong(id=number):
-                self._pings.answered(number, self._heard_at)
+                round_trip = self._pings.answered(number, self._heard_at)
+                if round_trip is not None and self._driver is not None:
+                    self._driver.pilot.ping_answered(round_trip)
             case Welcome():
                 self._welcome = message
             case RobotState():

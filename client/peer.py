@@ -8,7 +8,7 @@ from aiortc import RTCBundlePolicy, RTCConfiguration, RTCDataChannel, RTCPeerCon
 from aiortc.rtcrtpparameters import RTCRtpCodecCapability
 from aiortc.rtcrtpreceiver import RTCRtpReceiver
 
-from client.aiortc_private import PacketSink, gather_only_on, hasten_sctp, take_packets, take_raw_rtp
+from client.aiortc_private import PacketSink, drain_dtls, gather_only_on, hasten_sctp, take_packets, take_raw_rtp
 from client.errors import ConnectFailed, ConsoleError
 from client.link import ConsoleLink
 from client.sdp import Section, offer_extension, read_sections
@@ -109,6 +109,7 @@ class Peer:
         if self._link.loopback:
             gather_only_on(self._pc, ["127.0.0.1"])
         hasten_sctp(self._pc)
+        drain_dtls(self._pc)
         offer = await self._pc.createOffer()
         uri = EXTENSION_URIS.get(self._carrier)
         await self._pc.setLocalDescription(RTCSessionDescription(offer_extension(offer.sdp, uri), "offer"))

@@ -28,6 +28,7 @@ ECHO = 0.020  # s; longer than the console's own path to the robot and back
 LOSSY_SPELL = 60.0  # s to go on doubling after the last loss that was seen
 PATIENT_REASONS = {"late", "out_of_order", "rested"}  # another try, on fresh feedback, can succeed
 NEEDLESS = 0.25  # an answer that follows the last repeat within this part of the whole wait answers an earlier sending
+FEW_SAMPLES = 8
 NEVER = float("inf")
 
 
@@ -126,6 +127,11 @@ class Pilot:
     def shown(self, stamp: int) -> None:
         """A picture of the main camera is on screen."""
         self.gate.shown(stamp)
+
+    def ping_answered(self, round_trip: float) -> None:
+        """A ping's round trip: stands in for that of a command while few of those are known."""
+        if len(self.samples) < FEW_SAMPLES:
+            self.timer.sample(round_trip)
 
     def loss(self, now: float) -> None:
         """Some message of this connection was lost."""

@@ -22,10 +22,13 @@ class PingLedger:
         self._out[number] = now
         return number
 
-    def answered(self, number: int, now: float) -> None:
+    def answered(self, number: int, now: float) -> float | None:
+        """The round trip; None for a pong that answers nothing."""
         sent_at = self._out.pop(number, None)
-        if sent_at is not None:
-            self.round_trip = now - sent_at
+        if sent_at is None:
+            return None
+        self.round_trip = now - sent_at
+        return self.round_trip
 
     def lost(self, now: float) -> int:
         """How many pings have become lost since the last call."""

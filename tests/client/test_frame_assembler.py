@@ -18,7 +18,7 @@ from client.frame_assembler import (
 
 def packets_of(sizes: Iterable[int], first: int = 0) -> list[MediaPacket]:
     """Frames of so many packets; the first is a keyframe, every packet says which frame and part it is."""
-    packets = []
+    packets: list[MediaPacket] = []
     for number, size in enumerate(sizes):
         for part in range(size):
             data = (b"K" if number == 0 else b"D") + bytes([number % 256, part])
