@@ -34,13 +34,14 @@ import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, We
 
 const BEAT_MS = 500; // reports and pings
 const SILENT_MS = 1500; // the other side counts as gone for driving
-const DEAD_MS = 5000; // and for the connection
+const DEAD_BEATS = 10; // and for the connection; counted, so that a page that was held up is not taken for it
 const FEEL_MS = 50; // rumble and tone
 
 export interface ConsoleAppEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;
   mainStream(): string | null; // name of the camera in the large view
   armedChanged(): void;
+  feedbackTaken(now: number): void; // pictures may have become stale
 }
 
 /** The page's engine: connection, driving and media. What it shows is read from its fields. */
@@ -65,6 +66,7 @@ export class ConsoleApp {
   private readonly disposal = new Disposal();
   private peer: Peer | null = null;
   private heardMs = 0;
+  private silentBeats = 0;
   private beatMs = 0;
   private feelMs = 0;
   private pings = new Map<number, number>(); // id -> when it was sent
@@ -256,6 +258,7 @@ export class ConsoleApp {
     if (this.driver !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
     this.drive(now);
     this.room.changed();
+    this.page.feedbackTaken(now);
   }
 
   private tookPong(id: number, now: number): void {
@@ -266,6 +269,7 @@ export class ConsoleApp {
 
   private welcomed(welcome: Welcome): void {
     this.link = { kind: "connected" };
+    this.silentBeats = 0;
     if (this.peer !== null) this.room.open(this.peer, welcome.streams, this.heardMs);
     if (this.name !== null) this.tell("session", { type: "rename", name: this.name });
     if (welcome.role === "operator") this.requestSeat();
@@ -329,7 +333,8 @@ export class ConsoleApp {
   private beat(now: number): void {
     this.beatMs = now + BEAT_MS;
     if (this.state.welcome === null) return;
-    if (now - this.heardMs > DEAD_MS) {
+    this.silentBeats = now - this.heardMs > BEAT_MS ? this.silentBeats + 1 : 0;
+    if (this.silentBeats > DEAD_BEATS) {
       this.connection.drop("the console fell silent");
       return;
     }

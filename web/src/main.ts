@@ -12,9 +12,9 @@ import { ConsoleApi } from "./rtc/console_api";
 const link = readFragment(location.hash);
 const page = new Page(new ConsoleApi(link.token ?? ""), link.trailer, link.name);
 installHook(page);
-page.start();
 if (link.token === null) page.app.link = { kind: "no_token" };
 else void page.app.connection.run();
+page.start();
 
 // Another link pasted into the same tab changes only the fragment.
 addEventListener("hashchange", () => location.reload());

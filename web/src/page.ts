@@ -11,7 +11,7 @@ import { h, setData, type Panel } from "./ui/dom";
 import { createEventPanel } from "./ui/event_panel";
 import { createForceGauge } from "./ui/force_gauge";
 import { createLogPanel } from "./ui/log_panel";
-import { createOverlay } from "./ui/overlay";
+import { createOverlay, overlayWords } from "./ui/overlay";
 import { createPeoplePanel } from "./ui/people_panel";
 import { createRangeRadar } from "./ui/range_radar";
 import { SceneView } from "./ui/scene_view";
@@ -39,6 +39,7 @@ export class Page {
       canvas: (info) => this.board.canvas(info),
       mainStream: () => this.board.mainStream(),
       armedChanged: () => this.draw(performance.now()),
+      feedbackTaken: (now) => this.board.update(this.app, now),
     });
     this.panels = this.build(left, right);
     watchTouch();
@@ -98,6 +99,7 @@ export class Page {
     setData(root, "role", app.state.welcome === null ? "" : isOperator(app.state) ? "operator" : "observer");
     setData(root, "stopped", String(app.state.stop.stopped));
     setData(root, "gate", app.state.settings.gateEnabled ? "on" : "off");
+    root.classList.toggle("has-overlay", overlayWords(app, now) !== null);
     this.board.update(app, now);
     for (const panel of this.panels) panel.update(now);
   }

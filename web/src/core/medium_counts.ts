@@ -1,7 +1,7 @@
 /** What the gate did with one stream. */
 export interface MediumCounts {
   stamp: number | null; // newest seen
-  gap: number | null; // at the last rendering
+  gap: number | null; // of the newest rendering; of sound, also while it is off
   maxGap: number; // largest |gap| rendered
   rendered: number;
   discarded: number;

@@ -31,6 +31,7 @@ export function observeSound(
   if (stamp === undefined && context.enabled) return false;
   const { verdict, gap } = judge(context.feedback, stamp ?? null, context.tolerance, context.enabled);
   if (stamp !== null && stamp !== undefined) counts.stamp = stamp;
+  counts.gap = gap;
   if (!gate.judged && audible) {
     gate.judged = true;
     if (verdict === "render") noteRendered(counts, gap, context);

@@ -8,6 +8,7 @@ export interface KeyboardEvents {
 }
 
 const STOP_KEYS = new Set(["Escape", "Backspace"]);
+const ARM_KEYS = new Set(["Enter", "NumpadEnter"]);
 const FIELDS = "input, textarea, select";
 const CONTROLS = "button, a, summary, [role=button]";
 
@@ -47,6 +48,7 @@ export class Keyboard {
       if (!event.repeat) this.events.stop();
       return;
     }
+    if (event.code === "") return;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (this.events.isArmed()) this.drive(event);
     else this.idle(event, inField || (target?.matches(CONTROLS) ?? false));
@@ -65,6 +67,6 @@ export class Keyboard {
     this.keys.add(event.code);
     if (onControl) return;
     if (event.code === "Space") event.preventDefault();
-    if (event.code === "Enter") this.events.arm();
+    if (ARM_KEYS.has(event.code)) this.events.arm();
   }
 }

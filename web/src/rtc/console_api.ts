@@ -21,19 +21,24 @@ export interface WhepAnswer {
 export class ConsoleApi {
   constructor(private readonly token: string) {}
 
-  /** How many cameras and microphones the robot has; a guess while that is not known. */
-  async media(signal: AbortSignal): Promise<{ cameras: number; microphones: number }> {
+  /** How many cameras the robot has; 0 while that is not known. */
+  async media(signal: AbortSignal): Promise<{ cameras: number }> {
     const session = await this.json("GET", "/api/session", undefined, signal);
-    return {
-      cameras: lengthOf(session, "cameras", 2),
-      microphones: Math.min(1, lengthOf(session, "microphones", 1)),
-    };
+    const description = isRecord(session) ? session["description"] : undefined;
+    const cameras = isRecord(description) ? description["cameras"] : undefined;
+    return { cameras: Array.isArray(cameras) ? cameras.length : 0 };
   }
 
   async offer(sdp: string, trailer: boolean, signal: AbortSignal): Promise<WhepAnswer> {
     const path = trailer ? "/whep?stamp=trailer" : "/whep";
     const response = await this.fetch("POST", path, { "Content-Type": "application/sdp" }, sdp, signal);
     return { sdp: await response.text(), location: response.headers.get("Location") ?? "" };
+  }
+
+  /** Candidates found after the offer was sent. */
+  async trickle(location: string, fragment: string): Promise<void> {
+    const headers = { "Content-Type": "application/trickle-ice-sdpfrag" };
+    await this.fetch("PATCH", location, headers, fragment, undefined);
   }
 
   /** Ends a WHEP session; also while the page is being left. */
@@ -110,10 +115,4 @@ async function errorOf(response: Response): Promise<ConsoleError> {
     field("detail"),
     Number.isFinite(retryAfter) ? retryAfter * 1000 : null,
   );
-}
-
-function lengthOf(session: unknown, name: string, fallback: number): number {
-  const description = isRecord(session) ? session["description"] : undefined;
-  const list = isRecord(description) ? description[name] : undefined;
-  return Array.isArray(list) ? list.length : fallback;
 }

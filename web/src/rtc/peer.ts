@@ -16,7 +16,9 @@ export interface PeerEvents {
   ended(why: string): void; // once, unless closed from here
 }
 
-const GATHER_LIMIT_MS = 300;
+/** Offered before the robot's number of cameras is known; sections too many are answered inactive. */
+const USUAL_CAMERAS = 2;
+const CLOSED_BY_CONSOLE = "the console closed the connection";
 const CONNECT_LIMIT_MS = 10_000;
 const DISCONNECTED_LIMIT_MS = 4000;
 
@@ -47,15 +49,20 @@ export class Peer {
   /** Returns when the answer is set; the channels open shortly after. Raises ConsoleError. */
   async connect(): Promise<void> {
     const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(CONNECT_LIMIT_MS)]);
-    const { cameras, microphones } = await this.api.media(signal);
-    const trailer = this.addSections(cameras, microphones);
-    await this.connection.setLocalDescription(await this.connection.createOffer());
-    await this.gathered();
+    const media = this.api.media(signal);
+    let trailer = this.addSections(USUAL_CAMERAS, 1);
+    // The first offer makes the browser look for its codecs, which takes as long as the console's answer.
+    const [{ cameras }, usual] = await Promise.all([media, this.connection.createOffer()]);
+    const more = cameras > USUAL_CAMERAS;
+    if (more) trailer = this.addSections(cameras - USUAL_CAMERAS, 0) || trailer;
+    await this.connection.setLocalDescription(more ? await this.connection.createOffer() : usual);
     const offer = this.connection.localDescription?.sdp ?? "";
     const answer = await this.api.offer(offer, trailer, signal);
     this.location = answer.location;
     if (this.isOver) throw new ConsoleError(0, "closed", "closed while connecting", null);
     await this.connection.setRemoteDescription({ type: "answer", sdp: answer.sdp });
+    if (this.connection.iceGatheringState === "complete") this.sendCandidates();
+    else this.connection.onicegatheringstatechange = () => this.gatheringChanged();
     this.endAfter(CONNECT_LIMIT_MS, "no connection: is UDP blocked?");
   }
 
@@ -98,7 +105,7 @@ export class Peer {
   private openChannel(name: ChannelName, options: RTCDataChannelInit): RTCDataChannel {
     const channel = this.connection.createDataChannel(name, options);
     channel.onmessage = (event: MessageEvent<unknown>) => this.events.message(name, event.data);
-    channel.onclose = () => this.finish("the console closed the connection");
+    channel.onclose = () => this.finish(CLOSED_BY_CONSOLE);
     return channel;
   }
 
@@ -111,24 +118,31 @@ export class Peer {
     else if (state !== "connected") this.endAfter(CONNECT_LIMIT_MS, "no connection: is UDP blocked?");
   }
 
+  private gatheringChanged(): void {
+    if (this.connection.iceGatheringState === "complete" && !this.isOver) this.sendCandidates();
+  }
+
   private endAfter(limitMs: number, why: string): void {
     clearTimeout(this.timer);
     if (this.connection.connectionState === "connected") return;
     this.timer = setTimeout(() => this.finish(why), limitMs);
   }
 
-  /** Candidates go with the offer: the console needs only one that works, and here they come in milliseconds. */
-  private async gathered(): Promise<void> {
-    const { connection } = this;
-    if (connection.iceGatheringState === "complete") return;
-    await new Promise<void>((resolve) => {
-      const timer = setTimeout(resolve, GATHER_LIMIT_MS);
-      connection.onicegatheringstatechange = () => {
-        if (connection.iceGatheringState !== "complete") return;
-        clearTimeout(timer);
-        resolve();
-      };
-    });
+  /**
+   * The console learns our address from our own checks (RFC 8445 7.3.1.3), so the offer does not wait for candidates.
+   * Those that say more than an mDNS name follow in one fragment (RFC 8840).
+   */
+  private sendCandidates(): void {
+    const offer = this.connection.localDescription?.sdp ?? "";
+    const lines = offer.split(/\r?\n/);
+    const candidates = lines.filter((line) => line.startsWith("a=candidate:") && !line.includes(".local "));
+    if (this.location === "" || candidates.length === 0) return;
+    const head = ["a=ice-ufrag:", "a=ice-pwd:", "a=mid:"].map(
+      (name) => lines.find((line) => line.startsWith(name)) ?? "",
+    );
+    const fragment = [...head, ...new Set(candidates), "a=end-of-candidates", ""].join("\r\n");
+    // Only a help: without them the connection is still found.
+    this.api.trickle(this.location, fragment).catch(() => undefined);
   }
 
   private finish(why: string | null): void {
@@ -139,7 +153,7 @@ export class Peer {
     for (const { stamps } of this.sections) if (stamps !== null) this.reader?.detach(stamps);
     this.connection.close();
     // The console notices a lost peer by itself; asking it to end the session only makes that quicker.
-    this.api.end(this.location).catch(() => undefined);
+    if (why !== CLOSED_BY_CONSOLE) this.api.end(this.location).catch(() => undefined);
     if (why !== null) this.events.ended(why);
   }
 }

@@ -3,7 +3,9 @@ import { button, h, setText } from "./dom";
 
 type SceneState = "off" | "loading" | "on" | "failed";
 
-/** The 3D scene in a frame of its own. It is loaded when asked for: it costs a graphics context. */
+const IDLE_WORDS = "The robot, posed from its feedback";
+
+/** The 3D scene in a frame of its own. It runs only while it is the large view: drawing it takes from the pictures. */
 export class SceneView {
   readonly element = h("div", "scene");
   private readonly words = h("p", "scene-words");
@@ -13,7 +15,7 @@ export class SceneView {
 
   constructor(private readonly api: ConsoleApi) {
     this.element.append(h("div", "scene-idle", {}, this.words, this.open));
-    this.show("off", "Robot, posed from its feedback");
+    this.show("off", IDLE_WORDS);
   }
 
   /** Opens the scene unless it is open. */
@@ -26,16 +28,24 @@ export class SceneView {
     );
   }
 
+  /** Ends it; what it drew is gone with it. */
+  unload(): void {
+    if (this.state === "off") return;
+    this.frame?.remove();
+    this.frame = null;
+    this.show("off", IDLE_WORDS);
+  }
+
   /** Opens it anew if it is open. */
   reload(): void {
     if (this.state === "off") return;
-    this.state = "off";
+    this.unload();
     this.load();
   }
 
   private embed(path: string): void {
-    this.frame?.remove();
-    this.frame = h("iframe", "scene-frame", { src: path, title: "3D scene of the robot", tabindex: "-1" });
+    if (this.state !== "loading") return;
+    this.frame = h("iframe", "scene-frame", { src: path, title: "3D scene of the robot" });
     this.element.append(this.frame);
     this.show("on", "");
   }

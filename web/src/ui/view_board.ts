@@ -77,6 +77,7 @@ export class ViewBoard {
   private swapIn(name: string): void {
     this.main = name;
     if (name === SCENE) this.scene.load();
+    else this.scene.unload();
     this.arrange();
   }
 
