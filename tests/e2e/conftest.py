@@ -1,4 +1,4 @@
-"""A console with the planar robot, and a Chromium, for each test."""
+"""A console with the planar robot, browsers, and a sound card that can be listened to, for each test."""
 
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -7,6 +7,8 @@ import pytest
 from playwright.async_api import Browser
 
 from tests.support.chromium import running_chromium
+from tests.support.firefox import Firefox, running_firefox
+from tests.support.sound_card import SoundCard, running_sound_card
 from tests.support.stack import Stack, running_stack
 
 
@@ -17,6 +19,18 @@ async def stack(tmp_path: Path) -> AsyncIterator[Stack]:
 
 
 @pytest.fixture
-async def chromium() -> AsyncIterator[Browser]:
-    async with running_chromium() as browser:
+async def sound_card(tmp_path: Path) -> AsyncIterator[SoundCard]:
+    async with running_sound_card(tmp_path) as card:
+        yield card
+
+
+@pytest.fixture
+async def chromium(sound_card: SoundCard) -> AsyncIterator[Browser]:
+    async with running_chromium(sound_card.environment) as browser:
+        yield browser
+
+
+@pytest.fixture
+async def firefox(sound_card: SoundCard) -> AsyncIterator[Firefox]:
+    async with running_firefox(sound_card.environment) as browser:
         yield browser

@@ -95,7 +95,7 @@ async def test_the_trailer_carries_sound_and_pictures_when_it_is_asked_for(stack
 async def test_media_pacing_shows_a_picture_for_every_few_events(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
-        await console.page.get_by_label("Next command waits for").select_option("media")
+        await console.page.get_by_role("button", name="Media", exact=True).click()
         await console.until("s.pacing === 'media'")
         await _driven(console, 40)
         _no_violation(await console.stats())

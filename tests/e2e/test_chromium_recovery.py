@@ -39,13 +39,9 @@ async def test_a_frozen_bridge_counts_as_a_dead_link_and_resumes_in_the_same_epo
         await console.until_live()
         await console.arm()
         await console.drive_forward()
-        pid = stack.bridge_pid()
-        os.kill(pid, signal.SIGSTOP)
-        try:
+        with stack.frozen_bridge():
             await console.until("!s.armed")
-            await console.page.get_by_text("robot link", exact=False).first.wait_for()
-        finally:
-            os.kill(pid, signal.SIGCONT)
+            await console.page.get_by_text("Robot unreachable").first.wait_for()
         await console.press(RB, False)
         await console.tilt(LEFT_Y, 0)
         await console.until("s.connected && s.at_rest === true && s.seat && s.seat.mine", 60)

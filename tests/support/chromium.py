@@ -20,13 +20,18 @@ FLAGS = [
 
 
 @asynccontextmanager
-async def running_chromium() -> AsyncIterator[Browser]:
-    """A headless Chromium, closed on leaving."""
+async def running_chromium(environment: dict[str, str] | None = None) -> AsyncIterator[Browser]:
+    """A headless Chromium, closed on leaving. It makes sound, which Playwright would otherwise mute."""
     executable = shutil.which("chromium") or shutil.which("google-chrome")
     if executable is None:
         raise RuntimeError("Chromium is not installed: make test installs Debian's chromium")
     async with async_playwright() as playwright:
-        browser = await playwright.chromium.launch(executable_path=executable, args=FLAGS)
+        browser = await playwright.chromium.launch(
+            executable_path=executable,
+            args=FLAGS,
+            ignore_default_args=["--mute-audio"],
+            env=dict(environment) if environment else None,
+        )
         try:
             yield browser
         finally:

@@ -33,6 +33,9 @@ class Firefox:
     async def key(self, code: str, *, down: bool) -> None:
         await self._ask("key", code=code, down=down)
 
+    async def click(self, selector: str) -> None:
+        await self._ask("click", selector=selector)
+
     async def screenshot(self, path: Path) -> None:
         await self._ask("screenshot", path=str(path))
 
@@ -56,7 +59,7 @@ class Firefox:
 
 
 @asynccontextmanager
-async def running_firefox() -> AsyncIterator[Firefox]:
+async def running_firefox(environment: dict[str, str] | None = None) -> AsyncIterator[Firefox]:
     """A headless Firefox with one empty page and its own profile, closed on leaving."""
     executable = shutil.which("firefox-esr") or shutil.which("firefox")
     if executable is None:
@@ -66,6 +69,7 @@ async def running_firefox() -> AsyncIterator[Firefox]:
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         limit=ANSWER_LIMIT,
+        env=environment,
     )
     try:
         yield Firefox(process)

@@ -28,6 +28,7 @@ const verbs = {
   evaluate: ({ expression }) => page.evaluate(expression),
   wait: ({ expression, timeout }) => waitFor(expression, timeout),
   key: ({ code, down }) => (down ? page.keyboard.down(code) : page.keyboard.up(code)).then(() => null),
+  click: ({ selector }) => page.click(selector).then(() => null),
   screenshot: ({ path }) => page.screenshot({ path }).then(() => null),
   errors: async () => errors,
 };

@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -44,6 +44,16 @@ class Stack:
         if len(children) != 1:
             raise RuntimeError(f"expected one child process, found {children}")
         return int(children[0])
+
+    @contextmanager
+    def frozen_bridge(self) -> Iterator[None]:
+        """The bridge's process does not run inside the block."""
+        pid = self.bridge_pid()
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            os.kill(pid, signal.SIGCONT)
 
     def events(self, kind: str) -> Iterator[dict[str, Any]]:
         """The bridge's records of one kind so far."""

@@ -1,0 +1,49 @@
+"""What comes out of the loudspeaker in real Chromium, recorded from the sound card."""
+
+import pytest
+from playwright.async_api import Browser
+
+from tests.e2e.console_page import open_console
+from tests.support.sound_card import SoundCard, tone_level
+from tests.support.stack import Stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+TONE = 440.0  # Hz, what the planar robot plays
+
+
+async def test_the_robots_tone_is_heard(stack: Stack, chromium: Browser, sound_card: SoundCard) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.until("s.streams.microphone.rendered > 20")
+        assert tone_level(await sound_card.record(1.0), TONE) > 0.02
+
+
+async def test_sound_outside_the_tolerance_is_silent_until_the_gate_is_switched_off(
+    stack: Stack, chromium: Browser, sound_card: SoundCard
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.until("s.streams.microphone.rendered > 20")
+        for _ in range(6):
+            await console.page.get_by_role("button", name="Sound tolerance: one event less").click()
+        await console.until("s.tolerance.audio === 0")
+        await console.arm()
+        await console.drive_forward()
+        await console.until("s.event > 20")
+        gated = tone_level(await sound_card.record(1.0), TONE)  # sound takes longer than one event to arrive
+        discarded = (await console.stats())["streams"]["microphone"]["discarded"]
+        await console.page.get_by_role("switch", name="Media gate").click()
+        await console.until("!s.gate_enabled")
+        ungated = tone_level(await sound_card.record(1.0), TONE)
+        assert discarded > 10
+        assert gated < ungated / 2
+
+
+async def test_a_dead_robot_link_is_silent(stack: Stack, chromium: Browser, sound_card: SoundCard) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.until("s.streams.microphone.rendered > 20")
+        with stack.frozen_bridge():
+            await console.page.get_by_text("Robot unreachable").first.wait_for()
+            assert tone_level(await sound_card.record(0.5), TONE) < 0.002
