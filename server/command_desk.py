@@ -85,6 +85,12 @@ class CommandDesk:
         self._forget()
         return self._unconfirmed_stop
 
+    def epoch_ends(self) -> None:
+        """Call before the clock begins another epoch: a bridge that starts anew must not release a latched stop."""
+        stop = self._clock.stop
+        if stop.stopped:
+            self._unconfirmed_stop = self._unconfirmed_stop or Stop(by=stop.by, reason=stop.reason)
+
     def link_down(self) -> None:
         self._link_is_up = False
         self._forget()

@@ -179,6 +179,7 @@ class Console:
 
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
         """References of different epochs are never compared: every peer starts anew."""
+        self._desk.epoch_ends()
         self.clock.begin(epoch)
         self._shown_stop = StopState()
         self.peers.end_all("new epoch")

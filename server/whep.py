@@ -5,13 +5,14 @@ import ipaddress
 from typing import Annotated, Literal
 
 import structlog
-from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
+from aiortc import RTCPeerConnection, RTCSessionDescription
 from aiortc.sdp import SessionDescription, candidate_from_sdp
 from fastapi import APIRouter, Depends, Request, Response
 
 from server.access import Identity
 from server.body import read_text
 from server.errors import BadSdp, BadSdpFragment, ConsoleError, NotFound, RobotUnreachable
+from server.media.aiortc_private import create_peer_connection
 from server.offer import parse_fragment, prepare_offer
 from server.peer import Peer
 from server.services import Services, authorized, services
@@ -82,7 +83,7 @@ def _own(here: Services, resource: str, identity: Identity) -> Peer:
 
 async def _negotiate(here: Services, identity: Identity, offer: str, *, trailer: bool) -> tuple[Peer, str]:
     # No STUN server: our host candidates are a setting, the peer's address is learnt from its checks.
-    pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+    pc = create_peer_connection()
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
             await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))

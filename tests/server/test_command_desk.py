@@ -206,6 +206,18 @@ def test_a_stop_without_a_link_is_kept_even_if_the_robot_was_stopped_when_last_s
     assert bench.desk.link_up(ROBOT) == Stop(by="any")
 
 
+def test_a_bridge_that_starts_anew_is_stopped_again_if_the_last_one_was() -> None:
+    bench = Bench(stopped=True)
+    bench.desk.link_down()
+    bench.desk.epoch_ends()
+    bench.clock.begin("another")
+    assert isinstance(bench.desk.link_up(ROBOT), Stop)
+    bench.hear(_feedback(1, 1))
+    assert _reason(bench.desk.command("me", _command(2))) == "stopped"
+    bench.desk.reset("me")
+    assert bench.desk.command("me", _command(2)) == Forward(_command(2))
+
+
 def test_a_stop_that_was_reset_before_any_feedback_showed_it_is_over() -> None:
     bench = Bench()
     bench.desk.stop("any", "", 0.0)

@@ -50,6 +50,25 @@ async def test_a_stop_while_no_link_lives_is_sent_first_when_one_does() -> None:
             assert console.clock.stop == StopState(stopped=True, by="observer", reason="dog")
 
 
+async def test_a_restarted_bridge_is_stopped_again_if_the_last_one_was() -> None:
+    async with running_bridge() as bridge:
+        port = bridge.address[1]
+        rig_context = running_console(port)
+        rig = await rig_context.__aenter__()
+        console = rig.services.console
+        async with asyncio.timeout(PATIENCE):
+            await console.robot.reached.wait()
+        await rig.http.post("/api/stop", headers=rig.token("observer"), json={"reason": "dog"})
+        await eventually(lambda: console.clock.stop.stopped)
+        first = bridge.epoch
+    try:
+        async with running_bridge(port):
+            await eventually(lambda: console.clock.epoch != first and console.clock.stop.stopped)
+            assert console.clock.stop.reason == "dog"
+    finally:
+        await rig_context.__aexit__(None, None, None)
+
+
 async def test_a_second_console_waits_until_the_operator_link_is_free() -> None:
     async with running_bridge() as bridge, running_console(bridge.address[1]) as first:
         async with asyncio.timeout(PATIENCE):
