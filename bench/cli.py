@@ -1,4 +1,4 @@
-"""`python -m bench [--json FILE|-] [--quick] [SECTION ...]`"""
+"""`python -m bench [--json FILE|-] [--markdown FILE] [--quick] [SECTION ...]`"""
 
 import asyncio
 import json
@@ -15,7 +15,7 @@ from bench.context import Context
 from bench.machine import machine_facts
 from bench.results import Result
 from bench.stack import available_robots
-from bench.table import render_table
+from bench.table import render_markdown, render_table
 
 __all__ = ["SECTIONS", "main", "measure"]
 
@@ -30,6 +30,7 @@ def main() -> None:
 def run(
     sections: Annotated[list[str] | None, typer.Argument(help=f"Of {', '.join(SECTIONS)}; all unless given.")] = None,
     json_to: Annotated[str, typer.Option("--json", help="Write the results there as JSON; - is standard output.")] = "",
+    markdown: Annotated[Path | None, typer.Option(help="Write the tables there as Markdown.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer samples: to see that it works.")] = False,
 ) -> None:
     """Measure Lockstep on this machine, everything on loopback."""
@@ -53,6 +54,8 @@ def run(
         "failed": failed,
     }
     _publish(report, render_table(results), json_to)
+    if markdown is not None:
+        markdown.write_text(render_markdown(results))
     if failed:
         raise typer.Exit(1)
 

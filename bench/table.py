@@ -1,11 +1,11 @@
-"""Results as a table for people."""
+"""Results as tables for people: plain text, and Markdown for docs/performance.md."""
 
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
 from bench.results import Result
 
-__all__ = ["render_table"]
+__all__ = ["render_markdown", "render_table"]
 
 HEADINGS = ("", "value", "target", "", "baseline", "ratio")
 
@@ -22,6 +22,26 @@ def render_table(results: Sequence[Result]) -> str:
         lines += [f"  · {text}" for text in _unique(member.conditions for member in members)]
         lines += [f"  · baseline: {text}" for text in _unique(member.baseline_name for member in members)]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def render_markdown(results: Sequence[Result]) -> str:
+    """A table for each section, its conditions, and the command that repeats it."""
+    lines: list[str] = []
+    for section, group in groupby(results, key=lambda result: result.section):
+        members = list(group)
+        lines += [f"### {section}", "", f"`{members[0].command}`", ""]
+        lines += ["| | measured | target | | baseline | ratio |", "|---|--:|--:|---|--:|--:|"]
+        lines += [_row(member) for member in members]
+        lines.append("")
+        lines += [f"- {text}" for text in _unique(member.conditions for member in members)]
+        lines += [f"- baseline: {text}" for text in _unique(member.baseline_name for member in members)]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _row(result: Result) -> str:
+    name, value, target, met, baseline, ratio = (cell.strip() for cell in _cells(result))
+    return f"| {name} | {value} | {target} | {f'**{met}**' if met == 'MISSED' else met} | {baseline} | {ratio} |"
 
 
 def _cells(result: Result) -> tuple[str, ...]:

@@ -1,5 +1,5 @@
 from bench.results import Result
-from bench.table import render_table
+from bench.table import render_markdown, render_table
 
 
 def figure(value: float | None, **fields: object) -> Result:
@@ -64,3 +64,10 @@ def test_numbers_keep_three_digits_without_an_exponent() -> None:
 
 def test_what_could_not_be_measured_is_said() -> None:
     assert "not measured" in render_table([figure(None, target=1.0)])
+
+
+def test_markdown_has_a_table_for_each_section_and_marks_misses() -> None:
+    markdown = render_markdown([figure(45.0, target=20.0, baseline=90.0), figure(1.0, section="other", target=2.0)])
+    assert "### lossy\n\n`make bench ARGS=lossy`\n" in markdown
+    assert "| p99 | 45 ms | ≤ 20 | **MISSED** | 90 ms | 0.50 |" in markdown
+    assert "| p99 | 1 ms | ≤ 2 | met |  |  |" in markdown
