@@ -13,7 +13,7 @@ import {
 import { contactStrength, forceOf, speedShare } from "./core/contact";
 import { notePicture } from "./core/latency";
 import { noteShown } from "./core/command_gate";
-import { createRateMeter, noteHappening, quantile } from "./core/samples";
+import { createRateMeter, noteHappening, quantile, rateOf } from "./core/samples";
 import { parseServerMessage } from "./core/wire_parser";
 import { ARM_REFUSAL_WORDS } from "./core/words";
 import { Controls, type ControlSample } from "./input/controls";
@@ -32,6 +32,7 @@ import { reportOf } from "./statistics";
 import { StopSender } from "./stop_sender";
 import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, Welcome } from "./wire";
 
+const STALL_MS = 300; // without a tick, which comes every 10 ms
 const BEAT_MS = 500; // reports and pings
 const SILENT_MS = 1500; // the other side counts as gone for driving
 const DEAD_BEATS = 10; // and for the connection; counted, so that a page that was held up is not taken for it
@@ -67,6 +68,8 @@ export class ConsoleApp {
   private peer: Peer | null = null;
   private heardMs = 0;
   private silentBeats = 0;
+  private readonly stalls = createRateMeter(6000);
+  private tickMs = Infinity;
   private beatMs = 0;
   private feelMs = 0;
   private pings = new Map<number, number>(); // id -> when it was sent
@@ -105,6 +108,11 @@ export class ConsoleApp {
 
   isArmed(): boolean {
     return this.arming.state !== "disarmed";
+  }
+
+  /** Whether something keeps the page from its work, again and again. */
+  isHeldUp(now: number): boolean {
+    return rateOf(this.stalls, now) >= 0.5;
   }
 
   conditions(now = performance.now()): arming.ArmConditions {
@@ -293,6 +301,8 @@ export class ConsoleApp {
   }
 
   private tick(now: number): void {
+    if (now - this.tickMs > STALL_MS) noteHappening(this.stalls, now);
+    this.tickMs = now;
     const sample = this.controls.sample();
     const lost = arming.lostCondition(this.conditions(now));
     if (lost !== null) this.disarm(lost);

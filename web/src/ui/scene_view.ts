@@ -4,6 +4,7 @@ import { button, h, setText } from "./dom";
 type SceneState = "off" | "loading" | "on" | "failed";
 
 const IDLE_WORDS = "The robot, posed from its feedback";
+const SETTLE_MS = 5000;
 
 /** The 3D scene in a frame of its own. It runs only while it is the large view: drawing it takes from the pictures. */
 export class SceneView {
@@ -12,6 +13,7 @@ export class SceneView {
   private readonly open = button("wide-button", "Open the 3D scene", () => this.load());
   private frame: HTMLIFrameElement | null = null;
   private state: SceneState = "off";
+  private openedMs = 0;
 
   constructor(private readonly api: ConsoleApi) {
     this.element.append(h("div", "scene-idle", {}, this.words, this.open));
@@ -29,11 +31,16 @@ export class SceneView {
   }
 
   /** Ends it; what it drew is gone with it. */
-  unload(): void {
+  unload(words = IDLE_WORDS): void {
     if (this.state === "off") return;
     this.frame?.remove();
     this.frame = null;
-    this.show("off", IDLE_WORDS);
+    this.show("off", words);
+  }
+
+  /** Whether it has run long enough that its loading no longer holds the page up. */
+  hasSettled(now: number): boolean {
+    return this.state === "on" && now - this.openedMs > SETTLE_MS;
   }
 
   /** Opens it anew if it is open. */
@@ -47,6 +54,7 @@ export class SceneView {
     if (this.state !== "loading") return;
     this.frame = h("iframe", "scene-frame", { src: path, title: "3D scene of the robot" });
     this.element.append(this.frame);
+    this.openedMs = performance.now();
     this.show("on", "");
   }
 

@@ -48,7 +48,15 @@ export class ViewBoard {
   update(app: ConsoleApp, now: number): void {
     this.element.classList.toggle("is-locked", app.isArmed());
     this.followEpoch(app.state.robot?.epoch ?? null);
+    if (this.scene.hasSettled(now) && app.isHeldUp(now)) this.dropScene();
     for (const view of this.views.values()) if (view.canvas !== null) showVeil(app, view, now);
+  }
+
+  /** Nothing may keep STOP waiting, so a scene that this machine cannot draw fast enough goes. */
+  private dropScene(): void {
+    const camera = [...this.views.keys()].find((name) => name !== SCENE);
+    this.scene.unload("Closed: this machine draws it too slowly");
+    if (camera !== undefined) this.swapIn(camera);
   }
 
   /** The scene lives as long as the bridge whose robot it shows. */
