@@ -1,5 +1,6 @@
 """How OpenGL is reached, and what to say when it is not there. Imports nothing of MuJoCo."""
 
+import logging
 import os
 
 from robot_bridge.errors import RobotUnavailable
@@ -18,6 +19,8 @@ def choose_graphics() -> None:
     # Without a GPU Mesa rasterises on the CPU. More threads than one make a picture no sooner at this size and
     # cost a third more processor time.
     os.environ.setdefault("LP_NUM_THREADS", "1")
+    # PyOpenGL tells every start that its optional accelerator is absent; nothing here would use it.
+    logging.getLogger("OpenGL").setLevel(logging.WARNING)
 
 
 def graphics_unavailable(cause: BaseException) -> RobotUnavailable:
