@@ -62,7 +62,7 @@ def _moved(pose: Pose, joint: BodyJoint, value: float) -> Pose:
 
 def about(axis: Vector, angle: float) -> Quaternion:
     """A turn about `axis`, which need not be of length 1; about no axis it is no turn."""
-    length = math.sqrt(sum(each * each for each in axis))
+    length = math.hypot(*axis)  # exact for tiny axes too, whose squares underflow
     if length == 0:
         return (1.0, 0.0, 0.0, 0.0)
     sine = math.sin(angle / 2) / length
