@@ -46,7 +46,7 @@ function blockedWords(app: ConsoleApp): string | null {
   if (app.state.welcome === null) return "Not connected";
   if (!robotIsUp(app.state)) return "The robot cannot be reached";
   if (app.state.stop.stopped) return "The robot is stopped";
-  return holdsSeat(app.state) ? null : "You do not hold the control seat";
+  return holdsSeat(app.state) ? null : "The control seat is not yours";
 }
 
 function driverWords(app: ConsoleApp): string {

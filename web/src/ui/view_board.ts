@@ -102,7 +102,7 @@ export class ViewBoard {
       if (!isMain && view.name !== SCENE) place += 1;
       setHidden(view.swap, isMain);
     }
-    this.element.style.setProperty("--small", String(this.views.size - 1));
+    this.element.style.setProperty("--small", String(Math.max(1, this.views.size - 1)));
   }
 }
 
