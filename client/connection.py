@@ -278,27 +278,35 @@ class Connection:
         return self._welcome is not None and self.seat.holder == self._welcome.peer
 
     def statistics(self) -> ConsoleStatistics:
+        now = self._loop.time()
         pilot, delays = self.driver.pilot, self.driver.picture_delay.samples
+        delay = percentiles(delays, 1000)
         return ConsoleStatistics(
+            peer=self._welcome.peer if self._welcome is not None else "",
+            epoch=self.robot.epoch,
             event=pilot.newest.event if pilot.newest is not None else 0,
             armed=pilot.armed,
+            gate=pilot.gate.state(now),
             streams=self.media.statistics(),
             picture_delay_ms=delays[-1] * 1000 if delays else None,
+            picture_delay_p50_ms=delay.median,
+            picture_delay_p95_ms=delay.p95,
             round_trip_ms=self._pings.round_trip * 1000 if self._pings.round_trip is not None else None,
             command_to_feedback_ms=percentiles(pilot.samples, 1000),
-            event_rate_hz=self._event_rate.rate(self._loop.time()),
+            event_rate=self._event_rate.rate(now),
+            bad_messages=self.malformed,
             repeats=pilot.repeats,
             echoes=pilot.echoes,
         )
 
     def _report(self) -> Report:
-        figures = self.statistics()
+        pilot, delays, round_trip = self.driver.pilot, self.driver.picture_delay.samples, self._pings.round_trip
         return Report(
-            event=figures.event,
-            armed=figures.armed,
-            streams=[stream.report() for stream in figures.streams],
-            picture_delay_ms=figures.picture_delay_ms,
-            round_trip_ms=figures.round_trip_ms,
+            event=pilot.newest.event if pilot.newest is not None else 0,
+            armed=pilot.armed,
+            streams=[stream.report() for stream in self.media.statistics()],
+            picture_delay_ms=delays[-1] * 1000 if delays else None,
+            round_trip_ms=round_trip * 1000 if round_trip is not None else None,
         )
 
     # What is asked of the console

@@ -64,6 +64,8 @@ class Console:
         silence_seconds: float = 5.0,
         route: Route | None = None,
     ) -> None:
+        if pacing == "media" and not (decode and video):
+            raise ValueError("pacing by media needs decoded pictures")
         self._options = ConnectionOptions(
             link=parse_link(link),
             pacing=pacing,

@@ -91,11 +91,12 @@ class Refused(ConsoleError):
     """
 
     def __init__(self, reason: str, detail: str = "") -> None:
-        super().__init__(detail)
+        super().__init__(f"{reason}: {detail}" if detail else reason)
         self.reason = reason
+        self.detail = detail
 
     def __str__(self) -> str:
-        return f"{self.reason}: {self.detail}" if self.detail else self.reason
+        return str(self.args[0])
 
 
 class CommandRefused(Refused):

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 import msgspec
 
+from client.command_gate import GateState
 from robot_bridge.protocol.carriers import Carrier
 from robot_bridge.protocol.console import StreamReport
 from robot_bridge.protocol.serial import event_gap
@@ -18,7 +19,7 @@ class Percentiles(msgspec.Struct, frozen=True, kw_only=True):
     """Of the last samples; None without any."""
 
     count: int = 0
-    p50: float | None = None
+    median: float | None = None
     p95: float | None = None
     p99: float | None = None
     maximum: float | None = None
@@ -58,15 +59,21 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ConsoleStatistics(msgspec.Struct, frozen=True, kw_only=True):
-    """Everything that `Console.stats()` says. Times in ms."""
+    """Everything that `Console.stats()` says. Times in ms. `msgspec.to_builtins` makes a dict of it."""
 
+    peer: str = ""  # this connection's id
+    epoch: str = ""  # run of the robot bridge
     event: int = 0  # newest feedback; 0 before the first
     armed: bool = False
+    gate: GateState = "no_feedback"
     streams: list[StreamStatistics] = []
     picture_delay_ms: float | None = None  # from a command to the first picture of its event, the last one seen
+    picture_delay_p50_ms: float | None = None
+    picture_delay_p95_ms: float | None = None
     round_trip_ms: float | None = None  # of the last ping
     command_to_feedback_ms: Percentiles = Percentiles()
-    event_rate_hz: float = 0.0
+    event_rate: float = 0.0  # Hz
+    bad_messages: int = 0  # from the console, that could not be read
     repeats: int = 0  # commands sent again for want of an answer
     echoes: int = 0  # commands doubled because the path loses packets
 
@@ -80,7 +87,7 @@ def percentiles(samples: Iterable[float], scale: float = 1.0) -> Percentiles:
     def rank(percent: int) -> float:
         return ordered[max(0, -(-len(ordered) * percent // 100) - 1)] * scale
 
-    return Percentiles(count=len(ordered), p50=rank(50), p95=rank(95), p99=rank(99), maximum=ordered[-1] * scale)
+    return Percentiles(count=len(ordered), median=rank(50), p95=rank(95), p99=rank(99), maximum=ordered[-1] * scale)
 
 
 class EventRate:

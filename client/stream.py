@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Executor
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import av
 
@@ -18,18 +18,24 @@ __all__ = ["Picture", "Sound", "Stream"]
 
 ENCODED_BOUND = 12  # frames that may wait for the decoder
 KEYFRAMES = {"VP8": is_vp8_keyframe, "H264": is_h264_keyframe}
-FrameType = TypeVar("FrameType", av.VideoFrame, av.AudioFrame)
 
 
-class _Medium(NamedTuple, Generic[FrameType]):
-    stream: str  # name of the camera or microphone
+class Picture(NamedTuple):
+    """A picture that may be shown now."""
+
+    stream: str  # name of the camera
     stamp: int | None  # event reference at capture; None only with the gate off
     gap: int | None  # newest feedback's event minus the stamp
-    frame: FrameType
+    frame: av.VideoFrame
 
 
-Picture = _Medium[av.VideoFrame]
-Sound = _Medium[av.AudioFrame]
+class Sound(NamedTuple):
+    """A segment of sound that may be played now; fields as in `Picture`."""
+
+    stream: str
+    stamp: int | None
+    gap: int | None
+    frame: av.AudioFrame
 
 
 class Stream:

@@ -1,0 +1,11 @@
+"""Makers of messages for the client's tests."""
+
+from robot_bridge.protocol.messages import Feedback, Refusal, RefusalReason, StopState
+
+
+def feedback(event: int, issue: int = 1, *, at_rest: bool = True, stopped: bool = False) -> Feedback:
+    return Feedback(event=event, issue=issue, time=0.0, axes=[0.0], at_rest=at_rest, stop=StopState(stopped=stopped))
+
+
+def refusal(event: int, reason: RefusalReason, current: int = 1) -> Refusal:
+    return Refusal(event=event, reason=reason, current=current)

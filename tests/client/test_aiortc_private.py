@@ -1,0 +1,243 @@
+"""Pins the private parts of aiortc and aioice that client/aiortc_private.py builds on: an upgrade that moves one of
+them fails here, by name."""
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from aiortc import RTCBundlePolicy, RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from aiortc.mediastreams import AudioStreamTrack, VideoStreamTrack
+from aiortc.rtp import RtpPacket
+
+from client import aiortc_private
+from client.aiortc_private import drain_dtls, gather_only_on, hasten_sctp, take_packets, take_raw_rtp
+from client.frame_assembler import MediaPacket
+from client.rtp_header import parse_rtp_header
+from client.sdp import offer_extension, read_sections
+from robot_bridge.protocol.carriers import EVENT_REFERENCE_URI, unpack_event_reference
+
+SECONDS = 15
+
+
+def new_peer(*kinds: str) -> RTCPeerConnection:
+    pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
+    for kind in kinds:
+        pc.addTransceiver(kind, direction="recvonly")
+    return pc
+
+
+@asynccontextmanager
+async def connected(
+    offerer: RTCPeerConnection,
+    *tracks: VideoStreamTrack | AudioStreamTrack,
+    before_answer: Callable[[RTCPeerConnection], None] = lambda pc: None,
+) -> AsyncIterator[tuple[RTCDataChannel, RTCDataChannel]]:
+    """`offerer` connected to a plain aiortc peer that sends `tracks`; both ends of a data channel."""
+    answerer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+    there: asyncio.Future[RTCDataChannel] = asyncio.get_running_loop().create_future()
+    answerer.on("datachannel", there.set_result)
+    opened = asyncio.Event()
+    here = offerer.createDataChannel("control", ordered=False, maxRetransmits=0)
+    here.on("open", opened.set)
+    try:
+        async with asyncio.timeout(SECONDS):
+            gather_only_on(offerer, ["127.0.0.1"])
+            await offerer.setLocalDescription(await offerer.createOffer())
+            await answerer.setRemoteDescription(offerer.localDescription)
+            for track in tracks:
+                answerer.addTrack(track)
+            gather_only_on(answerer, ["127.0.0.1"])
+            await answerer.setLocalDescription(await answerer.createAnswer())
+            before_answer(offerer)
+            await offerer.setRemoteDescription(answerer.localDescription)
+            await opened.wait()
+            yield here, await there
+    finally:
+        await offerer.close()
+        await answerer.close()
+
+
+class Sink:
+    """Keeps the packets of one section."""
+
+    def __init__(self) -> None:
+        self.packets: list[MediaPacket] = []
+        self.enough = asyncio.Event()
+
+    def packet(self, payload_type: int, packet: MediaPacket) -> bool:
+        self.packets.append(packet)
+        if len(self.packets) >= 5:
+            self.enough.set()
+        return False
+
+    def missing(self) -> list[int]:
+        return []
+
+
+def decoder_threads() -> list[str]:
+    return [thread.name for thread in threading.enumerate() if thread.name.endswith("-decoder")]
+
+
+@pytest.mark.parametrize(
+    "attribute",
+    [
+        "_RTCRtpReceiver__jitter_buffer",
+        "_RTCRtpReceiver__decoder_thread",
+        "_handle_rtp_packet",
+        "_handle_disconnect",
+        "_send_rtcp_nack",
+        "receive",
+    ],
+)
+async def test_a_receiver_has(attribute: str) -> None:
+    pc = new_peer("video")
+    assert hasattr(pc.getTransceivers()[0].receiver, attribute)
+    await pc.close()
+
+
+@pytest.mark.parametrize("attribute", ["_rtp_header_extensions_map", "_handle_rtp_data", "_ssl", "_data_receiver"])
+async def test_a_dtls_transport_has(attribute: str) -> None:
+    pc = new_peer("video")
+    transport = pc.getTransceivers()[0].receiver.transport
+    if attribute == "_ssl":
+        assert "_ssl" in type(transport).start.__code__.co_names
+    else:
+        assert hasattr(transport, attribute)
+    await pc.close()
+
+
+@pytest.mark.parametrize(
+    "attribute", ["_rto", "_cwnd", "_srtt", "_rttvar", "_update_rto", "_t3_expired", "_handle_data", "transport"]
+)
+async def test_sctp_has(attribute: str) -> None:
+    pc = new_peer()
+    pc.createDataChannel("control")
+    assert hasattr(pc.sctp, attribute)
+    await pc.close()
+
+
+async def test_only_the_given_addresses_are_gathered() -> None:
+    pc = new_peer("video")
+    gather_only_on(pc, ["127.0.0.1"])
+    await pc.setLocalDescription(await pc.createOffer())
+    candidates = [line for line in pc.localDescription.sdp.splitlines() if line.startswith("a=candidate:")]
+    await pc.close()
+    assert candidates
+    assert all(" 127.0.0.1 " in line for line in candidates)
+
+
+async def test_a_connection_without_anything_to_carry_is_a_mistake() -> None:
+    pc = new_peer()
+    with pytest.raises(RuntimeError):
+        gather_only_on(pc, ["127.0.0.1"])
+    await pc.close()
+
+
+async def test_the_offered_extension_survives_the_local_description() -> None:
+    pc = new_peer("video", "audio")
+    gather_only_on(pc, ["127.0.0.1"])
+    offer = await pc.createOffer()
+    await pc.setLocalDescription(RTCSessionDescription(offer_extension(offer.sdp, EVENT_REFERENCE_URI), "offer"))
+    sections = read_sections(pc.localDescription.sdp)
+    await pc.close()
+    assert all(EVENT_REFERENCE_URI in section.extensions for section in sections)
+
+
+async def test_packets_reach_their_sink_and_nothing_is_decoded() -> None:
+    pc = new_peer("video", "audio")
+    video, audio = Sink(), Sink()
+
+    def take(pc: RTCPeerConnection) -> None:
+        take_packets(pc, {"0": video, "1": audio}, None, unpack_event_reference)
+
+    async with connected(pc, VideoStreamTrack(), AudioStreamTrack(), before_answer=take):
+        await video.enough.wait()
+        await audio.enough.wait()
+        assert decoder_threads() == []
+    assert any(packet.marker for packet in video.packets)
+    assert all(packet.stamp is None for packet in video.packets)
+    assert all(packet.data for packet in audio.packets)
+
+
+async def test_raw_packets_come_without_threads_or_receivers() -> None:
+    pc = new_peer("video")
+    taken: list[bytes] = []
+    enough = asyncio.Event()
+
+    def count(data: bytes) -> None:
+        taken.append(data)
+        if len(taken) >= 5:
+            enough.set()
+
+    async with connected(pc, VideoStreamTrack(), before_answer=lambda pc: take_raw_rtp(pc, count)):
+        await enough.wait()
+        assert decoder_threads() == []
+    assert all(parse_rtp_header(data) is not None for data in taken)
+
+
+def test_the_stamp_is_read_beside_the_other_extensions() -> None:
+    stamps = aiortc_private._StampMap(5)
+    header = bytes([0x90, 97]) + (1).to_bytes(2, "big") + (2).to_bytes(4, "big") + (3).to_bytes(4, "big")
+    extension = bytes([0x53]) + (77).to_bytes(4, "big") + bytes(3)
+    packet = header + (0xBEDE).to_bytes(2, "big") + (2).to_bytes(2, "big") + extension + b"payload"
+    parsed: Any = RtpPacket.parse(packet, stamps).extensions
+    assert unpack_event_reference(parsed.event_reference) == 77
+
+
+def test_an_extension_of_the_wrong_length_drops_the_packet_and_no_more() -> None:
+    stamps = aiortc_private._StampMap(5)
+    parameters: Any = type("Parameters", (), {})()
+    extension: Any = type("Extension", (), {})()
+    extension.id, extension.uri = 3, "http://www.webrtc.org/experiments/rtp-hdrext/abs-send-time"
+    parameters.headerExtensions = [extension]
+    stamps.configure(parameters)
+    with pytest.raises(ValueError, match="wrong length"):
+        stamps.get(0xBEDE, bytes([0x30, 1, 0, 0]))
+
+
+async def test_every_record_of_a_datagram_is_delivered() -> None:
+    pc = new_peer()
+    received: asyncio.Queue[str] = asyncio.Queue(10)
+    async with connected(pc, before_answer=drain_dtls) as (here, there):
+        here.on("message", received.put_nowait)
+        transport: Any = there.transport.transport
+        write, held, both = transport._write_ssl, [], asyncio.Event()
+
+        async def hold() -> None:
+            held.append(1)
+            if len(held) == 2:
+                both.set()
+
+        transport._write_ssl = hold
+        for text in ("first", "second"):
+            there.send(text)
+        await both.wait()
+        transport._write_ssl = write
+        await write()
+        assert [await received.get(), await received.get()] == ["first", "second"]
+
+
+async def test_the_end_of_dtls_is_still_noticed() -> None:
+    pc = new_peer()
+    closed = asyncio.Event()
+    async with connected(pc, before_answer=drain_dtls) as (here, there):
+        here.on("close", closed.set)
+        await there.transport.transport.stop()
+        await closed.wait()
+
+
+async def test_a_lost_message_is_found_out_sooner_and_does_not_shut_the_window() -> None:
+    pc = new_peer()
+    async with connected(pc, before_answer=hasten_sctp) as (here, there):
+        answers: asyncio.Queue[str] = asyncio.Queue(10)
+        there.on("message", answers.put_nowait)
+        here.send("measure")
+        await answers.get()
+        sctp: Any = pc.sctp
+        assert aiortc_private.RETRANSMISSION_FLOOR <= sctp._rto < 1
+        sctp._t3_cancel()
+        sctp._t3_expired()
+        assert sctp._cwnd >= aiortc_private.WINDOW_FLOOR
