@@ -1,15 +1,19 @@
 import { judge } from "./media_gate";
 import { createCounts, noteRendered, type GateContext, type MediumCounts } from "./medium_counts";
 
+/** When no new segment came for this long, what plays is the decoder's concealment: its own invention. */
+const CONCEALED_MS = 200;
+
 /** The gate of one audio stream. A segment counts by the verdict at its start. */
 export interface SoundGate {
   readonly counts: MediumCounts;
   playing: number | null; // RTP timestamp of the segment being played
+  playingSinceMs: number;
   judged: boolean; // whether that segment is counted
 }
 
 export function createSoundGate(): SoundGate {
-  return { counts: createCounts(), playing: null, judged: false };
+  return { counts: createCounts(), playing: null, playingSinceMs: 0, judged: false };
 }
 
 /**
@@ -22,10 +26,12 @@ export function observeSound(
   stamp: number | null | undefined,
   context: GateContext,
   audible: boolean,
+  now: number,
 ): boolean {
   const { counts } = gate;
   if (gate.playing !== rtpTimestamp) {
     gate.playing = rtpTimestamp;
+    gate.playingSinceMs = now;
     gate.judged = false;
   }
   if (stamp === undefined && context.enabled) return false;
@@ -38,5 +44,5 @@ export function observeSound(
     else if (verdict === "hold") counts.held += 1;
     else counts.discarded += 1;
   }
-  return verdict === "render";
+  return verdict === "render" && now - gate.playingSinceMs < CONCEALED_MS;
 }

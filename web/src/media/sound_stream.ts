@@ -26,7 +26,8 @@ export class SoundStream {
     const stamp =
       source === undefined || stamps === null ? null : findStamp(stamps.book, source.rtpTimestamp);
     const passes =
-      source !== undefined && observeSound(this.gate, source.rtpTimestamp, stamp, context, audible);
+      source !== undefined &&
+      observeSound(this.gate, source.rtpTimestamp, stamp, context, audible, performance.now());
     this.isOpen = passes && audible;
     this.output.open(this.isOpen);
   }

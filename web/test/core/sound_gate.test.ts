@@ -14,43 +14,50 @@ function contextOf(feedback: number | null, enabled = true): GateContext {
 
 describe("the sound gate", () => {
   it("counts a segment once, by the verdict at its start", () => {
-    expect(observeSound(gate, 960, 10, contextOf(10), true)).toBe(true);
-    expect(observeSound(gate, 960, 10, contextOf(16), true)).toBe(true);
-    expect(observeSound(gate, 960, 10, contextOf(17), true)).toBe(false);
+    expect(observeSound(gate, 960, 10, contextOf(10), true, 0)).toBe(true);
+    expect(observeSound(gate, 960, 10, contextOf(16), true, 0)).toBe(true);
+    expect(observeSound(gate, 960, 10, contextOf(17), true, 0)).toBe(false);
     expect(gate.counts).toMatchObject({ rendered: 1, discarded: 0, maxGap: 0, violations: 0 });
   });
 
   it("shuts for a segment that is too old, and counts it as discarded", () => {
-    expect(observeSound(gate, 960, 3, contextOf(10), true)).toBe(false);
+    expect(observeSound(gate, 960, 3, contextOf(10), true, 0)).toBe(false);
     expect(gate.counts).toMatchObject({ rendered: 0, discarded: 1 });
   });
 
   it("shuts for a segment that overtook the feedback, and opens when that catches up", () => {
-    expect(observeSound(gate, 960, 20, contextOf(10), true)).toBe(false);
+    expect(observeSound(gate, 960, 20, contextOf(10), true, 0)).toBe(false);
     expect(gate.counts.held).toBe(1);
-    expect(observeSound(gate, 960, 20, contextOf(14), true)).toBe(true);
+    expect(observeSound(gate, 960, 20, contextOf(14), true, 0)).toBe(true);
     expect(gate.counts).toMatchObject({ held: 1, rendered: 0 });
   });
 
   it("stays shut while the stamp is unknown, and judges when it is known", () => {
-    expect(observeSound(gate, 960, undefined, contextOf(10), true)).toBe(false);
-    expect(observeSound(gate, 960, 9, contextOf(10), true)).toBe(true);
+    expect(observeSound(gate, 960, undefined, contextOf(10), true, 0)).toBe(false);
+    expect(observeSound(gate, 960, 9, contextOf(10), true, 0)).toBe(true);
     expect(gate.counts).toMatchObject({ rendered: 1, stamp: 9, gap: 1 });
   });
 
   it("shuts for a segment without a stamp", () => {
-    expect(observeSound(gate, 960, null, contextOf(10), true)).toBe(false);
+    expect(observeSound(gate, 960, null, contextOf(10), true, 0)).toBe(false);
     expect(gate.counts.discarded).toBe(1);
   });
 
   it("renders nothing while sound is off", () => {
-    observeSound(gate, 960, 10, contextOf(10), false);
+    observeSound(gate, 960, 10, contextOf(10), false, 0);
     expect(gate.counts).toMatchObject({ rendered: 0, discarded: 0, stamp: 10 });
   });
 
+  it("shuts when no new segment comes, for what plays then is invented", () => {
+    expect(observeSound(gate, 960, 10, contextOf(10), true, 1000)).toBe(true);
+    expect(observeSound(gate, 960, 10, contextOf(10), true, 1199)).toBe(true);
+    expect(observeSound(gate, 960, 10, contextOf(10), true, 1200)).toBe(false);
+    expect(observeSound(gate, 1920, 10, contextOf(10), true, 1300)).toBe(true);
+  });
+
   it("lets everything through while it is off", () => {
-    expect(observeSound(gate, 960, undefined, contextOf(100, false), true)).toBe(true);
-    expect(observeSound(gate, 1920, 1, contextOf(100, false), true)).toBe(true);
+    expect(observeSound(gate, 960, undefined, contextOf(100, false), true, 0)).toBe(true);
+    expect(observeSound(gate, 1920, 1, contextOf(100, false), true, 0)).toBe(true);
     expect(gate.counts).toMatchObject({ rendered: 2, violations: 0 });
   });
 });

@@ -1,0 +1,65 @@
+"""What was true at the bridge, to compare with what a client was given."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+from client import Console, Picture
+from robot_bridge.robots.planar.event_strip import read_event_strip
+from tests.support.stack import Stack
+
+__all__ = ["collecting", "drawn_event", "executed_after", "logged_stamps", "until_logged"]
+
+LOG_SECONDS = 5.0  # for the bridge's writer thread to catch up
+
+
+def drawn_event(picture: Picture) -> int | None:
+    """The event that the robot drew into the picture, read from its pixels."""
+    frame = picture.frame
+    return read_event_strip(frame.to_ndarray(format="gray"))
+
+
+async def until_logged(stack: Stack, kind: str, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    """The first record of this kind that meets the condition; waits for the log's writer."""
+    async with asyncio.timeout(LOG_SECONDS):
+        while True:
+            for record in stack.events(kind):
+                if condition(record):
+                    return record
+            await asyncio.sleep(0.05)
+
+
+async def logged_stamps(stack: Stack, stream: str, newest: int) -> set[int]:
+    """The stamps that the bridge gave this stream; the log is complete up to `newest`."""
+    await until_logged(stack, "feedback", lambda record: record["event"] >= newest)
+    return {record["event"] for record in stack.events("media") if record["stream"] == stream}
+
+
+def executed_after(stack: Stack, time: float) -> list[dict[str, Any]]:
+    return [record for record in stack.events("executed") if record["time"] > time]
+
+
+@asynccontextmanager
+async def collecting(console: Console, *, sound: bool = True) -> AsyncIterator[dict[str, list[Any]]]:
+    """Everything that passes the gate meanwhile, by stream."""
+    found: dict[str, list[Any]] = {camera.name: [] for camera in console.description.cameras}
+    found |= {microphone.name: [] for microphone in console.description.microphones if sound}
+
+    async def watch(camera: str) -> None:
+        async for picture in console.pictures(camera, keep=50):
+            found[camera].append(picture)
+
+    async def listen(microphone: str) -> None:
+        async for segment in console.sounds(microphone):
+            found[microphone].append(segment)
+
+    async with asyncio.TaskGroup() as group:
+        tasks = [group.create_task(watch(camera.name)) for camera in console.description.cameras]
+        tasks += [group.create_task(listen(each.name)) for each in console.description.microphones if sound]
+        await asyncio.sleep(0)
+        try:
+            yield found
+        finally:
+            for task in tasks:
+                task.cancel()
