@@ -13,6 +13,7 @@ Why each is needed:
   overtook the end of the handshake does, is never caught up with: from then on every message is one datagram late.
 """
 
+import contextlib
 import struct
 from collections.abc import Callable, Sequence
 from types import MethodType
@@ -188,7 +189,7 @@ def hasten_sctp(pc: RTCPeerConnection) -> None:
     RTO.Min to the application's needs) nor a window of a few packets after a timeout can congest a path.
     """
     sctp: Any = pc.sctp
-    measure, expire = sctp._update_rto, sctp._t3_expired
+    measure, expire, transmit = sctp._update_rto, sctp._t3_expired, sctp._transmit
 
     def update(round_trip: float) -> None:
         measure(round_trip)
@@ -198,7 +199,13 @@ def hasten_sctp(pc: RTCPeerConnection) -> None:
         expire()
         sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
 
+    async def transmit_or_not() -> None:
+        # A timer may fire while the connection closes; aiortc runs this in a task that nobody awaits.
+        with contextlib.suppress(ConnectionError):
+            await transmit()
+
     sctp._rto = RETRANSMISSION_START
     sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
     sctp._update_rto = update
     sctp._t3_expired = expired
+    sctp._transmit = transmit_or_not

@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
 
@@ -220,11 +220,13 @@ class Console:
 
     # Watching
 
-    async def feedbacks(self) -> AsyncIterator[Feedback]:
+    async def feedbacks(self) -> AsyncGenerator[Feedback]:
         """Every new feedback, the newest first if the reader is slow. Raises ConsoleLost when the connection ends."""
         connection = self._live()
         queue: NewestQueue[Feedback] = NewestQueue(1)
         connection.feedback_readers.append(queue)
+        if connection.lost is not None:
+            queue.close()
         try:
             while True:
                 yield await queue.get()
@@ -233,7 +235,7 @@ class Console:
         finally:
             connection.feedback_readers.remove(queue)
 
-    async def pictures(self, camera: str = "", *, keep: int = 2) -> AsyncIterator[Picture]:
+    async def pictures(self, camera: str = "", *, keep: int = 2) -> AsyncGenerator[Picture]:
         """Pictures of a camera ("" is the main one) that passed the gate, each judged once more when it is taken.
 
         A reader that is slow loses the oldest: at most `keep` wait. Raises ConsoleLost when the connection ends.
@@ -242,13 +244,13 @@ class Console:
         async for stream, medium in self._media(connection, connection.media.stream("video", camera), keep):
             yield Picture(stream.name, medium.stamp, stream.gate.check(medium.stamp)[1], medium.frame)
 
-    async def sounds(self, microphone: str = "", *, keep: int = 50) -> AsyncIterator[Sound]:
+    async def sounds(self, microphone: str = "", *, keep: int = 50) -> AsyncGenerator[Sound]:
         """Segments of a microphone ("" is the first) that passed the gate; as `pictures`."""
         connection = self._live()
         async for stream, medium in self._media(connection, connection.media.stream("audio", microphone), keep):
             yield Sound(stream.name, medium.stamp, stream.gate.check(medium.stamp)[1], medium.frame)
 
-    async def _media(self, connection: Connection, stream: Stream, keep: int) -> AsyncIterator[tuple[Stream, Any]]:
+    async def _media(self, connection: Connection, stream: Stream, keep: int) -> AsyncGenerator[tuple[Stream, Any]]:
         reader = stream.open_reader(keep)
         try:
             while True:

@@ -63,6 +63,7 @@ class Stream:
         self._packets = 0
         self._frames = 0
         self._unstamped = 0
+        self._closed = False
         self._unread = 0  # dropped by readers that are gone
 
     # From the network
@@ -142,6 +143,8 @@ class Stream:
 
     def open_reader(self, bound: int) -> NewestQueue[Decoded]:
         reader: NewestQueue[Decoded] = NewestQueue(bound)
+        if self._closed:
+            reader.close()
         self._readers.append(reader)
         return reader
 
@@ -151,6 +154,7 @@ class Stream:
 
     def close(self) -> None:
         """Nothing will come any more: readers read what is there, and end."""
+        self._closed = True
         for reader in self._readers:
             reader.close()
 

@@ -110,7 +110,8 @@ async def test_a_dtls_transport_has(attribute: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "attribute", ["_rto", "_cwnd", "_srtt", "_rttvar", "_update_rto", "_t3_expired", "_handle_data", "transport"]
+    "attribute",
+    ["_rto", "_cwnd", "_srtt", "_rttvar", "_update_rto", "_t3_expired", "_transmit", "_handle_data", "transport"],
 )
 async def test_sctp_has(attribute: str) -> None:
     pc = new_peer()

@@ -87,12 +87,13 @@ async def test_a_console_that_dies_is_noticed_in_bounded_time(tmp_path: Path) ->
             await console.drive([0.2, 0.0, 0.0])
             stack.process.send_signal(signal.SIGKILL)
             await stack.process.wait()
-            with pytest.raises(ConsoleLost):
-                async with asyncio.timeout(4):
-                    while True:
-                        await console.drive([0.2, 0.0, 0.0])
+            async with asyncio.timeout(4):
+                with pytest.raises(ConsoleLost):
+                    await _drive_until_refused(console)
             with pytest.raises(ConsoleLost):
                 await anext(console.pictures())
+            with pytest.raises(ConsoleLost):
+                await anext(console.feedbacks())
             with pytest.raises(ConsoleLost):
                 await console.stop("gone")
         await _until_gone(stack.robot)
@@ -114,7 +115,11 @@ async def _until_gone(robot: str) -> None:
 async def test_a_console_that_ends_says_so_at_once(tmp_path: Path) -> None:
     async with running_stack(tmp_path) as stack, Console(stack.observer, video=False, audio=False) as console:
         os.kill(stack.process.pid, signal.SIGTERM)
-        with pytest.raises(ConsoleLost, match="the console closed"):
-            async with asyncio.timeout(4):
-                async for _ in console.feedbacks():
-                    pass
+        async with asyncio.timeout(4):
+            with pytest.raises(ConsoleLost, match="the console closed"):
+                await _read_to_the_end(console)
+
+
+async def _read_to_the_end(console: Console) -> None:
+    async for _ in console.feedbacks():
+        pass
