@@ -70,7 +70,7 @@ LAYERS: Final = (
     ),
     ControlLayer(
         name="arm",
-        label="Arm",
+        label="Tool",
         bindings=(
             forward("tool.vx", "left_y", "left_y", ("W", "S")),
             leftward("tool.vy", "left_x", "left_x", ("A", "D")),

@@ -17,7 +17,7 @@ CAMERAS: Final = (  # names are those of the model's cameras
 MICROPHONE: Final = Microphone(name="microphone", label="Microphone", sample_rate=48_000)
 
 WRENCH: Final = WrenchSensor(
-    name="contact", body=MOUNT, threshold_force=1.0, full_scale_force=150.0, full_scale_torque=80.0
+    name="contact", body=MOUNT, threshold_force=3.0, full_scale_force=150.0, full_scale_torque=80.0
 )
 
 
