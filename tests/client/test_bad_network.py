@@ -48,14 +48,15 @@ async def test_a_freeze_brings_the_robot_to_rest_and_nothing_frozen_moves_it_lat
             await console.take_seat()
             for _ in range(10):
                 await console.drive([0.3, 0.0, 0.0])
-            driving = asyncio.ensure_future(_drive_until_refused(console))
-            await until_moving(console)
-            relay.freeze()
-            frozen_at = time.monotonic()
-            await asyncio.sleep(FREEZE)
-            thawed_at = time.monotonic()
-            relay.thaw()
-            assert await driving == "no_seat"
+            async with asyncio.TaskGroup() as group:
+                driving = group.create_task(_drive_until_refused(console))
+                await until_moving(console)
+                relay.freeze()
+                frozen_at = time.monotonic()
+                await asyncio.sleep(FREEZE)
+                thawed_at = time.monotonic()
+                relay.thaw()
+            assert driving.result() == "no_seat"
     last = [record for record in stack.events("executed") if record["time"] < frozen_at + MARGIN][-1]
     rest = await until_logged(stack, "feedback", lambda record: record["time"] > last["time"] and record["at_rest"])
     resting = [record for record in stack.events("feedback") if record["time"] > last["time"] + HOLD + MARGIN]
