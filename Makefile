@@ -40,7 +40,7 @@ check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, generated files 
 	$(BIN)/mypy
 	$(BIN)/python -m scripts.generate_wire --check
 	cd web && npm run --silent check
-	$(BIN)/pip-audit --disable-pip --require-hashes -r requirements-dev.lock
+	$(BIN)/python -m scripts.audit
 
 format: $(VENV)/.dev web/node_modules/.installed ## Format the code
 	$(BIN)/ruff format .
