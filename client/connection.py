@@ -233,7 +233,7 @@ class Connection:
     def _take_refusal(self, refusal: Refusal) -> None:
         if refusal.event == 0:
             self._refusals.append(refusal)
-        elif self._driver is not None:
+        if self._driver is not None and (refusal.event or refusal.reason == "link_down"):
             self._driver.refusal(refusal)
 
     def _take_robot(self, robot: RobotState) -> None:

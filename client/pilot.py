@@ -107,8 +107,8 @@ class Pilot:
     def refusal(self, refusal: Refusal) -> None:
         """Take a refusal. Those that fresh feedback can cure lead to another try, the others to an outcome."""
         flight = self._flight
-        if flight is None or not self.gate.refused(refusal.event):
-            return
+        if flight is None or not self.gate.refused(refusal.event or flight.command.event):
+            return  # event 0: the console could not even tell which
         self._flight = None
         if refusal.reason == "rested":
             self._void = flight.command.event

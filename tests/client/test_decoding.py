@@ -1,4 +1,3 @@
-from fractions import Fraction
 from typing import Any
 
 import av
@@ -9,27 +8,7 @@ from hypothesis import strategies as st
 
 from client.decoding import Decoder, is_h264_keyframe, is_vp8_keyframe
 from client.frame_assembler import EncodedFrame
-
-ENCODERS = {"VP8": "libvpx", "H264": "libx264"}
-OPTIONS = {
-    "VP8": {"deadline": "realtime", "lag-in-frames": "0"},
-    "H264": {"tune": "zerolatency", "bf": "0", "sc_threshold": "0"},
-}
-
-
-def encode(codec: str, count: int, every: int = 100) -> list[bytes]:
-    """Grey pictures, each lighter than the last."""
-    context: Any = av.CodecContext.create(ENCODERS[codec], "w")
-    context.width, context.height, context.pix_fmt = 64, 48, "yuv420p"
-    context.time_base, context.gop_size, context.options = Fraction(1, 30), every, OPTIONS[codec]
-    if codec == "H264":
-        context.profile = "Baseline"
-    encoded = []
-    for number in range(count):
-        frame = av.VideoFrame.from_ndarray(np.full((72, 64), 16 + 8 * number, np.uint8), format="yuv420p")
-        frame.pts = number
-        encoded += [bytes(packet) for packet in context.encode(frame)]
-    return encoded
+from tests.client.pictures import encode
 
 
 @pytest.mark.parametrize("codec", ["VP8", "H264"])

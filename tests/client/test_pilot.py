@@ -198,6 +198,15 @@ def test_a_refusal_of_another_event_changes_nothing() -> None:
     assert pilot.armed
 
 
+def test_a_refusal_without_an_event_is_of_the_one_in_flight() -> None:
+    pilot = new_pilot()
+    flying(pilot)
+    pilot.refusal(refusal(0, "link_down"))
+    [outcome] = pilot.outcomes()
+    assert outcome.refusal is not None
+    assert outcome.refusal.reason == "link_down"
+
+
 def test_an_event_voided_by_a_rest_is_used_up_by_a_neutral_command_first() -> None:
     pilot = new_pilot()
     ticket = pilot.intend(FAST, 0.0)
