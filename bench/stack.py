@@ -13,7 +13,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from bench.processes import ProcessFailed, Running, running_process
 
-__all__ = ["DEFAULT_ROBOT", "Bridge", "Stack", "available_robots", "running_bridge", "running_stack"]
+__all__ = ["DEFAULT_ROBOT", "Bridge", "Metrics", "Stack", "available_robots", "running_bridge", "running_stack"]
 
 DEFAULT_ROBOT = "mobile-manipulator"
 ROBOTS = (DEFAULT_ROBOT, "planar")
@@ -39,14 +39,23 @@ class Stack:
     operator: str  # links with a token
     observer: str
 
-    async def counts(self, name: str, by: str, **where: str) -> dict[str, float]:
-        """One of the console's counters: a value for each value of the label `by`, other labels as in `where`."""
+    async def metrics(self) -> "Metrics":
+        """The console's counters now."""
         async with httpx.AsyncClient(trust_env=False) as http:
-            text = (await http.get(f"{self.url}/metrics")).text
+            return Metrics((await http.get(f"{self.url}/metrics")).text)
+
+
+class Metrics:
+    """Counters in the Prometheus text format."""
+
+    def __init__(self, text: str) -> None:
+        self._samples = [sample for family in text_string_to_metric_families(text) for sample in family.samples]
+
+    def values(self, name: str, by: str, **where: str) -> dict[str, float]:
+        """One counter: a value for each value of the label `by`, other labels as in `where`."""
         return {
             sample.labels[by]: sample.value
-            for family in text_string_to_metric_families(text)
-            for sample in family.samples
+            for sample in self._samples
             if sample.name == name and where.items() <= sample.labels.items()
         }
 

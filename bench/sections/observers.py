@@ -32,9 +32,12 @@ BARE_SECONDS, QUICK_BARE_SECONDS = 8, 3
 CONNECT_SECONDS = 150.0
 ANSWER_SECONDS = 10.0
 SETTLE = 2.0  # s after somebody came
-DRAIN = 0.4  # s until nothing is on its way; the console gives its robot up after 1 s of silence
+ENCODE = 0.03  # s until what the bridge has sent is encoded
+LOOK, SAME, LOOKS = 0.01, 3, 40  # s between two looks at the observers; looks alike that settle it; looks at most
 ROBOT = "planar"  # the lightest: the machine's cores are for the console and the observers
 CPU_TARGET, SLOWDOWN_TARGET = 0.5, 2.0
+
+Received = dict[str, list[int]]  # per stream: frames, and packets lost
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Counts:
 
     encoded: dict[str, int]  # pictures, by camera
     dropped: float  # frames that did not fit an observer's outbox
-    received: list[dict[str, list[int]]]  # by observer: per stream, frames and packets lost
+    received: list[Received]  # by observer
 
 
 async def run(context: Context) -> list[Result]:
@@ -86,17 +89,28 @@ async def _drive(stack: Stack, audience: Running | None, operator: Console, even
 
 
 async def _count(stack: Stack, audience: Running) -> Counts:
+    """As briefly as possible: what the bridge could not send meanwhile it sends at once afterwards."""
     stack.bridge.process.pause()
     try:
-        await asyncio.sleep(DRAIN)
-        encoded, dropped, answer = await asyncio.gather(
-            stack.counts("lockstep_media_frames_encoded_total", "stream", codec="VP8"),
-            stack.counts("lockstep_media_frames_dropped_total", "stream", stage="peer_busy"),
-            audience.ask("count", ANSWER_SECONDS),
-        )
+        await asyncio.sleep(ENCODE)
+        metrics, received = await asyncio.gather(stack.metrics(), _settled(audience))
     finally:
         stack.bridge.process.go_on()
-    return Counts({camera: int(count) for camera, count in encoded.items()}, sum(dropped.values()), answer["counts"])
+    encoded = metrics.values("lockstep_media_frames_encoded_total", "stream", codec="VP8")
+    dropped = metrics.values("lockstep_media_frames_dropped_total", "stream", stage="peer_busy")
+    return Counts({camera: int(count) for camera, count in encoded.items()}, sum(dropped.values()), received)
+
+
+async def _settled(audience: Running) -> list[Received]:
+    """What each observer has received when nothing more comes."""
+    found: list[list[Received]] = []
+    while len(found) < SAME or any(each != found[-1] for each in found[-SAME:]):
+        if len(found) > LOOKS:
+            raise RuntimeError("the observers' counts grow without a picture")
+        answer = await audience.ask("count", ANSWER_SECONDS)
+        found.append(answer["counts"])
+        await asyncio.sleep(LOOK)
+    return found[-1]
 
 
 async def _bare(bridge: Bridge, seconds: float) -> dict[int, float]:
