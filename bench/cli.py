@@ -4,6 +4,7 @@ import asyncio
 import json
 import sys
 import time
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
@@ -12,15 +13,16 @@ from typing import Annotated, Any
 import typer
 
 from bench.context import Context
-from bench.machine import machine_facts
+from bench.machine import busy_percent, machine_facts
 from bench.results import Result
 from bench.stack import available_robots
 from bench.table import render_markdown, render_table
 
-__all__ = ["SECTIONS", "main", "measure"]
+__all__ = ["SECTIONS", "Measured", "main", "measure"]
 
 SECTIONS = ("command_to_feedback", "lossy", "capture_to_shown", "first_picture", "observers")
-BUSY = 1.0  # load average above which the figures say more about the neighbours
+BUSY_PERCENT = 8.0  # of the machine, by others, above which the figures say more about them
+LOOK_SECONDS = 1.5  # at the neighbours before each section
 
 
 def main() -> None:
@@ -52,6 +54,7 @@ def run(
         "seconds": round(time.monotonic() - began),
         "results": [result.fields() for result in results],
         "failed": failed,
+        "busy_percent": measured.busy_percent,
     }
     _publish(report, render_table(results), json_to)
     if markdown is not None:
@@ -70,19 +73,27 @@ def _publish(report: dict[str, Any], table: str, json_to: str) -> None:
             Path(json_to).write_text(text)
 
 
-async def measure(sections: list[str], quick: bool) -> tuple[list[Result], dict[str, str]]:
-    """The results, and why sections failed. One that fails does not keep the others from being measured."""
+@dataclass
+class Measured:
+    results: list[Result] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)  # by section, why
+    busy_percent: dict[str, float] = field(default_factory=dict)  # by section, of the machine, by others before it
+
+
+async def measure(sections: list[str], quick: bool) -> Measured:
+    """One section that fails does not keep the others from being measured."""
     context = Context(quick, await available_robots(), _say)
-    results: list[Result] = []
-    failed: dict[str, str] = {}
+    measured = Measured()
     for name in sections:
-        _say(f"{name} …")
+        measured.busy_percent[name] = busy = round(await busy_percent(LOOK_SECONDS), 1)
+        neighbours = f" (others use {busy:.0f} % of this machine: too much)" if busy > BUSY_PERCENT else ""
+        _say(f"{name} …{neighbours}")
         try:
-            results += await import_module(f"bench.sections.{name}").run(context)
+            measured.results += await import_module(f"bench.sections.{name}").run(context)
         except Exception as error:
-            failed[name] = _reason(error)
-            _say(f"{name} failed: {failed[name]}")
-    return results, failed
+            measured.failed[name] = _reason(error)
+            _say(f"{name} failed: {measured.failed[name]}")
+    return measured
 
 
 def _reason(error: BaseException) -> str:

@@ -1,5 +1,6 @@
 """What the figures were measured on."""
 
+import asyncio
 import os
 import platform
 import shutil
@@ -8,13 +9,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-__all__ = ["machine_facts"]
+__all__ = ["busy_percent", "machine_facts"]
 
 PACKAGES = ("lockstep", "aiortc", "av", "fastapi", "mujoco", "uvloop", "playwright")
 
 
 def machine_facts() -> dict[str, Any]:
-    """Cores, processor, memory, versions, and how busy the machine is."""
+    """Cores, processor, memory, versions."""
     return {
         "cores": os.cpu_count(),
         "cpu": _cpu_model(),
@@ -23,8 +24,22 @@ def machine_facts() -> dict[str, Any]:
         "python": platform.python_version(),
         "chromium": _chromium_version(),
         "packages": {name: version(name) for name in PACKAGES},
-        "load_average": os.getloadavg()[0],
     }
+
+
+async def busy_percent(seconds: float) -> float:
+    """What of the whole machine's processor time is used while we wait (proc(5), /proc/stat)."""
+    total, idle = _processor_time()
+    await asyncio.sleep(seconds)
+    later, later_idle = _processor_time()
+    return 100 * (1 - (later_idle - idle) / (later - total))
+
+
+def _processor_time() -> tuple[int, int]:
+    """In ticks since boot: all of it, and what was idle or waited for a disk."""
+    first, _, _ = Path("/proc/stat").read_text().partition("\n")
+    fields = [int(field) for field in first.split()[1:9]]  # guests are counted in the user time already
+    return sum(fields), fields[3] + fields[4]
 
 
 def _cpu_model() -> str:

@@ -52,9 +52,9 @@ async def test_a_section_that_fails_is_named_and_the_others_are_measured(monkeyp
 
     monkeypatch.setattr("bench.cli.available_robots", nothing)
     monkeypatch.setattr("bench.sections.lossy.run", fail)
-    results, failed = await measure(["lossy", "command_to_feedback"], quick=True)
-    assert failed == {"lossy": "RuntimeError: no such luck"}
-    assert results == []
+    measured = await measure(["lossy", "command_to_feedback"], quick=True)
+    assert measured.failed == {"lossy": "RuntimeError: no such luck"}
+    assert measured.busy_percent.keys() == {"lossy", "command_to_feedback"}
 
 
 def test_the_sections_are_the_figures_of_the_console() -> None:
