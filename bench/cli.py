@@ -40,15 +40,11 @@ def run(
     unknown = [name for name in chosen if name not in SECTIONS]
     if unknown:
         raise typer.BadParameter(f"no section {', '.join(unknown)}; there are {', '.join(SECTIONS)}")
-    facts = machine_facts()
-    if facts["load_average"] > BUSY:
-        _say(
-            f"this machine is busy (load average {facts['load_average']:.1f}): the figures will be worse than they are"
-        )
     began = time.monotonic()
-    results, failed = asyncio.run(measure(chosen, quick))
+    measured = asyncio.run(measure(chosen, quick))
+    results, failed = measured.results, measured.failed
     report = {
-        "machine": facts,
+        "machine": machine_facts(),
         "at": datetime.now(UTC).isoformat(timespec="seconds"),
         "quick": quick,
         "seconds": round(time.monotonic() - began),
