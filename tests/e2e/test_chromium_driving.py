@@ -48,10 +48,11 @@ async def test_driving_moves_the_robot_and_nothing_outside_the_tolerance_is_rend
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
         await _driven(console, 60)
+        # Sound that piled up while the sound device opened must not keep it behind the events for long.
+        await console.until("s.streams.microphone.rendered > 60", 15)
         statistics = await console.stats()
         _no_violation(statistics)
         assert statistics["streams"]["overview"]["rendered"] > 30
-        assert statistics["streams"]["microphone"]["rendered"] > 10
         await console.press(RB, False)
         await console.until("s.armed && !s.driving && s.at_rest === true")
     executed = [record["event"] for record in stack.events("executed")]

@@ -85,7 +85,7 @@ export class MediaRoom {
     const hasPicture = [...this.videos.values()].some((video) => video.lastDrawnMs !== null);
     if (!hasPicture && this.waitingSounds.every((sound) => performance.now() < sound.untilMs)) return;
     for (const { info, section } of this.waitingSounds.splice(0))
-      this.sounds.set(info.stream, new SoundStream(info, section, this.audio.open()));
+      this.sounds.set(info.stream, new SoundStream(info, section, this.reader, this.audio.open()));
   }
 
   private openVideo(info: StreamInfo, section: Section): VideoStream {

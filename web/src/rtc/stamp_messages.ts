@@ -14,12 +14,18 @@ export interface SoundContext {
   readonly enabled: boolean;
 }
 
+/** Page to worker: leave out sound of this receiver that is older than `before`, to work off a backlog. */
+export interface SoundSkip {
+  readonly receiver: number;
+  readonly before: number; // RTP timestamp
+}
+
 /** Worker to page, for every encoded frame. */
 export interface FrameNote {
   readonly receiver: number;
   readonly rtpTimestamp: number;
   readonly stamp: number | null; // null: none that is valid
-  readonly dropped: boolean; // too old already; never decoded
+  readonly dropped: boolean; // too old already or skipped; never decoded
 }
 
 export function isFrameNote(value: unknown): value is FrameNote {

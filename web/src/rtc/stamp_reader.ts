@@ -1,11 +1,12 @@
 import { createStampBook, noteStamp, type StampBook } from "../core/stamp_book";
-import { isFrameNote, type SoundContext, type TransformOptions } from "./stamp_messages";
+import { isFrameNote, type SoundContext, type SoundSkip, type TransformOptions } from "./stamp_messages";
 
 const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
 
 /** Stamps of one receiver's frames. */
 export interface ReceiverStamps {
   readonly book: StampBook;
+  newest: number | null; // RTP timestamp of the frame that arrived last
   dropped: number; // sound thrown away before decoding
   onstamp: (() => void) | null;
 }
@@ -27,7 +28,12 @@ export class StampReader {
   /** Puts the transform in front of a receiver's decoder. Call before the first frame arrives. */
   attach(receiver: RTCRtpReceiver, kind: "audio" | "video", trailer: boolean): ReceiverStamps {
     const options: TransformOptions = { receiver: this.nextReceiver++, kind, trailer };
-    const stamps: ReceiverStamps = { book: createStampBook(BOOK_LIMIT), dropped: 0, onstamp: null };
+    const stamps: ReceiverStamps = {
+      book: createStampBook(BOOK_LIMIT),
+      newest: null,
+      dropped: 0,
+      onstamp: null,
+    };
     this.receivers.set(options.receiver, stamps);
     receiver.transform = new RTCRtpScriptTransform(this.worker, options);
     return stamps;
@@ -41,6 +47,14 @@ export class StampReader {
     this.worker.postMessage(context);
   }
 
+  /** Leaves out sound that is older than the RTP timestamp `before`, before it is decoded. */
+  skip(stamps: ReceiverStamps, before: number): void {
+    for (const [receiver, known] of this.receivers) {
+      const order: SoundSkip = { receiver, before };
+      if (known === stamps) this.worker.postMessage(order);
+    }
+  }
+
   close(): void {
     this.receivers.clear();
     this.worker.terminate();
@@ -51,6 +65,7 @@ export class StampReader {
     const stamps = this.receivers.get(data.receiver);
     if (stamps === undefined) return;
     noteStamp(stamps.book, data.rtpTimestamp, data.stamp);
+    stamps.newest = data.rtpTimestamp;
     if (data.dropped) stamps.dropped += 1;
     stamps.onstamp?.();
   }

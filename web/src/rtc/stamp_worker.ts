@@ -1,8 +1,9 @@
 /** Transform worker: reads the stamp of every encoded frame before it is decoded, and takes the trailer off. */
 import { eventOfOffset } from "../core/capture_time";
 import { judge } from "../core/media_gate";
+import { rtpGap } from "../core/sound_backlog";
 import { splitTrailer } from "../core/trailer";
-import type { FrameNote, SoundContext, TransformOptions } from "./stamp_messages";
+import type { FrameNote, SoundContext, SoundSkip, TransformOptions } from "./stamp_messages";
 
 interface EncodedFrame {
   data: ArrayBuffer;
@@ -17,15 +18,17 @@ interface Transformer {
 
 interface TransformScope {
   onrtctransform: ((event: { readonly transformer: Transformer }) => void) | null;
-  onmessage: ((event: MessageEvent<SoundContext>) => void) | null;
+  onmessage: ((event: MessageEvent<SoundContext | SoundSkip>) => void) | null;
   postMessage(note: FrameNote): void;
 }
 
 const scope = self as unknown as TransformScope;
 let context: SoundContext = { feedback: null, tolerance: 0, enabled: true };
+const skips = new Map<number, number>(); // receiver -> RTP timestamp before which its sound is left out
 
-scope.onmessage = (event) => {
-  context = event.data;
+scope.onmessage = ({ data }) => {
+  if ("receiver" in data) skips.set(data.receiver, data.before);
+  else context = data;
 };
 
 scope.onrtctransform = ({ transformer }) => {
@@ -45,7 +48,8 @@ scope.onrtctransform = ({ transformer }) => {
 function passes(frame: EncodedFrame, options: TransformOptions): boolean {
   const metadata = frame.getMetadata();
   const stamp = options.trailer ? takeTrailer(frame) : eventOfOffset(metadata.senderCaptureTimeOffset);
-  const dropped = options.kind === "audio" && isTooOld(stamp);
+  const dropped =
+    options.kind === "audio" && (isSkipped(options.receiver, metadata.rtpTimestamp) || isTooOld(stamp));
   if (metadata.rtpTimestamp !== undefined)
     scope.postMessage({ receiver: options.receiver, rtpTimestamp: metadata.rtpTimestamp, stamp, dropped });
   return !dropped;
@@ -56,6 +60,14 @@ function takeTrailer(frame: EncodedFrame): number | null {
   if (trailer === null) return null;
   frame.data = frame.data.slice(0, length);
   return trailer.event;
+}
+
+function isSkipped(receiver: number, rtpTimestamp: number | undefined): boolean {
+  const before = skips.get(receiver);
+  if (before === undefined || rtpTimestamp === undefined) return false;
+  if (rtpGap(before, rtpTimestamp) > 0) return true;
+  skips.delete(receiver);
+  return false;
 }
 
 /** The gap of a sound only grows, so one that is too old now would never be heard. */

@@ -1,0 +1,44 @@
+import { describe, expect, it } from "vitest";
+import { createSoundBacklog, rtpGap, skipTarget } from "../../src/core/sound_backlog";
+
+const RATE = 48_000;
+const MS = RATE / 1000;
+
+describe("the sound backlog", () => {
+  it("leaves nothing out while little waits", () => {
+    const backlog = createSoundBacklog();
+    for (let now = 0; now < 2000; now += 20)
+      expect(skipTarget(backlog, (now + 240) * MS, now * MS, RATE, now)).toBeNull();
+  });
+
+  it("leaves out as much as waits, but for a little to play with", () => {
+    const backlog = createSoundBacklog();
+    expect(skipTarget(backlog, 1600 * MS, 0, RATE, 0)).toBeNull();
+    expect(skipTarget(backlog, 1900 * MS, 300 * MS, RATE, 300)).toBe((1900 + 1600 - 40) * MS);
+  });
+
+  it("waits until that is done before it judges again", () => {
+    const backlog = createSoundBacklog();
+    skipTarget(backlog, 1600 * MS, 0, RATE, 0);
+    const target = skipTarget(backlog, 1900 * MS, 300 * MS, RATE, 300) ?? 0;
+    expect(skipTarget(backlog, 3000 * MS, 1400 * MS, RATE, 1400)).toBeNull();
+    expect(skipTarget(backlog, target + 40 * MS, target, RATE, 3500)).toBeNull();
+    expect(backlog.skipTo).toBeNull();
+  });
+
+  it("does not take the jump after an outage for a backlog", () => {
+    const backlog = createSoundBacklog();
+    expect(skipTarget(backlog, 100 * MS, 40 * MS, RATE, 100)).toBeNull();
+    expect(skipTarget(backlog, 2100 * MS, 100 * MS, RATE, 2100)).toBeNull();
+    expect(skipTarget(backlog, 2200 * MS, 2140 * MS, RATE, 2200)).toBeNull();
+    expect(skipTarget(backlog, 2500 * MS, 2440 * MS, RATE, 2500)).toBeNull();
+  });
+
+  it("counts across the wrap of RTP timestamps", () => {
+    const backlog = createSoundBacklog();
+    const playing = 2 ** 32 - 500 * MS;
+    skipTarget(backlog, 500 * MS, playing, RATE, 0);
+    expect(skipTarget(backlog, 500 * MS, playing, RATE, 300)).toBe((500 + 1000 - 40) * MS);
+    expect(rtpGap(0, 2 ** 32 - 1)).toBe(1);
+  });
+});
