@@ -12,7 +12,6 @@ __all__ = ["LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
 
 START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
 LEFT_X, LEFT_Y = 0, 1
-ARM_TRIES = 5
 
 # The true event, read out of the strip that the planar robot draws into its pictures (robots/planar/event_strip.py),
 # together with the stamp that the page believes it has. One expression: no picture is drawn in between.
@@ -76,7 +75,12 @@ class ConsolePage:
         await self.until(f"s.connected && {videos}.length > 0 && {videos}.every((x) => x.rendered > 3)")
 
     async def press(self, button: int, pressed: bool = True) -> None:
-        await self.page.evaluate("([button, pressed]) => window.testPad.press(button, pressed)", [button, pressed])
+        """As a finger does it: no shorter than the page's sampling can see."""
+        await self.page.evaluate(
+            "([button, pressed]) => { window.testPad.press(button, pressed);"
+            " return new Promise((resolve) => setTimeout(resolve, 60)); }",
+            [button, pressed],
+        )
 
     async def tilt(self, axis: int, value: float) -> None:
         await self.page.evaluate("([axis, value]) => window.testPad.tilt(axis, value)", [axis, value])
@@ -84,16 +88,9 @@ class ConsolePage:
     async def arm(self) -> None:
         """With the pad's START, as an operator does."""
         await self.until("s.seat && s.seat.mine")
-        for _ in range(ARM_TRIES):  # one press counts only after the deadman was seen released
-            await self.press(START)
-            try:
-                await self.until("s.armed", 1)
-                return
-            except AssertionError:
-                continue
-            finally:
-                await self.press(START, False)
-        await self.until("s.armed", 0)
+        await self.press(START)
+        await self.until("s.armed", 5)
+        await self.press(START, False)
 
     async def drive_forward(self) -> None:
         """Hold the deadman and push the left stick forward."""
