@@ -12,6 +12,7 @@ import {
 } from "./core/console_state";
 import { contactStrength, forceOf, speedShare } from "./core/contact";
 import { notePicture } from "./core/latency";
+import { createPingLedger, lostPings, pingAnswered, sendPing } from "./core/ping_ledger";
 import { noteShown } from "./core/command_gate";
 import { createRateMeter, noteHappening, quantile, rateOf } from "./core/samples";
 import { parseServerMessage } from "./core/wire_parser";
@@ -34,6 +35,8 @@ import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, We
 
 const STALL_MS = 300; // without a tick, which comes every 10 ms
 const BEAT_MS = 500; // reports and pings
+const EARLY_PINGS = 5; // to know the path before the first command
+const EARLY_PING_MS = 50; // between them
 const SILENT_MS = 1500; // the other side counts as gone for driving
 const DEAD_BEATS = 10; // and for the connection; counted, so that a page that was held up is not taken for it
 const FEEL_MS = 50; // rumble and tone
@@ -72,8 +75,9 @@ export class ConsoleApp {
   private tickMs = Infinity;
   private beatMs = 0;
   private feelMs = 0;
-  private pings = new Map<number, number>(); // id -> when it was sent
-  private nextPing = 1;
+  private readonly pings = createPingLedger();
+  private earlyPings = 0; // still to send
+  private earlyPingMs = 0;
 
   constructor(
     api: ConsoleApi,
@@ -229,7 +233,8 @@ export class ConsoleApp {
     this.peer = null;
     this.driver = null;
     this.room.close();
-    this.pings.clear();
+    this.pings.out.clear();
+    this.earlyPings = 0;
     forgetConnection(this.state);
   }
 
@@ -270,9 +275,10 @@ export class ConsoleApp {
   }
 
   private tookPong(id: number, now: number): void {
-    const sent = this.pings.get(id);
-    if (sent !== undefined) this.state.roundTripMs = now - sent;
-    this.pings.delete(id);
+    const roundTripMs = pingAnswered(this.pings, id, now);
+    if (roundTripMs === null) return;
+    this.state.roundTripMs = roundTripMs;
+    if (this.driver !== null) driver.driverPingAnswered(this.driver, roundTripMs);
   }
 
   private welcomed(welcome: Welcome): void {
@@ -291,6 +297,7 @@ export class ConsoleApp {
     const interval = 1000 / description.max_event_rate;
     const neutral = restValues(description.axes);
     this.driver = driver.createDriver(settings.pacing, settings.tolerance.video, interval, neutral);
+    this.earlyPings = EARLY_PINGS;
     this.layer = Math.min(this.layer, Math.max(0, description.layers.length - 1));
     if (feedback !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
   }
@@ -316,6 +323,7 @@ export class ConsoleApp {
     this.stopping.step(this.state.stop.stopped, now);
     if (now >= this.feelMs) this.feel(now);
     if (now >= this.beatMs) this.beat(now);
+    else if (this.earlyPings > 0 && now >= this.earlyPingMs) this.earlyBeat(now);
   }
 
   private takeValues(sample: ControlSample): void {
@@ -336,8 +344,8 @@ export class ConsoleApp {
     for (const message of messages) this.tell("control", message);
   }
 
-  private tell(channel: ChannelName, message: ClientMessage): void {
-    this.connection.send(channel, JSON.stringify(message));
+  private tell(channel: ChannelName, message: ClientMessage): boolean {
+    return this.connection.send(channel, JSON.stringify(message));
   }
 
   private beat(now: number): void {
@@ -348,11 +356,21 @@ export class ConsoleApp {
       this.connection.drop("the console fell silent");
       return;
     }
-    const id = this.nextPing++;
-    this.pings.set(id, now);
-    if (this.pings.size > 20) this.pings.delete(id - 20);
-    this.tell("control", { type: "ping", id });
+    this.ping(now);
     this.tell("control", reportOf(this));
+  }
+
+  private earlyBeat(now: number): void {
+    if (this.state.welcome === null) return;
+    this.earlyPingMs = now + EARLY_PING_MS;
+    this.earlyPings -= 1;
+    this.ping(now);
+  }
+
+  private ping(now: number): void {
+    if (lostPings(this.pings, now) > 0 && this.driver !== null) driver.driverLoss(this.driver, now);
+    const id = sendPing(this.pings, now);
+    if (!this.tell("control", { type: "ping", id })) this.pings.out.delete(id); // did not leave: is not lost
   }
 
   /** Force is felt only while driving is possible. */

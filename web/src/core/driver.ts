@@ -10,13 +10,20 @@ import {
   type Pacing,
 } from "./command_gate";
 import { createLatency, noteCommandRefused, noteCommandSent, noteFeedback, type Latency } from "./latency";
-import { createRepeatTimer, takeSample, waitAfter, type RepeatTimer } from "./repeat_timer";
+import { createRepeatTimer, INITIAL_MS, takeSample, waitAfter, type RepeatTimer } from "./repeat_timer";
 import { isNewer } from "./serial";
 
 /** While armed and at rest, neutral commands keep forces felt and the link proven. */
 const IDLE_INTERVAL_MS = 200;
 /** A rest that is never confirmed is given up: the robot's own hold has long ended. */
 const REST_GIVE_UP_MS = 5000;
+/** A copy comes this much later: longer than the console's own path to the robot and back. */
+const ECHO_MS = 20;
+/** To go on doubling after the last loss that was seen. */
+const LOSSY_SPELL_MS = 60_000;
+/** An answer that follows the last repeat within this part of the whole wait answers an earlier sending. */
+const NEEDLESS = 0.25;
+const FEW_SAMPLES = 8;
 
 /** What the operator wants now. */
 export interface Intention {
@@ -24,14 +31,22 @@ export interface Intention {
   readonly values: readonly number[]; // one per axis; at rest unless the deadman is held
 }
 
-/** Turns intentions into commands, rests and repeats of them. Holds no clock and no socket. */
+/**
+ * Turns intentions into commands, rests and repeats of them. Holds no clock and no socket.
+ *
+ * While the path loses packets every command is sent twice: the copy covers the loss of the command and, being
+ * answered from the stored feedback, the loss of the answer too. On a clean path nothing is doubled.
+ */
 export interface Driver {
   readonly gate: CommandGate;
   readonly repeat: RepeatTimer;
   readonly latency: Latency;
   readonly neutral: readonly number[]; // the axes' rest values
-  sends: number; // of the event in flight
+  sends: number; // of the event in flight; its echo does not count
+  lastSentMs: number; // the last of them
   repeatAtMs: number;
+  echoAtMs: number; // Infinity when no copy is due
+  lossyUntilMs: number; // -Infinity before the first loss
   lastValues: readonly number[]; // sent last
   neutralOwed: boolean; // one neutral command is due after disarming
   barrier: number | null; // events up to this one were voided by a rest: only neutral goes under their numbers
@@ -50,7 +65,10 @@ export function createDriver(
     latency: createLatency(),
     neutral,
     sends: 0,
+    lastSentMs: -Infinity,
     repeatAtMs: 0,
+    echoAtMs: Infinity,
+    lossyUntilMs: -Infinity,
     lastValues: neutral,
     neutralOwed: false,
     barrier: null,
@@ -66,16 +84,34 @@ export function driverFeedback(
   now: number,
 ): boolean {
   const { gate, rest } = driver;
-  const sends = driver.sends;
   const flying = gate.inFlight;
   if (!takeFeedback(gate, feedback.event, feedback.issue)) return false;
   const sample = noteFeedback(driver.latency, feedback.event, now);
-  // Karn's rule: which of several sends was answered cannot be told, so only a single send is a sample.
-  if (sample !== null && sends === 1 && flying === feedback.event) takeSample(driver.repeat, sample);
+  if (sample !== null && flying === feedback.event) landed(driver, sample, now);
   if (driver.barrier !== null && !isNewer(driver.barrier, feedback.event)) driver.barrier = null;
   if (rest !== null && feedback.at_rest && (!canCommand || isNewer(feedback.event, rest.event)))
     driver.rest = null;
   return true;
+}
+
+/**
+ * Karn's rule: a command whose repeat may have been the one answered is no sample. Taken to the letter, the first
+ * repeat would come too soon for ever on a path longer than the interval, so a repeat that was needless still counts.
+ */
+function landed(driver: Driver, takenMs: number, now: number): void {
+  // An echo makes a sample at most ECHO_MS too long, which is the safe side.
+  if (driver.sends === 1 || now - driver.lastSentMs < NEEDLESS * takenMs) takeSample(driver.repeat, takenMs);
+  else driverLoss(driver, now);
+}
+
+/** A ping's round trip: stands in for that of a command while few of those are known. */
+export function driverPingAnswered(driver: Driver, roundTripMs: number): void {
+  if (knowsFewCommands(driver)) takeSample(driver.repeat, roundTripMs);
+}
+
+/** Some message of this connection was lost. */
+export function driverLoss(driver: Driver, now: number): void {
+  driver.lossyUntilMs = now + LOSSY_SPELL_MS;
 }
 
 export function driverRefusal(driver: Driver, refusal: Refusal, armed: boolean): void {
@@ -103,6 +139,7 @@ export function driverDisarm(driver: Driver, now: number): void {
 
 /** Nothing sent from here can be executed any more (seat lost, robot link down). */
 export function driverSilence(driver: Driver): void {
+  if (driver.gate.inFlight !== null) noteCommandRefused(driver.latency, driver.gate.inFlight);
   driver.gate.inFlight = null;
   driver.neutralOwed = false;
   driver.rest = null;
@@ -141,18 +178,31 @@ function commandDue(driver: Driver, intention: Intention, now: number): ClientMe
   const isVoided = driver.barrier !== null && !isNewer(next.event, driver.barrier);
   const values = intention.armed && !isVoided ? intention.values : driver.neutral;
   if (driver.gate.inFlight !== null) {
-    if (now < driver.repeatAtMs) return null;
-    driver.sends += 1;
+    if (now < Math.min(driver.repeatAtMs, driver.echoAtMs)) return null;
+    if (now >= driver.repeatAtMs) noteSending(driver, driver.sends + 1, now);
+    driver.echoAtMs = Infinity;
   } else {
     if (!wantsToSend(driver, intention.armed, values, now)) return null;
     noteSent(driver.gate, now);
     noteCommandSent(driver.latency, next.event, now);
-    driver.sends = 1;
+    noteSending(driver, 1, now);
+    driver.echoAtMs = now < driver.lossyUntilMs ? now + ECHO_MS : Infinity;
     driver.neutralOwed &&= intention.armed;
   }
-  driver.repeatAtMs = now + waitAfter(driver.repeat, driver.sends);
   driver.lastValues = values;
   return { type: "command", event: next.event, issue: next.issue, values };
+}
+
+function noteSending(driver: Driver, sends: number, now: number): void {
+  driver.sends = sends;
+  driver.lastSentMs = now;
+  // A ping does not reach the robot: until its share is known, pings may lengthen the wait but not shorten it.
+  const least = knowsFewCommands(driver) ? INITIAL_MS : 0;
+  driver.repeatAtMs = now + Math.max(least, waitAfter(driver.repeat, sends));
+}
+
+function knowsFewCommands(driver: Driver): boolean {
+  return driver.latency.toFeedback.values.length < FEW_SAMPLES;
 }
 
 function wantsToSend(driver: Driver, armed: boolean, values: readonly number[], now: number): boolean {

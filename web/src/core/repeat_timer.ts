@@ -1,6 +1,6 @@
-/** When the pending command is sent again (RFC 6298 2; no sample is taken of a repeated event, Karn's rule). */
+/** When the pending command is sent again (RFC 6298 2; Karn's rule is the caller's). */
 
-const INITIAL_MS = 100;
+export const INITIAL_MS = 100; // before the first sample
 const FLOOR_MS = 20;
 const CAP_MS = 500;
 const GRANULARITY_MS = 10;
