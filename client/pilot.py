@@ -16,7 +16,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from client.command_gate import CommandGate
-from client.repeat_timer import RepeatTimer
+from client.repeat_timer import INITIAL, RepeatTimer
 from client.rest_call import RestCall
 from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest
 from robot_bridge.protocol.serial import event_gap
@@ -210,7 +210,7 @@ class Pilot:
         want = _Want.NEUTRAL if event == self._void else self._want
         command = Command(event=event, issue=issue, values=self._values_for(want))
         flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now)
-        flight.repeat_at = now + self.timer.wait(1)
+        flight.repeat_at = now + self._wait(1)
         flight.echo_at = now + ECHO if now < self._lossy_until else NEVER
         self._flight = flight
         self.gate.sent(now)
@@ -232,13 +232,18 @@ class Pilot:
             self.repeats += 1
             flight.sends += 1
             flight.last_sent_at = now
-            flight.repeat_at = now + self.timer.wait(flight.sends)
+            flight.repeat_at = now + self._wait(flight.sends)
         else:
             self.echoes += 1
         flight.echo_at = NEVER
         flight.issue = self.gate.next().issue
         want = _Want.NEUTRAL if flight.command.event == self._void else _Want.VALUES
         return [Command(event=flight.command.event, issue=flight.issue, values=self._values_for(want))]
+
+    def _wait(self, sends: int) -> float:
+        """A ping does not reach the robot: until its share is known, pings may lengthen the wait but not shorten it."""
+        least = INITIAL if len(self.samples) < FEW_SAMPLES else 0.0
+        return max(least, self.timer.wait(sends))
 
     def _values_for(self, want: _Want) -> list[float]:
         return self._values if want is _Want.VALUES else self._neutral
