@@ -53,7 +53,7 @@ class Delays(NamedTuple):
 
 async def run(context: Context) -> list[Result]:
     results: list[Result] = []
-    for robot in context.robots:
+    for robot in context.robots[:1] if context.quick else context.robots:
         async with running_stack(robot) as stack:
             seconds = float(context.scale(int(SECONDS), int(QUICK_SECONDS)))
             idle, driving = await _lockstep(stack, seconds)

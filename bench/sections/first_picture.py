@@ -28,7 +28,7 @@ BARE = "plain aiortc and a bare page with one <video>"
 async def run(context: Context) -> list[Result]:
     count = context.scale(OPENINGS, QUICK_OPENINGS)
     results: list[Result] = []
-    for robot in context.robots:
+    for robot in context.robots[:1] if context.quick else context.robots:
         async with running_stack(robot) as stack:
             ours = [await _open(stack.operator, OURS) for _ in range(count)]
             command = (sys.executable, "-m", "bench.baseline_server", stack.bridge.address)

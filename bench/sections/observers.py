@@ -89,7 +89,7 @@ async def _drive(stack: Stack, audience: Running | None, operator: Console, even
 
 
 async def _count(stack: Stack, audience: Running) -> Counts:
-    """As briefly as possible: what the bridge could not send meanwhile it sends at once afterwards."""
+    """The bridge is held still only for as long as counting takes."""
     stack.bridge.process.pause()
     try:
         await asyncio.sleep(ENCODE)
