@@ -40,7 +40,6 @@ export interface Statistics {
   readonly pacing: Pacing;
   readonly tolerance: { readonly video: number; readonly audio: number };
   readonly gate_enabled: boolean;
-  readonly gateEnabled: boolean;
   readonly streams: Readonly<Record<string, StreamStatistics>>;
   readonly picture_delay_ms: number | null;
   readonly picture_delay_p50_ms: number | null;
@@ -75,7 +74,6 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     pacing: settings.pacing,
     tolerance: { ...settings.tolerance },
     gate_enabled: settings.gateEnabled,
-    gateEnabled: settings.gateEnabled,
     streams: streamsOf(app, now),
     picture_delay_ms: driver?.latency.pictureMs ?? null,
     picture_delay_p50_ms: driver === null ? null : quantile(driver.latency.toPicture, 0.5),
