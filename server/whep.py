@@ -11,6 +11,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from server.access import Identity
 from server.body import read_text
+from server.data_transport_private import tune_data_transport
 from server.errors import BadSdp, BadSdpFragment, ConsoleError, NotFound, RobotUnreachable
 from server.media.aiortc_private import create_peer_connection
 from server.offer import parse_fragment, prepare_offer
@@ -87,6 +88,7 @@ async def _negotiate(here: Services, identity: Identity, offer: str, *, trailer:
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
             await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
+            tune_data_transport(pc)
             media = here.media.attach(pc, offer, priority=identity.role == "operator", trailer=trailer)
             try:
                 # Before the answer: the first events can come while it is still on its way.

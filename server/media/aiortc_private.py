@@ -1,4 +1,6 @@
-"""The only file that touches private parts of aiortc and aioice; tests pin every one of them.
+"""Private parts of aiortc and aioice under media and ICE; tests pin every one of them.
+
+Those under the data channels are in `server/data_transport_private.py`; nothing else in the server touches any.
 
 What is used and why:
 

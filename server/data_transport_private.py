@@ -1,0 +1,93 @@
+"""Private parts of aiortc under the data channels; tests pin every one of them.
+
+What is used and why:
+
+- `RTCSctpTransport._rto`, `._srtt`, `._rttvar`, `._update_rto`, `._t1_expired`, `._t3_expired`, `._cwnd`: it waits at
+  least one second before it repeats a lost message, three while it connects, and then sends one packet at a time
+- `RTCSctpTransport._transmit`: runs in tasks that nobody awaits, and raises there when the connection has ended
+- `RTCSctpTransport._handle_data`, `RTCDtlsTransport._ssl`: one record is taken from OpenSSL for each datagram that
+  comes in. A record that waits there, as one that overtook the end of the handshake does, is never caught up with:
+  from then on every message is one datagram late
+"""
+
+import contextlib
+from typing import Any
+
+from aiortc import RTCPeerConnection
+from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH
+from OpenSSL import SSL
+
+__all__ = ["tune_data_transport"]
+
+RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
+RETRANSMISSION_START = 0.5  # s before the first measured round trip
+CONNECT_CEILING = 3.0  # s, to which the interval grows while nobody answers; aiortc gives up after eight
+RECORD = 1500  # bytes, the most that a DTLS record carries here
+WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
+
+
+def tune_data_transport(pc: RTCPeerConnection) -> None:
+    """Let data channels take what has come, and find out about a loss soon. Nothing to do for a peer without any.
+
+    Call after setRemoteDescription(offer), before setLocalDescription. Once per connection.
+    """
+    if pc.sctp is not None:
+        _drain_dtls(pc.sctp)
+        _hasten_sctp(pc.sctp)
+
+
+def _drain_dtls(sctp: Any) -> None:
+    """With every datagram, take all records that OpenSSL has, not only the first."""
+    handle = sctp._handle_data
+
+    async def handle_all(data: bytes) -> None:
+        await handle(data)
+        while (more := _next_record(sctp.transport)) is not None:
+            await handle(more)
+
+    sctp._handle_data = handle_all
+
+
+def _next_record(transport: Any) -> bytes | None:
+    try:
+        record: bytes = transport._ssl.recv(RECORD)
+    except SSL.ZeroReturnError as error:
+        raise ConnectionError("the peer closed DTLS") from error
+    except SSL.Error:
+        return None  # nothing more
+    return record or None
+
+
+def _hasten_sctp(sctp: Any) -> None:
+    """Repeat a lost message sooner, and go on sending after a loss.
+
+    What a peer gets on data channels is some kilobytes a second, so that neither a timeout of less than a second
+    (RFC 9260 16 leaves RTO.Min to the application's needs) nor a window of a few packets after one can congest a path.
+    """
+    measure, transmit = sctp._update_rto, sctp._transmit
+    expire_connecting, expire_sending = sctp._t1_expired, sctp._t3_expired
+
+    def update(round_trip: float) -> None:
+        measure(round_trip)
+        sctp._rto = max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar)
+
+    def expired_connecting() -> None:
+        # The wait grows: eight short ones would end before a path that was gone for five seconds is back.
+        sctp._rto = min(2 * sctp._rto, CONNECT_CEILING)
+        expire_connecting()
+
+    def expired_sending() -> None:
+        expire_sending()
+        sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
+
+    async def transmit_or_not() -> None:
+        # Not around single packets: the end of the connection must keep aiortc from starting its timer again.
+        with contextlib.suppress(ConnectionError):
+            await transmit()
+
+    sctp._rto = RETRANSMISSION_START
+    sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
+    sctp._update_rto = update
+    sctp._t1_expired = expired_connecting
+    sctp._t3_expired = expired_sending
+    sctp._transmit = transmit_or_not

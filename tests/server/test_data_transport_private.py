@@ -1,0 +1,226 @@
+"""Pins what data_transport_private.py relies on, and what it is for."""
+
+import asyncio
+import inspect
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSctpTransport, RTCSessionDescription
+from aiortc.rtcdtlstransport import RTCDtlsTransport
+
+from server.data_transport_private import RETRANSMISSION_FLOOR, WINDOW_FLOOR, tune_data_transport
+from server.media.aiortc_private import create_peer_connection
+from tests.server.rig import PATIENCE, running_rig
+
+MOVED = "aiortc moved a private part: see server/data_transport_private.py"
+SOON = 0.8  # s; aiortc's own shortest timeout is 1 s
+
+
+class Ends:
+    """Two ends of a reliable channel: a plain client's and the server's."""
+
+    def __init__(self, client: RTCDataChannel, server: RTCDataChannel) -> None:
+        self.client = client
+        self.server = server
+        self.at_client: asyncio.Queue[str] = asyncio.Queue(100)
+        self.at_server: asyncio.Queue[str] = asyncio.Queue(100)
+        client.on("message", self.at_client.put_nowait)
+        server.on("message", self.at_server.put_nowait)
+
+    async def exchange(self) -> None:
+        """One message each way, so that both have measured a round trip."""
+        self.server.send("there")
+        assert await self.at_client.get() == "there"
+        self.client.send("back")
+        assert await self.at_server.get() == "back"
+
+
+@pytest.fixture
+async def ends() -> AsyncIterator[Ends]:
+    async with connected() as found:
+        yield found
+
+
+@asynccontextmanager
+async def connected() -> AsyncIterator[Ends]:
+    """The server's side is tuned, the client's is plain aiortc. Sections are bundled, as browsers do."""
+    client, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
+    there: asyncio.Future[RTCDataChannel] = asyncio.get_running_loop().create_future()
+    server.on("datachannel", there.set_result)
+    opened = asyncio.Event()
+    client.addTransceiver("video", direction="recvonly")
+    here = client.createDataChannel("session")
+    here.on("open", opened.set)
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await client.setLocalDescription(await client.createOffer())
+            await server.setRemoteDescription(RTCSessionDescription(client.localDescription.sdp, "offer"))
+            tune_data_transport(server)
+            await server.setLocalDescription(await server.createAnswer())
+            await client.setRemoteDescription(RTCSessionDescription(server.localDescription.sdp, "answer"))
+            await opened.wait()
+            yield Ends(here, await there)
+    finally:
+        await server.close()
+        await client.close()
+
+
+def lose(sctp: Any, first: int) -> list[bytes]:
+    """Lose the first so many data packets that `sctp` sends; the list has what was lost."""
+    lost: list[bytes] = []
+    dtls = sctp.transport
+    send = dtls._send_data
+
+    async def send_or_lose(data: bytes) -> None:
+        if data[12] == 0 and len(lost) < first:  # a DATA chunk (RFC 9260 3.3.1)
+            lost.append(data)
+        else:
+            await send(data)
+
+    dtls._send_data = send_or_lose
+    return lost
+
+
+@pytest.mark.parametrize("name", ["_rto", "_cwnd", "_srtt", "_rttvar", "_t1_handle", "_t3_handle"])
+async def test_sctp_has(name: str) -> None:
+    pc = create_peer_connection()
+    pc.createDataChannel("any")
+    assert hasattr(pc.sctp, name), MOVED
+    await pc.close()
+
+
+@pytest.mark.parametrize(
+    ("caller", "call"),
+    [
+        (RTCDtlsTransport._recv_next, "await self._data_receiver._handle_data(data)"),
+        (RTCDtlsTransport._recv_next, "self._ssl.recv(1500)"),
+        (RTCSctpTransport.start, "_register_data_receiver(self)"),
+        (RTCSctpTransport._receive_sack_chunk, "self._update_rto("),
+        (RTCSctpTransport._t1_start, "call_later(self._rto, self._t1_expired)"),
+        (RTCSctpTransport._t3_start, "call_later(self._rto, self._t3_expired)"),
+        (RTCSctpTransport._t3_restart, "call_later(self._rto, self._t3_expired)"),
+        (RTCSctpTransport._t3_expired, "asyncio.ensure_future(self._transmit())"),
+        (RTCSctpTransport._send, "await self._transmit()"),
+    ],
+)
+def test_aiortc_calls_what_is_replaced(caller: Callable[..., Any], call: str) -> None:
+    assert call in inspect.getsource(caller), MOVED
+
+
+async def test_a_peer_without_data_channels_is_left_alone() -> None:
+    pc = create_peer_connection()
+    tune_data_transport(pc)
+    assert pc.sctp is None
+    await pc.close()
+
+
+async def test_the_console_tunes_its_connections() -> None:
+    async with running_rig() as rig, rig.peer("observer"):
+        (peer,) = rig.services.console.peers
+        sctp: Any = peer.pc.sctp
+        assert sctp._cwnd >= WINDOW_FLOOR
+        assert sctp._rto < SOON
+
+
+async def test_every_record_that_waits_is_delivered_at_once(ends: Ends) -> None:
+    dtls: Any = ends.client.transport.transport
+    write, written, both = dtls._write_ssl, [], asyncio.Event()
+
+    async def hold() -> None:
+        written.append(1)
+        if len(written) == 2:
+            both.set()
+
+    await ends.exchange()
+    dtls._write_ssl = hold
+    for text in ("first", "second"):
+        ends.client.send(text)
+    await both.wait()
+    dtls._write_ssl = write
+    await write()
+    async with asyncio.timeout(SOON):  # sooner than the client would repeat the second
+        assert [await ends.at_server.get(), await ends.at_server.get()] == ["first", "second"]
+
+
+async def test_the_end_of_dtls_is_still_noticed(ends: Ends) -> None:
+    closed = asyncio.Event()
+    ends.server.on("close", closed.set)
+    await ends.client.transport.transport.stop()
+    async with asyncio.timeout(PATIENCE):
+        await closed.wait()
+
+
+async def test_a_lost_message_is_repeated_soon(ends: Ends) -> None:
+    await ends.exchange()
+    lost = lose(ends.server.transport, 1)
+    async with asyncio.timeout(SOON):
+        ends.server.send("once")
+        assert await ends.at_client.get() == "once"
+    assert len(lost) == 1
+
+
+async def test_the_timeout_stays_above_a_delayed_acknowledgement(ends: Ends) -> None:
+    await ends.exchange()
+    sctp: Any = ends.server.transport
+    assert RETRANSMISSION_FLOOR <= sctp._rto < SOON
+    sctp._update_rto(2.0)
+    assert sctp._rto > SOON
+
+
+async def test_a_timeout_does_not_shut_the_window(ends: Ends) -> None:
+    await ends.exchange()
+    sctp: Any = ends.server.transport
+    sctp._t3_cancel()
+    sctp._t3_expired()
+    assert sctp._cwnd >= WINDOW_FLOOR
+
+
+async def test_many_lost_messages_are_all_repeated_by_one_timeout(ends: Ends) -> None:
+    await ends.exchange()
+    texts = [str(number) * 1000 for number in range(4)]
+    lost = lose(ends.server.transport, len(texts))
+    async with asyncio.timeout(SOON):
+        for text in texts:
+            ends.server.send(text)
+        assert [await ends.at_client.get() for _ in texts] == texts
+    assert len(lost) == len(texts)
+
+
+async def test_a_timer_after_the_end_of_the_connection_raises_nothing(ends: Ends) -> None:
+    await ends.exchange()
+    unhandled: list[dict[str, Any]] = []
+    asyncio.get_running_loop().set_exception_handler(lambda loop, context: unhandled.append(context))
+    sctp: Any = ends.server.transport
+    lose(sctp, 1)
+    ends.server.send("never arrives")
+    await ends.server.transport._data_channel_flush()
+    await sctp.transport.stop()
+    sctp._t3_cancel()
+    before = asyncio.all_tasks()
+    sctp._t3_expired()
+    (repeat,) = asyncio.all_tasks() - before
+    await asyncio.wait([repeat])
+    assert repeat.exception() is None
+    assert unhandled == []
+
+
+async def test_while_connecting_the_wait_grows() -> None:
+    pc = create_peer_connection()
+    pc.createDataChannel("any")
+    tune_data_transport(pc)
+    sctp: Any = pc.sctp
+    waits = []
+
+    async def vanish(chunk: object) -> None:
+        """Nobody answers."""
+
+    sctp._send_chunk = vanish
+    await sctp._init()
+    for _ in range(5):
+        waits.append(sctp._t1_handle.when() - asyncio.get_running_loop().time())
+        sctp._t1_handle.cancel()
+        sctp._t1_expired()
+    await pc.close()
+    assert waits == pytest.approx([0.5, 1.0, 2.0, 3.0, 3.0], abs=0.1)
