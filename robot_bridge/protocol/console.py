@@ -3,11 +3,14 @@
 They stand here and not in `server/` because the server and the headless client both speak them and neither may
 import the other. JSON Schemas and the page's TypeScript types are generated from this file (scripts/generate_wire.py).
 
-| channel | reliability | client to server | server to client |
+| channel | reliability | who | messages |
 |---|---|---|---|
-| control | unordered, 0 retransmits | command, rest, report, ping | feedback, refusal, pong |
-| session | reliable | seat_request, seat_release, rename | welcome, robot, seat, participants, notice, refusal |
-| stop | reliable | stop, reset | stop_state, refusal |
+| control | unordered, 0 retransmits | client | command, rest, report, ping |
+| | | server | feedback, refusal, pong |
+| session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
+| | | server | welcome, robot, seat, participants, quality, note_shared, notice, refusal |
+| stop | reliable | client | stop, reset |
+| | | server | stop_state, refusal |
 """
 
 from typing import Annotated, Literal
@@ -32,27 +35,37 @@ from robot_bridge.protocol.messages import (
 
 __all__ = [
     "ClientMessage",
+    "Note",
     "Notice",
     "Participant",
     "Participants",
+    "Quality",
     "Rename",
     "Report",
     "RobotState",
     "Role",
     "Seat",
+    "SeatClaim",
+    "SeatDecline",
+    "SeatGrant",
     "SeatRelease",
     "SeatRequest",
+    "SeatTake",
     "ServerMessage",
+    "SharedNote",
     "StopStateNotice",
     "StreamInfo",
+    "StreamQuality",
     "StreamReport",
+    "Tier",
     "Welcome",
     "decode_client_message",
     "decode_server_message",
     "encode_console_message",
 ]
 
-Role = Literal["operator", "observer"]
+Role = Literal["operator", "observer", "supervisor"]
+Tier = Literal["operator", "high", "low"]  # of the encoded media: the operator's own, and the observers' two
 Name = Annotated[str, msgspec.Meta(max_length=60)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 MAX_STREAMS = 32
@@ -69,6 +82,8 @@ class StreamReport(msgspec.Struct, frozen=True, kw_only=True):
     rendered: Count = 0
     discarded: Count = 0
     held: Count = 0
+    tolerance: Count = 0  # events; what the person at the client allows
+    lag: int = 0  # largest feedback - stamp among what arrived since the last report, rendered or not
 
 
 class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="report"):
@@ -81,8 +96,29 @@ class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="r
     round_trip_ms: float | None = None
 
 
-class SeatRequest(msgspec.Struct, frozen=True, tag_field="type", tag="seat_request"):
-    """Ask for the control seat; answered by `seat` to all, or by a refusal."""
+class SeatRequest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_request"):
+    """Ask for the control seat; answered by `seat` to all, or by a refusal.
+
+    While somebody else holds it the request is put to that person, unless `only_if_free`: then it is refused.
+    """
+
+    only_if_free: bool = False
+
+
+class SeatGrant(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_grant"):
+    """The holder hands the seat to a peer that asked for it."""
+
+    peer: Name
+
+
+class SeatDecline(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_decline"):
+    """The holder refuses a peer that asked for the seat."""
+
+    peer: Name
+
+
+class SeatTake(msgspec.Struct, frozen=True, tag_field="type", tag="seat_take"):
+    """A supervisor takes the seat from whoever holds it, at once."""
 
 
 class SeatRelease(msgspec.Struct, frozen=True, tag_field="type", tag="seat_release"):
@@ -93,6 +129,12 @@ class Rename(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="r
     """The name that others see."""
 
     name: Name
+
+
+class Note(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note"):
+    """Text to everyone."""
+
+    text: Annotated[str, msgspec.Meta(min_length=1, max_length=500)]
 
 
 class StreamInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -124,12 +166,22 @@ class RobotState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
     detail: str = ""  # why it is down
 
 
+class SeatClaim(msgspec.Struct, frozen=True, kw_only=True):
+    """A request for the seat that its holder has not answered yet."""
+
+    peer: str
+    name: str
+    seconds_left: float  # then it counts as declined
+
+
 class Seat(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat"):
     """Who may drive. `holder` is a peer id, empty when the seat is free."""
 
     holder: str = ""
     name: str = ""
-    why: str = ""  # "released", "heartbeat lost", "disconnected" …
+    why: str = ""  # "released", "heartbeat lost", "disconnected", "granted", "taken", "idle" …
+    claims: list[SeatClaim] = []
+    idle_seconds_left: float | None = None  # until the idle holder loses the seat; sent when the countdown begins or ends
 
 
 class Participant(msgspec.Struct, frozen=True, kw_only=True):
@@ -139,6 +191,39 @@ class Participant(msgspec.Struct, frozen=True, kw_only=True):
     carrier: Carrier
     gap: int = 0
     picture_delay_ms: float | None = None
+    round_trip_ms: float | None = None
+    loss: float | None = None  # 0 to 1, of the media on the way to this peer
+    tier: Tier | None = None  # None: receives no video
+
+
+class StreamQuality(msgspec.Struct, frozen=True, kw_only=True):
+    """How one camera's pictures are encoded for this peer now."""
+
+    stream: str
+    tier: Tier
+    width: int  # pixels
+    height: int
+    frames_per_second: float
+    bits_per_second: float  # what the encoder aims at
+
+
+class Quality(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="quality"):
+    """What the quality controller decided for this peer's pictures, and why; sent when it changes."""
+
+    streams: list[StreamQuality]
+    reason: str = ""  # "loss", "gap", "bandwidth", "round trip", "" when nothing limits
+
+
+class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note_shared"):
+    """A note that somebody wrote, with the event it belongs to. Newcomers get the last ones."""
+
+    id: int
+    peer: str
+    name: str
+    role: Role
+    text: str
+    event: EventReference
+    time: float  # s since 1970, the console's clock: for people to read, never for a decision
 
 
 class Participants(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="participants"):
@@ -159,8 +244,34 @@ class Notice(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="n
     text: str
 
 
-ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatRelease | Rename | Stop | Reset
-ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Notice | StopStateNotice
+ClientMessage = (
+    Command
+    | Rest
+    | Report
+    | Ping
+    | SeatRequest
+    | SeatGrant
+    | SeatDecline
+    | SeatTake
+    | SeatRelease
+    | Rename
+    | Note
+    | Stop
+    | Reset
+)
+ServerMessage = (
+    Feedback
+    | Refusal
+    | Pong
+    | Welcome
+    | RobotState
+    | Seat
+    | Participants
+    | Quality
+    | SharedNote
+    | Notice
+    | StopStateNotice
+)
 
 _client_decoder: msgspec.json.Decoder[ClientMessage] = msgspec.json.Decoder(ClientMessage)
 _server_decoder: msgspec.json.Decoder[ServerMessage] = msgspec.json.Decoder(ServerMessage)

@@ -49,7 +49,7 @@ export interface Camera {
   readonly frame_rate: number;
 }
 
-export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatRelease | Rename | Stop | Reset;
+export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | Rename | Note | Stop | Reset;
 
 /** Event `event`, valid only as the answer to issue `issue` of feedback `event - 1`. */
 export interface Command {
@@ -105,6 +105,12 @@ export interface Microphone {
   readonly channels: number;
 }
 
+/** Text to everyone. */
+export interface Note {
+  readonly type: "note";
+  readonly text: string;
+}
+
 /** Something a person should read. */
 export interface Notice {
   readonly type: "notice";
@@ -115,10 +121,13 @@ export interface Notice {
 export interface Participant {
   readonly peer: string;
   readonly name: string;
-  readonly role: "observer" | "operator";
+  readonly role: "observer" | "operator" | "supervisor";
   readonly carrier: "capture-time" | "native" | "none" | "trailer";
   readonly gap: number;
   readonly picture_delay_ms: number | null;
+  readonly round_trip_ms: number | null;
+  readonly loss: number | null;
+  readonly tier: "high" | "low" | "operator" | null;
 }
 
 export interface Participants {
@@ -135,6 +144,13 @@ export interface Ping {
 export interface Pong {
   readonly type: "pong";
   readonly id: number;
+}
+
+/** What the quality controller decided for this peer's pictures, and why; sent when it changes. */
+export interface Quality {
+  readonly type: "quality";
+  readonly streams: readonly (StreamQuality)[];
+  readonly reason: string;
 }
 
 /** Range sensors in a plane, with the field names of sensor_msgs/LaserScan. */
@@ -216,6 +232,27 @@ export interface Seat {
   readonly holder: string;
   readonly name: string;
   readonly why: string;
+  readonly claims: readonly (SeatClaim)[];
+  readonly idle_seconds_left: number | null;
+}
+
+/** A request for the seat that its holder has not answered yet. */
+export interface SeatClaim {
+  readonly peer: string;
+  readonly name: string;
+  readonly seconds_left: number;
+}
+
+/** The holder refuses a peer that asked for the seat. */
+export interface SeatDecline {
+  readonly type: "seat_decline";
+  readonly peer: string;
+}
+
+/** The holder hands the seat to a peer that asked for it. */
+export interface SeatGrant {
+  readonly type: "seat_grant";
+  readonly peer: string;
 }
 
 /** Give the control seat back. */
@@ -223,12 +260,30 @@ export interface SeatRelease {
   readonly type: "seat_release";
 }
 
-/** Ask for the control seat; answered by `seat` to all, or by a refusal. */
+/** Ask for the control seat; answered by `seat` to all, or by a refusal. While somebody else holds it the request is put to that person, unless `only_if_free`: then it is refused. */
 export interface SeatRequest {
   readonly type: "seat_request";
+  readonly only_if_free?: boolean;
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Notice | StopStateNotice;
+/** A supervisor takes the seat from whoever holds it, at once. */
+export interface SeatTake {
+  readonly type: "seat_take";
+}
+
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SharedNote | Notice | StopStateNotice;
+
+/** A note that somebody wrote, with the event it belongs to. Newcomers get the last ones. */
+export interface SharedNote {
+  readonly type: "note_shared";
+  readonly id: number;
+  readonly peer: string;
+  readonly name: string;
+  readonly role: "observer" | "operator" | "supervisor";
+  readonly text: string;
+  readonly event: number;
+  readonly time: number;
+}
 
 /** Latch the stop. */
 export interface Stop {
@@ -261,6 +316,16 @@ export interface StreamInfo {
   readonly carrier: "capture-time" | "native" | "none" | "trailer";
 }
 
+/** How one camera's pictures are encoded for this peer now. */
+export interface StreamQuality {
+  readonly stream: string;
+  readonly tier: "high" | "low" | "operator";
+  readonly width: number;
+  readonly height: number;
+  readonly frames_per_second: number;
+  readonly bits_per_second: number;
+}
+
 /** How one stream does at a client, since it connected. */
 export interface StreamReport {
   readonly stream: string;
@@ -271,13 +336,15 @@ export interface StreamReport {
   readonly rendered?: number;
   readonly discarded?: number;
   readonly held?: number;
+  readonly tolerance?: number;
+  readonly lag?: number;
 }
 
 /** First message on `session`. */
 export interface Welcome {
   readonly type: "welcome";
   readonly peer: string;
-  readonly role: "observer" | "operator";
+  readonly role: "observer" | "operator" | "supervisor";
   readonly name: string;
   readonly streams: readonly (StreamInfo)[];
 }

@@ -48,5 +48,5 @@ export function welcomeOf(role: Welcome["role"]): Welcome {
 }
 
 export function seatOf(holder: string, name = ""): Seat {
-  return { type: "seat", holder, name, why: "" };
+  return { type: "seat", holder, name, why: "", claims: [], idle_seconds_left: null };
 }

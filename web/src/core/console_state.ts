@@ -1,10 +1,12 @@
 import type {
   Feedback,
   Participant,
+  Quality,
   Refusal,
   RobotState,
   Seat,
   ServerMessage,
+  SharedNote,
   StopState,
   Welcome,
 } from "../wire";
@@ -37,6 +39,8 @@ export interface ConsoleState {
   robot: RobotState | null;
   seat: Seat | null;
   participants: readonly Participant[];
+  quality: Quality | null; // of this peer's pictures
+  notes: SharedNote[]; // oldest first
   feedback: Feedback | null; // newest
   stop: StopState;
   roundTripMs: number | null;
@@ -44,6 +48,7 @@ export interface ConsoleState {
 }
 
 const LOG_LIMIT = 40;
+const NOTE_LIMIT = 100;
 const NOT_STOPPED: StopState = { stopped: false, by: "", reason: "" };
 
 export function createConsoleState(): ConsoleState {
@@ -61,6 +66,8 @@ export function createConsoleState(): ConsoleState {
     robot: null,
     seat: null,
     participants: [],
+    quality: null,
+    notes: [],
     feedback: null,
     stop: NOT_STOPPED,
     roundTripMs: null,
@@ -74,6 +81,8 @@ export function forgetConnection(state: ConsoleState): void {
   state.robot = null;
   state.seat = null;
   state.participants = [];
+  state.quality = null;
+  state.notes = [];
   state.feedback = null;
   state.roundTripMs = null;
 }
@@ -118,6 +127,13 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       return;
     case "feedback":
       if (isNews(state.feedback, message)) takeFeedbackState(state, message);
+      return;
+    case "quality":
+      state.quality = message;
+      return;
+    case "note_shared":
+      state.notes.push(message);
+      state.notes.splice(0, state.notes.length - NOTE_LIMIT);
       return;
     case "pong":
       return;
