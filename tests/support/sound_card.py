@@ -13,6 +13,7 @@ __all__ = ["SAMPLE_RATE", "SoundCard", "running_sound_card", "tone_level"]
 
 SAMPLE_RATE = 48000
 READY_TRIES = 100
+WINDOW = SAMPLE_RATE // 20  # samples
 
 
 class SoundCard:
@@ -38,11 +39,22 @@ class SoundCard:
             await process.communicate()
         return np.frombuffer(data, np.int16)
 
+    async def hears(self, frequency: float, level: float, within: float = 20.0) -> bool:
+        """Whether the tone is played at `level` for a second on end, some time in the next `within` seconds."""
+        for _ in range(int(within)):
+            if tone_level(await self.record(1.0), frequency) >= level:
+                return True
+        return False
+
 
 def tone_level(samples: npt.NDArray[np.int16], frequency: float) -> float:
-    """Amplitude of one tone, 0 to 1 of full scale (the discrete Fourier transform at `frequency`)."""
-    time = np.arange(samples.size) / SAMPLE_RATE
-    return float(abs(np.mean(samples / 32768 * np.exp(-2j * np.pi * frequency * time)))) * 2
+    """Amplitude of one tone, 0 to 1 of full scale: the discrete Fourier transform at `frequency`, window by window.
+
+    Receivers shift the phase whenever they stretch or conceal sound, so only the windows' amplitudes are averaged.
+    """
+    whole = samples[: samples.size - samples.size % WINDOW].reshape(-1, WINDOW) / 32768
+    wave = np.exp(-2j * np.pi * frequency * np.arange(WINDOW) / SAMPLE_RATE)
+    return float(np.mean(abs(whole @ wave) / WINDOW * 2))
 
 
 @asynccontextmanager

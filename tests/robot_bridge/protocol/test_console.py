@@ -45,7 +45,7 @@ def test_a_server_message_survives_the_wire() -> None:
 
 
 def test_messages_are_json_text_with_a_type() -> None:
-    assert json.loads(encode_console_message(SeatRequest())) == {"type": "seat_request"}
+    assert json.loads(encode_console_message(SeatRequest())) == {"type": "seat_request", "only_if_free": False}
 
 
 def test_a_client_cannot_speak_as_the_server() -> None:

@@ -1,0 +1,25 @@
+"""The ear that the browser tests listen with."""
+
+import numpy as np
+import numpy.typing as npt
+
+from tests.support.sound_card import SAMPLE_RATE, tone_level
+
+
+def _tone(frequency: float, amplitude: float) -> npt.NDArray[np.int16]:
+    time = np.arange(SAMPLE_RATE) / SAMPLE_RATE
+    return (amplitude * 32768 * np.sin(2 * np.pi * frequency * time)).astype(np.int16)
+
+
+def test_a_tone_is_measured_by_its_amplitude() -> None:
+    assert abs(tone_level(_tone(440, 0.05), 440) - 0.05) < 0.001
+
+
+def test_a_jump_of_phase_as_receivers_make_it_does_not_hide_the_tone() -> None:
+    tone = _tone(440, 0.05)
+    turned = np.concatenate([tone[: tone.size // 2], -tone[tone.size // 2 :]])
+    assert abs(tone_level(turned, 440) - 0.05) < 0.001
+
+
+def test_another_tone_is_not_heard() -> None:
+    assert tone_level(_tone(520, 0.3), 440) < 0.002
