@@ -1,4 +1,5 @@
-# Two images from one file: `robot` (bridge and simulated robot) and `console` (the service and its page).
+# Three images from one file: `robot` (bridge and simulated robot), `console` (the service and its page), and `proxy`
+# (TLS). All run as a user of their own.
 
 FROM node:20-bookworm-slim AS page
 WORKDIR /src/web
@@ -8,7 +9,7 @@ COPY web ./
 RUN npm run build
 
 FROM python:3.11-slim-bookworm AS base
-ENV PYTHONUNBUFFERED=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
+ENV PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /src
 COPY requirements.lock ./
 RUN pip install --require-hashes -r requirements.lock
@@ -16,7 +17,10 @@ COPY pyproject.toml README.md LICENSE ./
 COPY robot_bridge ./robot_bridge
 COPY server ./server
 COPY client ./client
-RUN useradd --system --create-home lockstep
+# A new volume takes over the owner of the folder that it covers.
+RUN useradd --system --create-home --uid 10001 lockstep \
+    && install -d -o lockstep -g lockstep -m 0755 /run/lockstep \
+    && install -d -o lockstep -g lockstep -m 0700 /var/lib/lockstep
 
 FROM base AS robot
 RUN apt-get update \
@@ -37,3 +41,8 @@ WORKDIR /home/lockstep
 EXPOSE 8000
 ENTRYPOINT ["lockstep", "serve"]
 CMD ["--robot", "tcp://127.0.0.1:5600"]
+
+FROM caddy:2.10-alpine AS proxy
+RUN adduser -D -H -u 10001 lockstep && chown -R lockstep /data /config
+COPY deploy/Caddyfile /etc/caddy/Caddyfile
+USER lockstep

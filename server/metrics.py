@@ -2,7 +2,7 @@
 
 from collections import Counter as Totals
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
 
 __all__ = ["Metrics"]
 
@@ -15,6 +15,7 @@ class Metrics:
         self._robot_bad_input: Totals[str] = Totals()
         self._robot_drops: Totals[str] = Totals()
         registry = self.registry
+        ProcessCollector(registry=registry)
         self.bad_input = Counter(
             "lockstep_bad_input", "Input refused, by where and why", ["where", "reason"], registry=registry
         )

@@ -74,7 +74,11 @@ async def running_stack(
         *("--port", str(port), "--robot-port", "0", "--event-log", str(event_log), *extra),
     ]
     # One secret for all runs of a test, so that a page's token outlives a restart of the console.
-    environment = os.environ | {"PYTHONWARNINGS": "default", "LOCKSTEP_SECRET": SECRET}
+    environment = os.environ | {
+        "PYTHONWARNINGS": "default",
+        "LOCKSTEP_SECRET": SECRET,
+        "LOCKSTEP_STATE_DIR": str(directory / "state"),
+    }
     process = await asyncio.create_subprocess_exec(
         *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, env=environment
     )

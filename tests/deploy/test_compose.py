@@ -1,0 +1,89 @@
+"""docker-compose.yml and the Dockerfile, as far as they can be checked without an engine."""
+
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+PROFILES = ("public", "monitoring")
+
+
+def _services() -> dict[str, dict[str, Any]]:
+    services: dict[str, dict[str, Any]] = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
+    return services
+
+
+SERVICES = _services()
+
+
+def _users_of_the_images() -> dict[str, str]:
+    """The last USER of every stage of the Dockerfile."""
+    users: dict[str, str] = {}
+    parents: dict[str, str] = {}
+    stage = ""
+    for line in (ROOT / "Dockerfile").read_text().splitlines():
+        if match := re.match(r"FROM (\S+) AS (\S+)", line):
+            parents[match[2]], stage = match[1], match[2]
+        elif line.startswith("USER "):
+            users[stage] = line.removeprefix("USER ").strip()
+    return {stage: users.get(stage) or users.get(parents[stage], "root") for stage in parents}
+
+
+@pytest.mark.parametrize("profiles", [(), ("public",), ("monitoring",), PROFILES])
+def test_compose_accepts_the_file_with_no_settings_at_all(profiles: tuple[str, ...]) -> None:
+    chosen = [part for profile in profiles for part in ("--profile", profile)]
+    done = subprocess.run(
+        ["docker-compose", *chosen, "config", "--quiet"], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_every_service_has_a_health_check_and_a_read_only_file_system(name: str) -> None:
+    service = SERVICES[name]
+    assert service["read_only"] is True
+    assert service["cap_drop"] == ["ALL"]
+    if name != "secrets":  # it ends by itself
+        assert service["healthcheck"]["test"][0] == "CMD"
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_no_service_runs_as_root(name: str) -> None:
+    service = SERVICES[name]
+    user = service.get("user") or _users_of_the_images()[service["build"]["target"]]
+    assert user not in ("root", "0")
+
+
+def test_only_the_proxy_may_gain_a_privilege_and_only_that_of_low_ports() -> None:
+    gained = {name: service["cap_add"] for name, service in SERVICES.items() if "cap_add" in service}
+    assert gained == {"caddy": ["NET_BIND_SERVICE"]}
+    relaxed = [name for name, service in SERVICES.items() if service["security_opt"] != ["no-new-privileges:true"]]
+    assert relaxed == ["caddy"]
+
+
+def test_the_robot_link_and_the_measurements_are_published_on_loopback_only() -> None:
+    published = [port for service in SERVICES.values() for port in service.get("ports", [])]
+    assert published
+    assert all(port.startswith("127.0.0.1:") for port in published)
+    assert "--web.listen-address=127.0.0.1:9090" in SERVICES["prometheus"]["command"]
+    assert SERVICES["grafana"]["environment"]["GF_SERVER_HTTP_ADDR"] == "127.0.0.1"
+
+
+def test_every_file_that_is_mounted_or_copied_exists() -> None:
+    volumes = [volume for service in SERVICES.values() for volume in service.get("volumes", [])]
+    mounted = [volume.split(":")[0] for volume in volumes if volume.startswith("./")]
+    copied = re.findall(r"^COPY (?!--from)(.+) \S+$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    missing = [path for path in [*mounted, *" ".join(copied).split()] if not (ROOT / path).exists()]
+    assert mounted
+    assert missing == []
+
+
+def test_images_of_others_are_pinned_to_a_version() -> None:
+    images = [service["image"] for service in SERVICES.values() if "image" in service]
+    images += re.findall(r"^FROM (\S+:\S+) AS", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    assert len(images) >= 5
+    assert [image for image in images if not re.search(r":v?\d+", image)] == []

@@ -1,0 +1,30 @@
+"""The systemd units, checked by systemd."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+UNITS = sorted((Path(__file__).resolve().parents[2] / "deploy" / "systemd").glob("*.service"))
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
+def test_systemd_accepts_the_unit(unit: Path, tmp_path: Path) -> None:
+    here = tmp_path / unit.name
+    program = Path(sys.executable).with_name("lockstep")
+    here.write_text(unit.read_text().replace("/opt/lockstep/.venv/bin/lockstep", str(program)))
+    done = subprocess.run(["systemd-analyze", "verify", str(here)], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
+def test_the_unit_starts_a_command_that_the_program_has(unit: Path) -> None:
+    line = next(line for line in unit.read_text().splitlines() if line.startswith("ExecStart="))
+    words = line.split()
+    command = [str(Path(sys.executable).with_name("lockstep")), words[1], "--help"]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=60, env={"COLUMNS": "200", "PATH": "/usr/bin"}
+    )
+    assert done.returncode == 0
+    assert [word for word in words if word.startswith("--") and word not in done.stdout] == []
