@@ -31,7 +31,7 @@ def make_secrets(folder: Path) -> list[str]:
 
 def main(arguments: list[str]) -> int:
     if len(arguments) != 1 or not Path(arguments[0]).is_dir():
-        print("usage: python -m server.make_secrets FOLDER", file=sys.stderr)
+        sys.stderr.write("usage: python -m server.make_secrets FOLDER\n")
         return 2
     make_secrets(Path(arguments[0]))
     return 0
