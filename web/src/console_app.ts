@@ -6,11 +6,11 @@ import {
   createConsoleState,
   forgetConnection,
   holdsSeat,
-  isOperator,
+  mayDrive,
   note,
   robotIsUp,
 } from "./core/console_state";
-import { contactStrength, forceOf, speedShare } from "./core/contact";
+import { forceOf, speedShare } from "./core/contact";
 import { notePicture } from "./core/latency";
 import { createPingLedger, lostPings, pingAnswered, sendPing } from "./core/ping_ledger";
 import { noteShown } from "./core/command_gate";
@@ -19,16 +19,16 @@ import { parseServerMessage } from "./core/wire_parser";
 import { ARM_REFUSAL_WORDS } from "./core/words";
 import { Controls, type ControlSample } from "./input/controls";
 import { Disposal } from "./input/disposal";
-import { Rumble } from "./input/rumble";
 import type { TouchSticks } from "./input/touch_sticks";
 import { AudioDesk } from "./media/audio_desk";
 import { MediaRoom } from "./media_room";
 import type { VideoStream } from "./media/video_stream";
-import { ContactTone } from "./media/contact_tone";
+import { ContactFeeling } from "./contact_feeling";
 import { Connection, type LinkState } from "./rtc/connection";
 import type { ConsoleApi } from "./rtc/console_api";
 import type { ChannelName, Peer } from "./rtc/peer";
 import { StampReader } from "./rtc/stamp_reader";
+import { SessionDesk } from "./session_desk";
 import { reportOf } from "./statistics";
 import { StopSender } from "./stop_sender";
 import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, Welcome } from "./wire";
@@ -39,11 +39,11 @@ const EARLY_PINGS = 5; // to know the path before the first command
 const EARLY_PING_MS = 50; // between them
 const SILENT_MS = 1500; // the other side counts as gone for driving
 const DEAD_BEATS = 10; // and for the connection; counted, so that a page that was held up is not taken for it
-const FEEL_MS = 50; // rumble and tone
 
 export interface ConsoleAppEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;
   mainStream(): string | null; // name of the camera in the large view
+  isOccupied(): boolean; // a text field has the keyboard, or something stands over the pictures
   armedChanged(): void;
   feedbackTaken(now: number): void; // pictures may have become stale
 }
@@ -55,6 +55,7 @@ export class ConsoleApp {
   readonly room: MediaRoom;
   readonly connection: Connection;
   readonly stopping: StopSender;
+  readonly session: SessionDesk;
   readonly controls: Controls;
   readonly events = createRateMeter();
   readonly audio = new AudioDesk();
@@ -65,8 +66,7 @@ export class ConsoleApp {
   force = 0; // N
   firstPictureMs: number | null = null;
   private readonly reader = StampReader.isSupported() ? new StampReader() : null;
-  private readonly rumble = new Rumble();
-  private readonly tone = new ContactTone(this.audio);
+  private readonly feeling = new ContactFeeling(this.audio);
   private readonly disposal = new Disposal();
   private peer: Peer | null = null;
   private heardMs = 0;
@@ -74,7 +74,6 @@ export class ConsoleApp {
   private readonly stalls = createRateMeter(6000);
   private tickMs = Infinity;
   private beatMs = 0;
-  private feelMs = 0;
   private readonly pings = createPingLedger();
   private earlyPings = 0; // still to send
   private earlyPingMs = 0;
@@ -82,9 +81,9 @@ export class ConsoleApp {
   constructor(
     api: ConsoleApi,
     trailer: boolean,
-    private readonly name: string | null,
+    name: string | null,
     sticks: TouchSticks,
-    private readonly page: ConsoleAppEvents,
+    readonly page: ConsoleAppEvents,
   ) {
     this.room = new MediaRoom(this.state, this.reader, this.audio, {
       canvas: (info) => page.canvas(info),
@@ -97,11 +96,13 @@ export class ConsoleApp {
       closed: () => this.connectionClosed(),
     });
     this.stopping = new StopSender(api, this.connection);
+    this.session = new SessionDesk(this.state, name, (message) => this.tell("session", message));
     this.controls = new Controls(sticks, {
       stop: () => this.stop("stop key"),
       arm: () => this.toggleArmed(),
       nextLayer: () => this.nextLayer(),
       isArmed: () => this.isArmed(),
+      answerClaim: (grant) => this.session.answerFirst(grant, performance.now()),
       lost: () => this.disarm("pad_lost"),
     });
     if (this.reader === null)
@@ -122,12 +123,13 @@ export class ConsoleApp {
   conditions(now = performance.now()): arming.ArmConditions {
     const { state } = this;
     return {
-      operator: isOperator(state),
+      operator: mayDrive(state),
       connected: state.welcome !== null && now - this.heardMs < SILENT_MS,
       robotUp: robotIsUp(state),
       holdsSeat: holdsSeat(state),
       stopped: state.stop.stopped || this.stopping.isPending,
       visible: !document.hidden,
+      occupied: this.page.isOccupied(),
     };
   }
 
@@ -144,7 +146,7 @@ export class ConsoleApp {
   disarm(reason: arming.DisarmReason): void {
     if (!arming.disarm(this.arming, reason)) return;
     this.controls.release();
-    this.rumble.stop();
+    this.feeling.still();
     if (this.driver !== null) driver.driverDisarm(this.driver, performance.now());
     this.drive(performance.now());
     this.page.armedChanged();
@@ -171,13 +173,9 @@ export class ConsoleApp {
       driver.driverRelease(this.driver, performance.now());
   }
 
-  requestSeat(): void {
-    this.tell("session", { type: "seat_request" });
-  }
-
   releaseSeat(): void {
     this.disarm("operator");
-    this.tell("session", { type: "seat_release" });
+    this.session.release();
   }
 
   /** A setting changed: the gates take it at once. */
@@ -196,7 +194,7 @@ export class ConsoleApp {
     this.connection.close();
     this.room.close();
     this.reader?.close();
-    this.tone.close();
+    this.feeling.close();
     await this.audio.close();
   }
 
@@ -247,9 +245,10 @@ export class ConsoleApp {
       return;
     }
     this.heardMs = performance.now();
-    const before = this.state.feedback;
+    const { feedback, handOver } = this.state;
     applyMessage(this.state, parsed.message, Date.now());
-    this.follow(parsed.message, before, this.heardMs);
+    this.follow(parsed.message, feedback, this.heardMs);
+    if (this.state.handOver !== handOver) this.handedOver();
   }
 
   private follow(message: ServerMessage, before: Feedback | null, now: number): void {
@@ -261,8 +260,14 @@ export class ConsoleApp {
     } else if (message.type === "pong") this.tookPong(message.id, now);
     else if (message.type === "welcome") this.welcomed(message);
     else if (message.type === "robot") this.robotChanged(message, now);
-    else if (message.type === "seat" && !holdsSeat(this.state) && this.driver !== null)
-      driver.driverSilence(this.driver);
+    else if (message.type === "seat") this.session.seatMs = now;
+  }
+
+  /** Whoever drives next has to arm, and nothing of the one before is executed. */
+  private handedOver(): void {
+    this.disarm("seat_lost");
+    if (holdsSeat(this.state)) arming.startAfresh(this.arming);
+    else if (this.driver !== null) driver.driverSilence(this.driver);
   }
 
   private tookFeedback(feedback: Feedback, before: Feedback | null, now: number): void {
@@ -285,8 +290,7 @@ export class ConsoleApp {
     this.link = { kind: "connected" };
     this.silentBeats = 0;
     if (this.peer !== null) this.room.open(this.peer, welcome.streams, this.heardMs);
-    if (this.name !== null) this.tell("session", { type: "rename", name: this.name });
-    if (welcome.role === "operator") this.requestSeat();
+    this.session.welcomed(welcome);
   }
 
   private robotChanged(robot: RobotState, now: number): void {
@@ -321,7 +325,7 @@ export class ConsoleApp {
     this.drive(now);
     this.room.listen();
     this.stopping.step(this.state.stop.stopped, now);
-    if (now >= this.feelMs) this.feel(now);
+    if (this.feeling.isDue(now)) this.feel(now);
     if (now >= this.beatMs) this.beat(now);
     else if (this.earlyPings > 0 && now >= this.earlyPingMs) this.earlyBeat(now);
   }
@@ -375,13 +379,12 @@ export class ConsoleApp {
 
   /** Force is felt only while driving is possible. */
   private feel(now: number): void {
-    this.feelMs = now + FEEL_MS;
-    const sensor = this.state.robot?.description.wrench ?? null;
     const { visible, stopped, connected } = this.conditions(now);
-    const strength =
-      sensor !== null && visible && connected && !stopped ? contactStrength(this.force, sensor) : 0;
-    this.rumble.feel(this.isArmed() ? (this.controls.pad.state?.gamepad ?? null) : null, strength, now);
-    this.tone.sound(this.state.settings.contactTone && this.room.isAudible() ? strength : 0);
+    const mayFeel = visible && connected && !stopped;
+    const sensor = mayFeel ? (this.state.robot?.description.wrench ?? null) : null;
+    const pad = this.isArmed() ? (this.controls.pad.state?.gamepad ?? null) : null;
+    const audible = this.state.settings.contactTone && this.room.isAudible();
+    this.feeling.feel({ force: this.force, sensor, pad, audible }, now);
   }
 
   private drawn(stream: VideoStream, stamp: number | null, at: number): void {

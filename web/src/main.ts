@@ -3,6 +3,8 @@ import "./style/base.css";
 import "./style/layout.css";
 import "./style/panels.css";
 import "./style/views.css";
+import "./style/session.css";
+import "./style/sheets.css";
 import "./style/small_screens.css";
 import { readFragment } from "./core/fragment";
 import { installHook } from "./lockstep_hook";

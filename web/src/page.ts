@@ -1,5 +1,7 @@
 import { ConsoleApp } from "./console_app";
-import { isOperator } from "./core/console_state";
+import { holdsSeat, isOperator } from "./core/console_state";
+import { countUnread, createUnread, markRead } from "./core/unread";
+import { FIELDS } from "./input/keyboard";
 import { TouchSticks } from "./input/touch_sticks";
 import type { ConsoleApi } from "./rtc/console_api";
 import { createAnnouncer } from "./ui/announcer";
@@ -11,23 +13,33 @@ import { h, setData, type Panel } from "./ui/dom";
 import { createEventPanel } from "./ui/event_panel";
 import { createForceGauge } from "./ui/force_gauge";
 import { createLogPanel } from "./ui/log_panel";
+import { createNotesPanel } from "./ui/notes_panel";
 import { createOverlay, overlayWords } from "./ui/overlay";
 import { createPeoplePanel } from "./ui/people_panel";
 import { createRangeRadar } from "./ui/range_radar";
 import { SceneView } from "./ui/scene_view";
+import { createSeatBar } from "./ui/seat_bar";
 import { createSettingsPanel } from "./ui/settings_panel";
+import { Sheets } from "./ui/sheet";
 import { createStatusBar } from "./ui/status_bar";
 import { createStopPanel } from "./ui/stop_panel";
 import { createStreamTable } from "./ui/stream_table";
+import { Tabs, type Tab } from "./ui/tabs";
 import { ViewBoard } from "./ui/view_board";
 
 const REDRAW_MS = 66;
+/** What a dialogue makes inert. The control seat, the banner and STOP stay in reach. */
+const BEHIND_SHEETS = ".bar, .views, .rail, .arm, .axis-panel, .stick";
+
+const SMALL_SCREEN = matchMedia("(max-width: 999px)");
 
 /** The whole page: one engine, and panels that show it. */
 export class Page {
   readonly app: ConsoleApp;
   readonly board: ViewBoard;
   private readonly root = h("div", "console");
+  private readonly sheets = new Sheets(() => this.root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
+  private readonly unread = createUnread();
   private readonly panels: Panel[];
   private drawnMs = 0;
 
@@ -38,6 +50,7 @@ export class Page {
     this.app = new ConsoleApp(api, trailer, name, new TouchSticks(left, right), {
       canvas: (info) => this.board.canvas(info),
       mainStream: () => this.board.mainStream(),
+      isOccupied: () => this.isOccupied(),
       armedChanged: () => this.draw(performance.now()),
       feedbackTaken: (now) => this.board.update(this.app, now),
     });
@@ -65,13 +78,14 @@ export class Page {
     const contact = createForceGauge(app, true);
     const radar = createRangeRadar(app);
     const overlay = createOverlay(app);
-    const details = [
+    const seat = createSeatBar(app);
+    const status = [
       createStreamTable(app),
       createDelayPanel(app, () => board.mainStream()),
       createSettingsPanel(app),
-      createPeoplePanel(app),
       createLogPanel(app),
     ];
+    const tabs = new Tabs("Session", this.createTabs(status));
     const arm = createArmPanel(app);
     const axes = createAxisPanel(app);
     const stop = createStopPanel(app);
@@ -80,25 +94,62 @@ export class Page {
       h("div", "gauges", {}, force.element, radar.element),
       h("div", "stage", {}, contact.element, overlay.element),
     );
-    const rail = h(
-      "aside",
-      "rail",
-      {},
-      event.element,
-      h("div", "details", {}, ...details.map((panel) => panel.element)),
-    );
+    const rail = h("aside", "rail", {}, event.element, tabs.element);
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
-    this.root.append(bar.element, banner.element, board.element, rail, deck, announcer.element);
-    return [bar, banner, event, force, contact, radar, overlay, ...details, arm, axes, stop, announcer];
+    this.root.append(
+      ...[bar.element, seat.element, banner.element, board.element, rail],
+      ...[this.sheets.element, deck, announcer.element],
+    );
+    addEventListener("keydown", (event) => {
+      if (event.code === "Escape") this.sheets.close();
+    });
+    return [bar, seat, banner, event, force, contact, radar, overlay, tabs, arm, axes, stop, announcer];
+  }
+
+  private createTabs(status: readonly Panel[]): Tab[] {
+    const { app, unread } = this;
+    const me = (): string | null => app.state.welcome?.peer ?? null;
+    const news = (): number => countUnread(unread, app.state.notes, me());
+    const notes = createNotesPanel(app);
+    const reading: Panel = {
+      element: notes.element,
+      update: (now) => {
+        notes.update(now);
+        if (!document.hidden && notes.element.checkVisibility()) markRead(unread, app.state.notes);
+      },
+    };
+    const count = (): string => (app.state.participants.length > 0 ? `${app.state.participants.length}` : "");
+    return [
+      { name: "Status", panels: status, badge: () => "", calls: () => false },
+      { name: "People", panels: [createPeoplePanel(app)], badge: count, calls: () => false },
+      {
+        name: "Notes",
+        panels: [reading],
+        badge: () => (news() > 0 ? `${news()}` : ""),
+        calls: () => news() > 0,
+      },
+    ];
+  }
+
+  /** Whether keys write, or something stands over the pictures. */
+  private isOccupied(): boolean {
+    const writes = document.activeElement?.matches(FIELDS) ?? false;
+    const covered = this.root.classList.contains("shows-details") && SMALL_SCREEN.matches;
+    return writes || covered || this.sheets.isOpen;
+  }
+
+  /** Who drives gets the controls; a supervisor while holding the seat. */
+  private drives(): boolean {
+    return isOperator(this.app.state) || holdsSeat(this.app.state);
   }
 
   private draw(now: number): void {
     this.drawnMs = now;
     const { app, root } = this;
     setData(root, "armed", app.arming.state);
-    setData(root, "role", app.state.welcome === null ? "" : isOperator(app.state) ? "operator" : "observer");
+    setData(root, "role", app.state.welcome === null ? "" : this.drives() ? "operator" : "observer");
     setData(root, "stopped", String(app.state.stop.stopped));
-    setData(root, "gate", app.state.settings.gateEnabled ? "on" : "off");
+    setData(root, "gate", app.state.settings.gate === "event" ? "on" : "off");
     root.classList.toggle("has-overlay", overlayWords(app, now) !== null);
     this.board.update(app, now);
     for (const panel of this.panels) panel.update(now);

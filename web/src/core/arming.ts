@@ -2,7 +2,14 @@
 export type ArmState = "disarmed" | "armed" | "driving";
 
 export type ArmRefusal =
-  "observer" | "not_connected" | "robot_down" | "no_seat" | "stopped" | "hidden" | "deadman_held";
+  | "observer"
+  | "not_connected"
+  | "robot_down"
+  | "no_seat"
+  | "stopped"
+  | "hidden"
+  | "occupied"
+  | "deadman_held";
 
 export type DisarmReason =
   | "start"
@@ -13,6 +20,7 @@ export type DisarmReason =
   | "connection_lost"
   | "robot_down"
   | "seat_lost"
+  | "occupied"
   | "stopped"
   | "taped_down";
 
@@ -23,6 +31,7 @@ export interface ArmConditions {
   readonly holdsSeat: boolean;
   readonly stopped: boolean;
   readonly visible: boolean;
+  readonly occupied: boolean; // the keyboard or the picture belongs to something else: a text field, a dialogue
 }
 
 export interface Arming {
@@ -48,6 +57,7 @@ export function armRefusal(arming: Arming, conditions: ArmConditions): ArmRefusa
   if (!conditions.holdsSeat) return "no_seat";
   if (conditions.stopped) return "stopped";
   if (!conditions.visible) return "hidden";
+  if (conditions.occupied) return "occupied";
   return arming.deadman ? "deadman_held" : null;
 }
 
@@ -67,13 +77,19 @@ export function disarm(arming: Arming, reason: DisarmReason): boolean {
   return true;
 }
 
+/** The seat is held anew: what disarmed an earlier turn is no longer news. */
+export function startAfresh(arming: Arming): void {
+  if (arming.state === "disarmed") arming.reason = "start";
+}
+
 /** What the first condition that no longer holds means for one who is armed; null when all hold. */
 export function lostCondition(conditions: ArmConditions): DisarmReason | null {
   if (!conditions.connected) return "connection_lost";
   if (conditions.stopped) return "stopped";
   if (!conditions.robotUp) return "robot_down";
   if (!conditions.operator || !conditions.holdsSeat) return "seat_lost";
-  return conditions.visible ? null : "hidden";
+  if (!conditions.visible) return "hidden";
+  return conditions.occupied ? "occupied" : null;
 }
 
 /**

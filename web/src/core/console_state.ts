@@ -11,13 +11,15 @@ import type {
   Welcome,
 } from "../wire";
 import type { Pacing } from "./command_gate";
+import { handOver, type HandOver } from "./hand_over";
+import type { GateMode } from "./media_gate";
 import { isNewer } from "./serial";
 import { REFUSAL_WORDS } from "./words";
 
 export interface Settings {
   tolerance: { video: number; audio: number }; // events; 4 and 6
   pacing: Pacing;
-  gateEnabled: boolean; // false: the thesis' control experiment
+  gate: GateMode; // "off" and "age" are what the rule is compared with
   speedCap: boolean; // slower the later the picture
   contactTone: boolean;
   soundWanted: boolean;
@@ -38,6 +40,7 @@ export interface ConsoleState {
   welcome: Welcome | null; // null while not connected
   robot: RobotState | null;
   seat: Seat | null;
+  handOver: HandOver | null; // the last one
   participants: readonly Participant[];
   quality: Quality | null; // of this peer's pictures
   notes: SharedNote[]; // oldest first
@@ -56,7 +59,7 @@ export function createConsoleState(): ConsoleState {
     settings: {
       tolerance: { video: 4, audio: 6 },
       pacing: "feedback",
-      gateEnabled: true,
+      gate: "event",
       speedCap: false,
       contactTone: false,
       soundWanted: true,
@@ -65,6 +68,7 @@ export function createConsoleState(): ConsoleState {
     welcome: null,
     robot: null,
     seat: null,
+    handOver: null,
     participants: [],
     quality: null,
     notes: [],
@@ -91,6 +95,11 @@ export function isOperator(state: ConsoleState): boolean {
   return state.welcome?.role === "operator";
 }
 
+/** Whether this link may drive at all. */
+export function mayDrive(state: ConsoleState): boolean {
+  return isOperator(state) || state.welcome?.role === "supervisor";
+}
+
 export function holdsSeat(state: ConsoleState): boolean {
   return state.seat !== null && state.seat.holder !== "" && state.seat.holder === state.welcome?.peer;
 }
@@ -110,8 +119,7 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       if (message.link === "down") note(state, "error", `Robot link down: ${message.detail}`, wallMs);
       return;
     case "seat":
-      state.seat = message;
-      note(state, "info", seatWords(message), wallMs);
+      takeSeat(state, message, wallMs);
       return;
     case "participants":
       state.participants = message.participants;
@@ -164,9 +172,12 @@ function takeFeedbackState(state: ConsoleState, feedback: Feedback): void {
   state.stop = feedback.stop;
 }
 
-function seatWords(seat: Seat): string {
-  const why = seat.why === "" ? "" : ` (${seat.why})`;
-  return seat.holder === "" ? `The control seat is free${why}` : `${seat.name} holds the control seat${why}`;
+function takeSeat(state: ConsoleState, seat: Seat, wallMs: number): void {
+  const change = handOver(state.seat, seat, state.welcome?.peer ?? null);
+  state.seat = seat;
+  if (change === null) return;
+  state.handOver = change;
+  note(state, "info", change.words, wallMs);
 }
 
 function refusalWords(refusal: Refusal): string {

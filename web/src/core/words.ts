@@ -15,6 +15,9 @@ export const REFUSAL_WORDS: Readonly<Record<RefusalReason, string>> = {
   malformed: "The console could not read it",
   no_seat: "You do not hold the control seat",
   seat_taken: "Somebody else holds the control seat",
+  declined: "Whoever drives said no, or did not answer",
+  not_neutral: "You are new in the control seat: let go once before you drive",
+  too_often: "That is too much at once: wait a moment",
   not_allowed: "Your link does not permit it",
   link_down: "The console has no link to the robot",
 };
@@ -34,6 +37,7 @@ export const ARM_REFUSAL_WORDS: Readonly<Record<ArmRefusal, string>> = {
   no_seat: "You do not hold the control seat",
   stopped: "The robot is stopped: reset it first",
   hidden: "The page is hidden",
+  occupied: "Close what is open over the picture, or leave the text field, first",
   deadman_held: "Let go of the hold-to-run control first",
 };
 
@@ -46,6 +50,7 @@ export const DISARM_WORDS: Readonly<Record<DisarmReason, string>> = {
   connection_lost: "Disarmed: the connection was lost",
   robot_down: "Disarmed: the robot cannot be reached",
   seat_lost: "Disarmed: the control seat was lost",
+  occupied: "Disarmed: you turned to a text field or a dialogue",
   stopped: "Disarmed: the robot was stopped",
   taped_down: "Disarmed: hold-to-run was held a minute without change",
 };

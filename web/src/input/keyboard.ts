@@ -5,11 +5,18 @@ export interface KeyboardEvents {
   arm(): void;
   nextLayer(): void;
   isArmed(): boolean;
+  /** Answers whoever asks for the seat; says whether anybody does. */
+  answerClaim(grant: boolean): boolean;
 }
 
 const STOP_KEYS = new Set(["Escape", "Backspace"]);
 const ARM_KEYS = new Set(["Enter", "NumpadEnter"]);
-const FIELDS = "input, textarea, select";
+/** The holder of the seat has to be able to answer while all other keys drive. */
+const ANSWER_KEYS: ReadonlyMap<string, boolean> = new Map([
+  ["F8", true],
+  ["F9", false],
+]);
+export const FIELDS = "input, textarea, select";
 const CONTROLS = "button, a, summary, [role=button]";
 
 /** Keys held now. While armed, keys drive; else they work the page as anywhere. */
@@ -49,8 +56,13 @@ export class Keyboard {
       return;
     }
     if (event.code === "") return;
+    const answer = ANSWER_KEYS.get(event.code);
+    if (answer !== undefined && !event.repeat && this.events.answerClaim(answer)) {
+      event.preventDefault();
+      return;
+    }
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (this.events.isArmed()) this.drive(event);
+    if (this.events.isArmed() && !inField) this.drive(event);
     else this.idle(event, inField || (target?.matches(CONTROLS) ?? false));
   }
 

@@ -1,5 +1,5 @@
 import { armRefusal } from "../core/arming";
-import { isOperator } from "../core/console_state";
+import { holdsSeat, isOperator } from "../core/console_state";
 import { ARM_REFUSAL_WORDS, DISARM_WORDS } from "../core/words";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
@@ -21,7 +21,7 @@ export function createArmPanel(app: ConsoleApp): Panel {
     element,
     update(now) {
       const { arming } = app;
-      setHidden(element, !isOperator(app.state));
+      setHidden(element, !isOperator(app.state) && !holdsSeat(app.state));
       setData(element, "state", arming.state);
       setText(state, STATE_WORDS[arming.state]);
       setText(toggle, arming.state === "disarmed" ? "Arm" : "Disarm");

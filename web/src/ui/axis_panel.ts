@@ -1,4 +1,4 @@
-import { isOperator } from "../core/console_state";
+import { holdsSeat, isOperator } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
 import type { Axis, RobotDescription } from "../wire";
 import { button, h, setHidden, setPressed, setText, type Panel } from "./dom";
@@ -28,7 +28,7 @@ export function createAxisPanel(app: ConsoleApp): Panel {
           ...now.layers.map((layer, index) => button("segment", layer.label, () => app.selectLayer(index))),
         );
       }
-      setHidden(layers, !isOperator(app.state) || layers.childElementCount < 2);
+      setHidden(layers, (!isOperator(app.state) && !holdsSeat(app.state)) || layers.childElementCount < 2);
       for (const [index, child] of [...layers.children].entries())
         if (child instanceof HTMLElement) setPressed(child, index === app.layer);
       showBars(app, shown);

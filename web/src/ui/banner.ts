@@ -1,38 +1,37 @@
-import { holdsSeat, isOperator } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
+
+const GATE_OFF_WORDS = { off: "Gate off", age: "Gate by clock" } as const;
 
 /** A strip across the page for what must not be missed and does not end by itself. */
 export function createBanner(app: ConsoleApp): Panel {
   const text = h("span", "banner-text");
   const gateOn = button("banner-button", "Turn the gate on", () => {
-    app.state.settings.gateEnabled = true;
+    app.state.settings.gate = "event";
     app.settingsChanged();
   });
-  const take = button("banner-button", "Take control", () => app.requestSeat());
-  const element = h("div", "banner", { role: "status" }, text, gateOn, take);
+  const element = h("div", "banner", { role: "status" }, text, gateOn);
   return {
     element,
     update() {
-      const gateOff = !app.state.settings.gateEnabled;
+      const { gate } = app.state.settings;
+      const gateOff = gate !== "event";
       const words = gateOff
-        ? "Gate off: pictures and sound may not match the robot's state"
+        ? `${GATE_OFF_WORDS[gate]}: pictures and sound may not match the robot's state`
         : app.stopping.failed
           ? "The robot did not confirm the STOP: use the hardware stop"
-          : roleWords(app);
+          : coveredStop(app);
       setHidden(element, words === null);
-      setData(element, "tone", gateOff ? "hazard" : app.stopping.failed ? "bad" : "calm");
+      setData(element, "tone", gateOff ? "hazard" : "bad");
       setText(text, words ?? "");
       setHidden(gateOn, !gateOff);
-      setHidden(take, gateOff || !isOperator(app.state) || app.state.seat?.holder !== "");
     },
   };
 }
 
-function roleWords(app: ConsoleApp): string | null {
-  const { seat, welcome } = app.state;
-  if (welcome === null || seat === null || holdsSeat(app.state)) return null;
-  const driver = seat.holder === "" ? "Nobody drives" : `${seat.name} drives`;
-  if (welcome.role === "observer") return `Watching. ${driver}. You may stop the robot at any time`;
-  return seat.holder === "" ? "The control seat is free" : `${driver}: the control seat is taken`;
+/** A stop stands over the large view; here too while something covers that. */
+function coveredStop(app: ConsoleApp): string | null {
+  if (!app.state.stop.stopped || !app.page.isOccupied()) return null;
+  const { by, reason } = app.state.stop;
+  return `Stopped${by === "" ? "" : ` by ${by}`}${reason === "" ? "" : `: ${reason}`}`;
 }

@@ -33,7 +33,7 @@ export function createEventPanel(app: ConsoleApp): Panel {
       const flows = blocked === null && now - openMs < STEADY_MS;
       setText(number, app.state.feedback === null ? "–" : grouped(app.state.feedback.event));
       setText(rate, `${rateOf(app.events, now).toFixed(1)} /s`);
-      const watches = app.state.welcome !== null && !isOperator(app.state);
+      const watches = app.state.welcome !== null && !isOperator(app.state) && !holdsSeat(app.state);
       setData(gate, "tone", watches ? "off" : flows ? "good" : "wait");
       setText(state, watches ? "Watching" : flows ? "Gate open" : "Gate shut");
       setText(words, watches ? driverWords(app) : (blocked ?? GATE_WORDS[flows ? "open" : found]));

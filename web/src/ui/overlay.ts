@@ -1,4 +1,4 @@
-import { isOperator, robotIsUp } from "../core/console_state";
+import { mayDrive, robotIsUp } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
 import type { LinkState, LinkTrouble } from "../rtc/connection";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
@@ -41,7 +41,7 @@ export function createOverlay(app: ConsoleApp): Panel {
       setText(text, words.text);
       setHidden(text, words.text === "");
       setHidden(retry, app.link.kind !== "waiting");
-      setHidden(reset, words.tone !== "stopped" || !isOperator(app.state));
+      setHidden(reset, words.tone !== "stopped" || !mayDrive(app.state));
     },
   };
 }
@@ -84,9 +84,9 @@ function stopWords(app: ConsoleApp): OverlayWords {
   const { by, reason } = app.state.stop;
   const who = by === "" ? "The robot was stopped" : `By ${by}`;
   const why = reason === "" ? "" : `: ${reason}`;
-  const next = isOperator(app.state)
+  const next = mayDrive(app.state)
     ? "Reset moves nothing; arm again afterwards."
-    : "The operator can reset it.";
+    : "An operator or a supervisor can reset it.";
   return { tone: "stopped", title: "Stopped", text: `${who}${why}. ${next}` };
 }
 

@@ -1,42 +1,80 @@
-import { holdsSeat, isOperator } from "../core/console_state";
+import { crowdWords, personWords, sortPeople, summarise, type People } from "../core/people";
 import type { ConsoleApp } from "../console_app";
 import type { Participant } from "../wire";
-import { button, h, milliseconds, setHidden, setText, type Panel } from "./dom";
+import { button, h, setHidden, setText, type Panel } from "./dom";
+import { createRenameForm } from "./rename_form";
 
-/** Who is here, and who may drive. */
+/** So few observers are shown without being asked for. */
+const FEW = 6;
+
+/** Who is here, and how each of them does. */
 export function createPeoplePanel(app: ConsoleApp): Panel {
-  const count = h("span", "card-note");
-  const list = h("ul", "people");
-  const take = button("wide-button", "Take control", () => app.requestSeat());
-  const release = button("wide-button quiet", "Give control back", () => app.releaseSeat());
-  const head = h("div", "card-head", {}, h("h2", "", {}, "People"), count);
+  const leading = h("ul", "people");
+  const crowd = h("span", "crowd-words");
+  const watching = h("ul", "people");
+  const toggle = button("quiet-button", "Show all", () => {
+    open = !open;
+    shown = "";
+  });
+  const crowdHead = h("div", "crowd", {}, crowd, toggle);
+  const empty = h("p", "muted", {}, "Nobody is connected");
+  const rename = createRenameForm(app);
+  let open = false;
   let shown = "";
   return {
-    element: h("section", "card", { "aria-label": "People" }, head, list, take, release),
+    element: h(
+      "section",
+      "people-panel",
+      { "aria-label": "People" },
+      empty,
+      leading,
+      rename,
+      crowdHead,
+      watching,
+    ),
     update() {
-      const { participants, seat } = app.state;
-      const mine = holdsSeat(app.state);
-      setText(count, String(participants.length));
-      setHidden(take, !isOperator(app.state) || mine || seat?.holder !== "");
-      setHidden(release, !mine);
-      const key = JSON.stringify([participants, seat?.holder, app.state.welcome?.peer]);
+      const { participants, seat, welcome } = app.state;
+      const key = JSON.stringify([
+        participants,
+        seat?.holder,
+        seat?.claims.map((claim) => claim.peer),
+        welcome?.peer,
+      ]);
       if (key === shown) return;
       shown = key;
-      list.replaceChildren(...participants.map((person) => personLine(app, person)));
+      const people = sortPeople(participants, seat, welcome?.peer ?? null);
+      setHidden(empty, participants.length > 0);
+      setHidden(rename, welcome === null);
+      leading.replaceChildren(...people.leading.map((person) => personLine(app, person)));
+      showCrowd(people);
     },
   };
+
+  function showCrowd({ watching: crowded }: People): void {
+    const all = open || crowded.length <= FEW;
+    setHidden(crowdHead, crowded.length === 0);
+    setText(crowd, crowdWords(summarise(crowded)));
+    setHidden(toggle, crowded.length <= FEW);
+    setText(toggle, open ? "Show few" : "Show all");
+    const rows = all ? crowded : crowded.slice(0, FEW);
+    watching.replaceChildren(...rows.map((person) => personLine(app, person)));
+  }
 }
 
 function personLine(app: ConsoleApp, person: Participant): HTMLElement {
-  const isYou = person.peer === app.state.welcome?.peer;
-  const drives = person.peer === app.state.seat?.holder;
-  const delay = person.picture_delay_ms === null ? "" : `${milliseconds(person.picture_delay_ms)} ms`;
+  const { seat, welcome } = app.state;
+  const name = h("span", "person-name", {}, person.name);
+  const line = h("span", "person-line", {}, name);
+  if (person.peer === welcome?.peer) line.append(h("span", "person-tag you", {}, "you"));
+  if (person.peer === seat?.holder) line.append(h("span", "person-tag drives", {}, "drives"));
+  else if (seat?.claims.some((claim) => claim.peer === person.peer) === true)
+    line.append(h("span", "person-tag asks", {}, "asks for control"));
   return h(
     "li",
-    drives ? "person drives" : "person",
+    "person",
     {},
-    h("span", "person-name", {}, isYou ? `${person.name} (you)` : person.name),
-    h("span", "person-role", {}, drives ? "drives" : person.role),
-    h("span", "person-delay", {}, delay),
+    line,
+    h("span", "person-role", {}, person.role),
+    h("span", "person-figures", {}, personWords(person)),
   );
 }

@@ -1,4 +1,4 @@
-import { holdsSeat, isOperator, robotIsUp } from "../core/console_state";
+import { robotIsUp } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setHidden, setPressed, setText, type Panel } from "./dom";
 
@@ -9,12 +9,11 @@ interface Chip {
   show(tone: Tone, text: string): void;
 }
 
-/** Name, links, seat and sound: the top of the page. */
+/** Name, links and sound: the top of the page. */
 export function createStatusBar(app: ConsoleApp, toggleDetails: () => void): Panel {
   const robotName = h("span", "bar-robot");
   const consoleChip = createChip("Console");
   const robotChip = createChip("Robot");
-  const seatChip = createChip("Seat");
   const level = h("span", "sound-level", { "aria-hidden": "true" });
   const soundText = h("span");
   const sound = button("chip-button sound", "", () => toggleSound(app));
@@ -26,7 +25,7 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void): Pan
     {},
     h("span", "bar-brand", {}, "Lockstep"),
     robotName,
-    h("div", "bar-chips", {}, consoleChip.element, robotChip.element, seatChip.element),
+    h("div", "bar-chips", {}, consoleChip.element, robotChip.element),
     h("div", "bar-tools", {}, sound, details),
   );
   return {
@@ -35,7 +34,6 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void): Pan
       setText(robotName, app.state.robot?.description.label ?? "");
       consoleChip.show(...consoleWords(app));
       robotChip.show(...robotWords(app));
-      seatChip.show(...seatWords(app));
       const audible = app.room.isAudible();
       setHidden(sound, app.room.sounds.size === 0);
       setPressed(sound, audible);
@@ -75,12 +73,4 @@ function consoleWords(app: ConsoleApp): [Tone, string] {
 function robotWords(app: ConsoleApp): [Tone, string] {
   if (app.state.robot === null) return ["off", "unknown"];
   return robotIsUp(app.state) ? ["good", "connected"] : ["bad", "unreachable"];
-}
-
-function seatWords(app: ConsoleApp): [Tone, string] {
-  const { seat } = app.state;
-  if (holdsSeat(app.state)) return ["good", "yours"];
-  if (seat === null) return ["off", "unknown"];
-  if (seat.holder === "") return [isOperator(app.state) ? "wait" : "off", "free"];
-  return ["off", seat.name];
 }

@@ -16,6 +16,7 @@ const READY: ArmConditions = {
   holdsSeat: true,
   stopped: false,
   visible: true,
+  occupied: false,
 };
 
 function armed(): Arming {
@@ -43,6 +44,7 @@ describe("arming", () => {
     ["no_seat", { holdsSeat: false }],
     ["stopped", { stopped: true }],
     ["hidden", { visible: false }],
+    ["occupied", { occupied: true }],
   ] as const)("is refused: %s", (refusal, change) => {
     const arming = createArming();
     sampleDeadman(arming, false, "", 0);

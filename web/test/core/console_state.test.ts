@@ -67,8 +67,11 @@ describe("the console's state", () => {
 
   it("says why a seat changed hands", () => {
     const state = createConsoleState();
+    applyMessage(state, seatOf("x", "Ada"), 0);
+    expect([state.log.length, state.handOver]).toEqual([0, null]);
     applyMessage(state, { ...seatOf("", ""), why: "heartbeat lost" }, 0);
-    expect(state.log[0]?.text).toBe("The control seat is free (heartbeat lost)");
+    expect(state.log[0]?.text).toBe("Ada fell silent: the control seat is free");
+    expect(state.handOver).toMatchObject({ toMe: false, fromMe: false });
   });
 
   it("keeps only the newest lines of the log", () => {

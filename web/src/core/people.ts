@@ -1,0 +1,68 @@
+import type { Participant, Seat } from "../wire";
+
+/** The people of a session in the order in which they matter, observers apart. */
+export interface People {
+  readonly leading: readonly Participant[]; // who drives, you, who may drive
+  readonly watching: readonly Participant[]; // the other observers, by name
+}
+
+/** What there is to say of a crowd in one line. */
+export interface CrowdSummary {
+  readonly count: number;
+  readonly largestGap: number; // events
+  readonly onLowQuality: number;
+}
+
+export function sortPeople(
+  participants: readonly Participant[],
+  seat: Seat | null,
+  me: string | null,
+): People {
+  const claims = new Set(seat?.claims.map((claim) => claim.peer));
+  const rank = (person: Participant): number => {
+    if (person.peer === seat?.holder) return 0;
+    if (person.peer === me) return 1;
+    if (claims.has(person.peer)) return 2;
+    if (person.role === "supervisor") return 3;
+    return person.role === "operator" ? 4 : 5;
+  };
+  const ranked = participants
+    .map((person) => ({ person, rank: rank(person) }))
+    .sort((one, other) => one.rank - other.rank || byName(one.person, other.person));
+  return {
+    leading: ranked.filter((each) => each.rank < 5).map((each) => each.person),
+    watching: ranked.filter((each) => each.rank === 5).map((each) => each.person),
+  };
+}
+
+export function summarise(people: readonly Participant[]): CrowdSummary {
+  return {
+    count: people.length,
+    largestGap: people.reduce((most, person) => Math.max(most, Math.abs(person.gap)), 0),
+    onLowQuality: people.filter((person) => person.tier === "low").length,
+  };
+}
+
+export function crowdWords({ count, largestGap, onLowQuality }: CrowdSummary): string {
+  const words = [`${count} ${count === 1 ? "observer" : "observers"}`];
+  if (largestGap > 0) words.push(`gap up to ${largestGap}`);
+  if (onLowQuality > 0) words.push(`${onLowQuality} on low quality`);
+  return words.join(" · ");
+}
+
+/** The figures of one person: only those that are known. */
+export function personWords(person: Participant): string {
+  const words: string[] = [person.carrier === "none" ? "no stamps" : person.carrier];
+  if (person.carrier !== "none") words.push(`gap ${person.gap}`);
+  if (person.picture_delay_ms !== null) words.push(`${person.picture_delay_ms.toFixed(0)} ms`);
+  else if (person.round_trip_ms !== null) words.push(`${person.round_trip_ms.toFixed(0)} ms round trip`);
+  if (person.tier !== null) words.push(TIER_WORDS[person.tier]);
+  if (person.loss !== null) words.push(`${(person.loss * 100).toFixed(person.loss < 0.0995 ? 1 : 0)} % lost`);
+  return words.join(" · ");
+}
+
+const TIER_WORDS = { operator: "operator quality", high: "high quality", low: "low quality" } as const;
+
+function byName(one: Participant, other: Participant): number {
+  return one.name.localeCompare(other.name, "en") || one.peer.localeCompare(other.peer, "en");
+}

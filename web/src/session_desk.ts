@@ -1,0 +1,77 @@
+import { holdsSeat, type ConsoleState } from "./core/console_state";
+import { claimsAfter, idleSecondsAfter, type Claim } from "./core/seat_standing";
+import type { ClientMessage, Welcome } from "./wire";
+
+const NAME_LIMIT = 60; // characters, as the console takes them
+const NOTE_LIMIT = 500;
+const NAME_KEY = "lockstep.name";
+
+/** What this page says to the other people: about the seat, its name, notes. */
+export class SessionDesk {
+  seatMs = 0; // when the console last spoke of the seat: its countdowns began then
+
+  constructor(
+    private readonly state: ConsoleState,
+    private name: string | null, // wanted; null: the link's own
+    private readonly tell: (message: ClientMessage) => boolean,
+  ) {
+    this.name = sessionStorage.getItem(NAME_KEY) ?? name;
+  }
+
+  /** An operator's page takes the seat if nobody has it, and disturbs nobody otherwise. */
+  welcomed(welcome: Welcome): void {
+    if (this.name !== null) this.tell({ type: "rename", name: this.name });
+    if (welcome.role === "operator") this.tell({ type: "seat_request", only_if_free: true });
+  }
+
+  requestSeat(): void {
+    this.tell({ type: "seat_request" });
+  }
+
+  /** The holder shows that somebody is there. */
+  keepSeat(): void {
+    if (holdsSeat(this.state)) this.tell({ type: "seat_request" });
+  }
+
+  takeSeat(): void {
+    this.tell({ type: "seat_take" });
+  }
+
+  release(): void {
+    this.tell({ type: "seat_release" });
+  }
+
+  answer(peer: string, grant: boolean): void {
+    this.tell({ type: grant ? "seat_grant" : "seat_decline", peer });
+  }
+
+  /** Answers whoever has waited longest; says whether this page was asked at all. */
+  answerFirst(grant: boolean, now: number): boolean {
+    const first = holdsSeat(this.state) ? this.claims(now)[0] : undefined;
+    if (first !== undefined) this.answer(first.peer, grant);
+    return first !== undefined;
+  }
+
+  claims(now: number): Claim[] {
+    return claimsAfter(this.state.seat, now - this.seatMs);
+  }
+
+  idleSecondsLeft(now: number): number | null {
+    return idleSecondsAfter(this.state.seat, now - this.seatMs);
+  }
+
+  /** The name lasts as long as the tab. */
+  rename(wanted: string): void {
+    const name = wanted.trim().slice(0, NAME_LIMIT);
+    if (name === "") return;
+    this.name = name;
+    sessionStorage.setItem(NAME_KEY, name);
+    this.tell({ type: "rename", name });
+  }
+
+  /** Says whether the note left. */
+  writeNote(text: string): boolean {
+    const note = text.trim().slice(0, NOTE_LIMIT);
+    return note !== "" && this.tell({ type: "note", text: note });
+  }
+}

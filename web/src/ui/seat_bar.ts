@@ -1,0 +1,95 @@
+import { seatAction, seatStanding, type SeatAction } from "../core/seat_standing";
+import { seatWords } from "../core/seat_words";
+import type { HandOver } from "../core/hand_over";
+import type { ConsoleApp } from "../console_app";
+import { button, h, setData, setHidden, setText, type Panel } from "./dom";
+
+/** A hand-over is told this long. */
+const NEWS_MS = 10_000;
+
+/** Who drives, who asks for it, and the one button for it: always in the same place. */
+export function createSeatBar(app: ConsoleApp): Panel {
+  const title = h("strong", "seat-title");
+  const text = h("span", "seat-text");
+  const why = h("span", "seat-why");
+  const grant = seatButton("Grant", "F8", () => app.session.answerFirst(true, performance.now()));
+  const decline = seatButton("Decline", "F9", () => app.session.answerFirst(false, performance.now()));
+  const keep = seatButton("Keep control", "", () => app.session.keepSeat());
+  const action = seatButton("", "", () => act(app));
+  action.classList.add("seat-action");
+  const words = h("div", "seat-words", { role: "status" }, title, text);
+  const buttons = h("div", "seat-buttons", {}, keep, grant, decline, why, action);
+  const element = h(
+    "section",
+    "seat",
+    { "aria-label": "Control seat" },
+    h("span", "seat-lamp"),
+    words,
+    buttons,
+  );
+  let told: HandOver | null = null;
+  let toldMs = -Infinity;
+  return {
+    element,
+    update(now) {
+      const { state, session } = app;
+      if (state.handOver !== told) {
+        told = state.handOver;
+        toldMs = now;
+      }
+      const me = state.welcome?.peer ?? null;
+      const standing = seatStanding(state.seat, me);
+      const claims = session.claims(now);
+      const found = seatWords({
+        role: state.welcome?.role ?? null,
+        standing,
+        holder: state.seat?.name ?? "",
+        claims,
+        me,
+        idleSeconds: session.idleSecondsLeft(now),
+        armed: app.isArmed(),
+        news: told !== null && now - toldMs < NEWS_MS ? told.words : null,
+      });
+      setData(element, "tone", found.tone);
+      setText(title, found.title);
+      setText(text, found.text);
+      setHidden(grant, found.tone !== "asked");
+      setHidden(decline, found.tone !== "asked");
+      setHidden(keep, found.tone !== "idle");
+      showAction(action, why, actionOf(app));
+    },
+  };
+}
+
+function actionOf(app: ConsoleApp): SeatAction | null {
+  const { welcome, seat } = app.state;
+  return seatAction(welcome?.role ?? null, seatStanding(seat, welcome?.peer ?? null));
+}
+
+function act(app: ConsoleApp): void {
+  const action = actionOf(app);
+  if (action === null || action.why !== null) return;
+  if (action.kind === "request") app.session.requestSeat();
+  else if (action.kind === "take") app.session.takeSeat();
+  else app.releaseSeat();
+}
+
+function showAction(element: HTMLButtonElement, why: HTMLElement, action: SeatAction | null): void {
+  setHidden(element, action === null);
+  setHidden(why, action === null || action.why === null);
+  if (action === null) return;
+  setText(element, action.label);
+  setText(why, action.why ?? "");
+  setData(element, "kind", action.kind);
+  if (element.disabled !== (action.why !== null)) element.disabled = action.why !== null;
+}
+
+/** Keeps no focus: the space bar is the deadman and must not press it again. */
+function seatButton(label: string, key: string, onclick: () => void): HTMLButtonElement {
+  const element = button("seat-button", label, () => {
+    onclick();
+    element.blur();
+  });
+  if (key !== "") element.append(h("kbd", "seat-key", {}, key));
+  return element;
+}
