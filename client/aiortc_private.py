@@ -27,6 +27,7 @@ from OpenSSL import SSL
 
 from client.frame_assembler import MediaPacket
 from client.rtp_header import find_extension
+from robot_bridge.protocol.carriers import unpack_capture_moment
 
 __all__ = ["PacketSink", "drain_dtls", "gather_only_on", "hasten_sctp", "take_packets", "take_raw_rtp"]
 
@@ -101,7 +102,8 @@ class _PacketTap:
         value = getattr(packet.extensions, "event_reference", None)
         data: bytes = packet._data  # type: ignore[attr-defined]
         stamp = self._read_stamp(value) if value is not None else None
-        taken = MediaPacket(packet.sequence_number, packet.timestamp, bool(packet.marker), data, stamp)
+        captured = unpack_capture_moment(value) if value is not None else None
+        taken = MediaPacket(packet.sequence_number, packet.timestamp, bool(packet.marker), data, stamp, captured)
         return self._sink.packet(packet.payload_type, taken), None
 
 

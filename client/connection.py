@@ -9,11 +9,13 @@ from client.command_gate import CommandGate, Pacing
 from client.driving import Driver
 from client.errors import CommandRefused, ConnectFailed, ConsoleError, ConsoleLost, SeatRefused, SignallingRefused
 from client.link import ConsoleLink
+from client.media_gate import GateMode
 from client.newest_queue import NewestQueue
 from client.peer import ChannelName, Peer, Route
 from client.pilot import Pilot
 from client.ping_ledger import PingLedger
 from client.reception import Reception
+from client.render_log import LIMIT, FeedbackArrival
 from client.sdp import Section
 from client.statistics import ConsoleStatistics, EventRate, percentiles
 from robot_bridge.protocol.carriers import Carrier
@@ -49,7 +51,7 @@ class ConnectionOptions:
     link: ConsoleLink
     pacing: Pacing
     tolerance: dict[str, int]  # by kind of medium
-    gate: bool
+    gate: GateMode
     carrier: Carrier
     video: int
     audio: bool
@@ -73,6 +75,7 @@ class Connection:
         self.participants = Participants(participants=[])
         self.malformed = 0  # messages from the console that could not be read
         self.feedback_readers: list[NewestQueue[Feedback]] = []
+        self.feedback_log: deque[FeedbackArrival] = deque(maxlen=LIMIT)
         self.media = Reception(options.carrier, options.tolerance, options.gate, self._rendered)
         self._loop = asyncio.get_running_loop()
         self._changed = asyncio.Event()  # a message came, or the connection ended
@@ -186,6 +189,7 @@ class Connection:
                 await asyncio.sleep(EARLY_PING)
                 continue
             self._peer.send("control", self._report())
+            self.media.reported()
             await asyncio.sleep(HEARTBEAT)
 
     # What the console says
@@ -225,7 +229,9 @@ class Connection:
         if not self._driver.feedback(feedback):
             return
         self.stop_state = feedback.stop
-        self._event_rate.event(feedback.event, self._loop.time())
+        now = self._loop.time()
+        self._event_rate.event(feedback.event, now)
+        self.feedback_log.append(FeedbackArrival(now, feedback.event))
         self.media.feedback(feedback.event)
         for reader in self.feedback_readers:
             reader.put(feedback)
@@ -291,6 +297,7 @@ class Connection:
             picture_delay_ms=delays[-1] * 1000 if delays else None,
             picture_delay_p50_ms=delay.median,
             picture_delay_p95_ms=delay.p95,
+            command_to_picture_ms=delay,
             round_trip_ms=self._pings.round_trip * 1000 if self._pings.round_trip is not None else None,
             command_to_feedback_ms=percentiles(pilot.samples, 1000),
             event_rate=self._event_rate.rate(now),

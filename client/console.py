@@ -10,8 +10,10 @@ from client.command_gate import GateState, Pacing
 from client.connection import Connection, ConnectionOptions
 from client.errors import CommandError, ConsoleError, ConsoleLost
 from client.link import parse_link
+from client.media_gate import GateMode
 from client.newest_queue import NewestQueue, QueueClosed
 from client.peer import Route
+from client.render_log import FeedbackArrival, Rendering
 from client.statistics import ConsoleStatistics
 from client.stream import Picture, Sound, Stream
 from robot_bridge.protocol.carriers import Carrier
@@ -32,7 +34,8 @@ class Console:
         pacing: "feedback": the next command waits for the feedback of the last; "media": also for its picture
         tolerance: largest gap of a rendered picture, in events
         audio_tolerance: the same for sound
-        gate: False renders everything, whatever its gap
+        gate: "event": the rule. "off": renders everything. "age": renders what is at most 0.5 s old by synchronised
+            clocks, as others do; needs the carrier "capture-time" or "trailer". The last two are for comparison
         carrier: how the event reference travels with media; the only one that is offered
         video: how many cameras at most; True: four, False: none
         audio: whether to receive sound
@@ -52,7 +55,7 @@ class Console:
         pacing: Pacing = "feedback",
         tolerance: int = 4,
         audio_tolerance: int = 6,
-        gate: bool = True,
+        gate: GateMode = "event",
         carrier: Carrier = "native",
         video: bool | int = True,
         audio: bool = True,
@@ -66,6 +69,8 @@ class Console:
     ) -> None:
         if pacing == "media" and not (decode and video):
             raise ValueError("pacing by media needs decoded pictures")
+        if gate == "age" and carrier not in ("capture-time", "trailer"):
+            raise ValueError("ages need a carrier that says when a medium was captured: capture-time or trailer")
         self._options = ConnectionOptions(
             link=parse_link(link),
             pacing=pacing,
@@ -151,6 +156,26 @@ class Console:
     def stats(self) -> ConsoleStatistics:
         """Figures since the connection began."""
         return self._live().statistics()
+
+    def rendered(self, stream: str) -> list[Rendering]:
+        """The last thousand renderings of a camera or microphone, oldest first."""
+        return self._live().media.log(stream)
+
+    def feedback_log(self) -> list[FeedbackArrival]:
+        """The last thousand feedbacks and when they came, oldest first."""
+        return list(self._live().feedback_log)
+
+    async def restart_ice(self) -> None:
+        """Look for a new path to the console, as after a change of networks; what is connected stays so meanwhile.
+
+        Nothing is lost but what was on its way, and the seat is kept. A path that was gone for longer than the console
+        waits for a sign of life (20 s) takes a new `Console`.
+
+        Raises:
+            SignallingRefused: the console has given up this connection.
+            ConnectFailed: no new path was found in time; the old one is as it was.
+        """
+        await self._live().restart_ice()
 
     # Driving
 
@@ -242,20 +267,20 @@ class Console:
         """
         connection = self._live()
         async for stream, medium in self._media(connection, connection.media.stream("video", camera), keep):
-            yield Picture(stream.name, medium.stamp, stream.gate.check(medium.stamp)[1], medium.frame)
+            yield Picture(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)
 
     async def sounds(self, microphone: str = "", *, keep: int = 50) -> AsyncGenerator[Sound]:
         """Segments of a microphone ("" is the first) that passed the gate; as `pictures`."""
         connection = self._live()
         async for stream, medium in self._media(connection, connection.media.stream("audio", microphone), keep):
-            yield Sound(stream.name, medium.stamp, stream.gate.check(medium.stamp)[1], medium.frame)
+            yield Sound(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)
 
     async def _media(self, connection: Connection, stream: Stream, keep: int) -> AsyncGenerator[tuple[Stream, Any]]:
         reader = stream.open_reader(keep)
         try:
             while True:
                 medium = await reader.get()
-                if stream.gate.check(medium.stamp)[0] == "render":
+                if stream.check(medium)[0] == "render":
                     yield stream, medium
                 else:
                     reader.dropped += 1

@@ -43,6 +43,7 @@ class Decoded(NamedTuple):
     frame: av.VideoFrame | av.AudioFrame
     stamp: int | None
     timestamp: int  # of RTP
+    captured: float | None = None  # s since 1970 on the sender's clock
 
 
 class Decoder:
@@ -78,6 +79,8 @@ class Decoder:
         decoded = []
         for frame in self._context.decode(packet):
             source = self._origin.pop(frame.pts, None) if frame.pts is not None else None
-            stamp, timestamp = (source.stamp, source.timestamp) if source is not None else (None, 0)
-            decoded.append(Decoded(frame, stamp, timestamp))
+            if source is None:
+                decoded.append(Decoded(frame, None, 0))
+            else:
+                decoded.append(Decoded(frame, source.stamp, source.timestamp, source.captured))
         return decoded

@@ -26,6 +26,7 @@ class MediaPacket(NamedTuple):
     marker: bool
     data: bytes
     stamp: int | None  # from its header extension; None without one
+    captured: float | None = None  # s since 1970, from its header extension; None without one
 
 
 class EncodedFrame(NamedTuple):
@@ -34,6 +35,7 @@ class EncodedFrame(NamedTuple):
     timestamp: int
     data: bytes
     stamp: int | None
+    captured: float | None = None  # s since 1970 on the sender's clock
 
 
 class Assembler(Protocol):
@@ -66,7 +68,7 @@ class AudioAssembler:
                 return []
             self.lost += ahead - 1
         self._newest = packet.sequence
-        return [EncodedFrame(packet.timestamp, packet.data, packet.stamp)]
+        return [EncodedFrame(packet.timestamp, packet.data, packet.stamp, packet.captured)]
 
     def missing(self, now: float) -> list[int]:
         return []
@@ -174,4 +176,4 @@ class VideoAssembler:
                 self.undecodable += 1
                 return None
             self._needs_keyframe = False
-        return EncodedFrame(parts[0].timestamp, data, parts[0].stamp)
+        return EncodedFrame(parts[0].timestamp, data, parts[0].stamp, parts[0].captured)

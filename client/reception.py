@@ -7,8 +7,9 @@ from typing import Protocol
 
 from client.aiortc_private import PacketSink
 from client.errors import NoSuchStream
-from client.media_gate import MediaGate
+from client.media_gate import GateMode, MediaGate
 from client.peer import stamp_reader
+from client.render_log import Rendering
 from client.rtp_counter import RtpCounter
 from client.rtp_header import parse_rtp_header
 from client.sdp import Section
@@ -36,7 +37,7 @@ class Reception:
         self,
         carrier: Carrier,
         tolerance: dict[str, int],
-        gate: bool,
+        gate: GateMode,
         on_render: Callable[[str, int], None],
     ) -> None:
         self._carrier = carrier
@@ -93,6 +94,10 @@ class Reception:
         for stream in self._streams:
             stream.feedback(event)
 
+    def log(self, name: str) -> list[Rendering]:
+        """What was rendered of a stream; empty when it is not received."""
+        return next((stream.log.all() for stream in self._streams if stream.name == name), [])
+
     def stream(self, kind: str, name: str) -> Stream:
         """The stream `name`, or the first of its kind when `name` is empty.
 
@@ -105,6 +110,11 @@ class Reception:
                 return stream
         known = ", ".join(stream.name for stream in streams) or "none"
         raise NoSuchStream(f"no {kind} stream {name!r} is received; there is: {known}")
+
+    def reported(self) -> None:
+        """The statistics went to the console."""
+        for stream in self._streams:
+            stream.gate.reported()
 
     def statistics(self) -> list[StreamStatistics]:
         return [stream.statistics() for stream in self._streams] + [

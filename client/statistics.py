@@ -35,9 +35,14 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
     stamp: int = 0  # last one seen; 0 before the first
     gap: int = 0  # at the last rendering
     max_gap: int = 0  # largest |gap| rendered
+    mean_gap: float | None = None  # of |gap| rendered; None before the first
+    tolerance: int = 0
+    lag: int = 0  # largest gap seen since the last report, rendered or not
+    received: int = 0  # decoded and put to the gate
     rendered: int = 0
     discarded: int = 0
     held: int = 0
+    violations: int = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
     packets: int = 0
     frames: int = 0  # complete encoded frames
     lost: int = 0  # packets that never came
@@ -55,6 +60,8 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
             rendered=self.rendered,
             discarded=self.discarded,
             held=self.held,
+            tolerance=self.tolerance,
+            lag=self.lag,
         )
 
 
@@ -70,6 +77,7 @@ class ConsoleStatistics(msgspec.Struct, frozen=True, kw_only=True):
     picture_delay_ms: float | None = None  # from a command to the first picture of its event, the last one seen
     picture_delay_p50_ms: float | None = None
     picture_delay_p95_ms: float | None = None
+    command_to_picture_ms: Percentiles = Percentiles()
     round_trip_ms: float | None = None  # of the last ping
     command_to_feedback_ms: Percentiles = Percentiles()
     event_rate: float = 0.0  # Hz

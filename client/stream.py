@@ -1,6 +1,7 @@
 """One received stream: packets → frames → decoder → gate → readers."""
 
 import asyncio
+import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from typing import NamedTuple
@@ -9,8 +10,9 @@ import av
 
 from client.decoding import Decoded, Decoder, is_h264_keyframe, is_vp8_keyframe
 from client.frame_assembler import Assembler, AudioAssembler, EncodedFrame, MediaPacket, VideoAssembler
-from client.media_gate import Gated, MediaGate
+from client.media_gate import Gated, MediaGate, Verdict
 from client.newest_queue import NewestQueue
+from client.render_log import Rendering, RenderLog
 from client.statistics import StreamStatistics
 from robot_bridge.protocol.carriers import Carrier, split_trailer
 
@@ -49,13 +51,16 @@ class Stream:
         carrier: Carrier,
         gate: MediaGate[Decoded],
         on_render: Callable[[str, int], None],
+        wall_clock: Callable[[], float] = time.time,
     ) -> None:
         self.name = name
         self.kind = kind
         self.carrier = carrier
         self.gate = gate
         self.codec = ""
+        self.log = RenderLog()
         self._codecs = codecs
+        self._wall_clock = wall_clock
         self._on_render = on_render
         self._assembler: Assembler | None = None
         self._encoded: NewestQueue[EncodedFrame] = NewestQueue(ENCODED_BOUND)
@@ -93,8 +98,7 @@ class Stream:
     def _assembled(self, frame: EncodedFrame, assembler: Assembler) -> None:
         self._frames += 1
         if self.carrier == "trailer":
-            data, trailer = split_trailer(frame.data)
-            frame = EncodedFrame(frame.timestamp, data, trailer.event if trailer is not None else None)
+            frame = _without_trailer(frame)
         if frame.stamp is None:
             self._unstamped += 1
         if len(self._encoded) >= ENCODED_BOUND:
@@ -125,7 +129,7 @@ class Stream:
                     self._start_over(self._assembler)
                 continue
             for frame in frames:
-                self._render(self.gate.offer(frame, frame.stamp))
+                self._render(self.gate.offer(frame, frame.stamp, self._age(frame)))
 
     # Through the gate, to the readers
 
@@ -133,9 +137,20 @@ class Stream:
         """The newest feedback is of `event`."""
         self._render(self.gate.feedback(event))
 
+    def check(self, medium: Decoded) -> tuple[Verdict, int | None]:
+        """The verdict now on a medium that a reader took."""
+        return self.gate.check(medium.stamp, self._age(medium))
+
+    def _age(self, medium: Decoded) -> float | None:
+        """Since its capture, in s, if the sender's clock and ours agree; None when the medium does not say."""
+        return None if medium.captured is None else self._wall_clock() - medium.captured
+
     def _render(self, gated: Gated[Decoded] | None) -> None:
         if gated is None:
             return
+        now = asyncio.get_running_loop().time()
+        feedback = self.gate.newest_feedback
+        self.log.add(Rendering(now, gated.stamp, gated.gap, feedback, self._age(gated.medium)))
         for reader in self._readers:
             reader.put(gated.medium)
         if gated.stamp is not None:
@@ -168,12 +183,27 @@ class Stream:
             stamp=gate.stamp,
             gap=gate.gap,
             max_gap=gate.max_gap,
+            mean_gap=gate.mean_gap,
+            tolerance=gate.tolerance,
+            lag=gate.lag,
+            received=gate.received,
             rendered=gate.rendered,
             discarded=gate.discarded,
             held=gate.held,
+            violations=gate.violations,
             packets=self._packets,
             frames=self._frames,
             lost=self._assembler.lost if self._assembler is not None else 0,
             unstamped=self._unstamped,
             dropped=self._unread + self._encoded.dropped + sum(reader.dropped for reader in self._readers),
         )
+
+
+def _without_trailer(frame: EncodedFrame) -> EncodedFrame:
+    data, trailer = split_trailer(frame.data)
+    if trailer is None:
+        return EncodedFrame(frame.timestamp, data, None)
+    microseconds = trailer.capture_time_us
+    return EncodedFrame(
+        frame.timestamp, data, trailer.event, None if microseconds is None else microseconds / 1_000_000
+    )

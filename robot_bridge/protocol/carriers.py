@@ -25,6 +25,7 @@ __all__ = [
     "pack_event_reference",
     "pack_playout_delay",
     "split_trailer",
+    "unpack_capture_moment",
     "unpack_capture_time",
     "unpack_event_reference",
 ]
@@ -74,6 +75,13 @@ def unpack_capture_time(value: bytes) -> int | None:
     offset = int.from_bytes(value[8:], "big", signed=True)
     event = offset >> 32
     return event if offset & 0xFFFF_FFFF == 0 and is_event(event) else None
+
+
+def unpack_capture_moment(value: bytes) -> float | None:
+    """When the medium was captured, s since 1970 on the sender's clock; None when `value` is no capture time."""
+    if len(value) != 16:
+        return None
+    return int.from_bytes(value[:8], "big") / 2**32 - NTP_EPOCH_OFFSET
 
 
 def pack_playout_delay(minimum_ms: int = 0, maximum_ms: int = 0) -> bytes:

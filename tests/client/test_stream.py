@@ -7,7 +7,7 @@ import pytest
 
 from client.decoding import Decoded
 from client.frame_assembler import MediaPacket
-from client.media_gate import MediaGate
+from client.media_gate import GateMode, MediaGate
 from client.newest_queue import NewestQueue, QueueClosed
 from client.stream import ENCODED_BOUND, Stream
 from robot_bridge.protocol.carriers import Carrier, append_trailer
@@ -29,7 +29,7 @@ class Shown:
             self.third.set()
 
 
-def new_stream(shown: Shown, carrier: Carrier = "native", tolerance: int = 4, gate: bool = True) -> Stream:
+def new_stream(shown: Shown, carrier: Carrier = "native", tolerance: int = 4, gate: GateMode = "event") -> Stream:
     return Stream("front", "video", {VP8: "VP8", H264: "H264"}, carrier, MediaGate(tolerance, gate), shown)
 
 
@@ -135,3 +135,17 @@ async def test_what_a_reader_lost_is_counted_after_it_is_gone() -> None:
         await shown.third.wait()
         assert reader.dropped == 2
     assert stream.statistics().dropped == 2
+
+
+async def test_by_age_what_is_older_than_half_a_second_is_not_rendered() -> None:
+    gate: MediaGate[Decoded] = MediaGate(4, "age")
+    stream = Stream("front", "video", {VP8: "VP8"}, "capture-time", gate, Shown(), lambda: 100.0)
+    first, second = encode("VP8", 2)
+    async with running(stream) as reader:
+        stream.packet(VP8, MediaPacket(0, 0, True, first, 1, 99.0))
+        stream.packet(VP8, MediaPacket(1, 3000, True, second, 1, 99.9))
+        taken = await reader.get()
+    assert taken.captured == 99.9
+    assert stream.check(taken)[0] == "render"
+    assert [(entry.stamp, round(entry.age or 0, 3)) for entry in stream.log.all()] == [(1, 0.1)]
+    assert (gate.rendered, gate.discarded) == (1, 1)

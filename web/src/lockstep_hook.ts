@@ -1,12 +1,25 @@
+import type { Pacing } from "./core/command_gate";
+import type { GateMode } from "./core/media_gate";
+import type { FeedbackArrival } from "./media_room";
 import type { Rendering } from "./media/render_log";
 import type { Page } from "./page";
 import { statisticsOf, type Statistics } from "./statistics";
 
+/** What may be set by code; a field that is left out stays as it is. */
+export interface Configuration {
+  readonly gate?: GateMode;
+  readonly pacing?: Pacing;
+  readonly tolerance?: { readonly video?: number; readonly audio?: number };
+}
+
 /** `window.lockstep`: live figures for tests and operators' own tools (docs/console-api.md). */
 export interface LockstepHook {
   stats(): Statistics;
-  /** The newest pictures drawn of one stream. */
+  /** The newest pictures drawn, or segments heard, of one stream. */
   rendered(stream: string): readonly Rendering[];
+  /** The newest events and when their feedback came. */
+  feedbacks(): readonly FeedbackArrival[];
+  configure(configuration: Configuration): void;
 }
 
 declare global {
@@ -16,8 +29,19 @@ declare global {
 }
 
 export function installHook(page: Page): void {
+  const { app } = page;
+  const { room } = app;
   window.lockstep = {
-    stats: () => statisticsOf(page.app, page.board.mainStream()),
-    rendered: (stream) => page.app.room.videos.get(stream)?.log.all() ?? [],
+    stats: () => statisticsOf(app, page.board.mainStream()),
+    rendered: (stream) => (room.videos.get(stream) ?? room.sounds.get(stream))?.log.all() ?? [],
+    feedbacks: () => room.feedbacks.all(),
+    configure({ gate, pacing, tolerance }) {
+      const { settings } = app.state;
+      settings.gate = gate ?? settings.gate;
+      settings.pacing = pacing ?? settings.pacing;
+      settings.tolerance.video = tolerance?.video ?? settings.tolerance.video;
+      settings.tolerance.audio = tolerance?.audio ?? settings.tolerance.audio;
+      app.settingsChanged();
+    },
   };
 }

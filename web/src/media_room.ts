@@ -1,5 +1,6 @@
 import type { GateContext } from "./core/medium_counts";
 import type { ConsoleState } from "./core/console_state";
+import { NewestLog } from "./core/newest_log";
 import type { AudioDesk } from "./media/audio_desk";
 import { SoundStream } from "./media/sound_stream";
 import { VideoStream } from "./media/video_stream";
@@ -16,6 +17,12 @@ interface WaitingSound {
   readonly untilMs: number;
 }
 
+/** When an event's first feedback came. */
+export interface FeedbackArrival {
+  readonly event: number;
+  readonly at: number; // ms, performance.now()
+}
+
 export interface MediaRoomEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;
   drawn(stream: VideoStream, stamp: number | null, at: number): void;
@@ -25,6 +32,8 @@ export interface MediaRoomEvents {
 export class MediaRoom {
   readonly videos = new Map<string, VideoStream>();
   readonly sounds = new Map<string, SoundStream>();
+  readonly feedbacks = new NewestLog<FeedbackArrival>();
+  private newest: number | null = null; // event of the last feedback
   private waitingSounds: WaitingSound[] = [];
 
   constructor(
@@ -47,6 +56,9 @@ export class MediaRoom {
 
   /** The feedback or a setting changed: everything is judged again. */
   changed(): void {
+    const event = this.state.feedback?.event ?? null;
+    if (event !== null && event !== this.newest) this.feedbacks.add({ event, at: performance.now() });
+    this.newest = event;
     this.reader?.tell(this.context("audio"));
     for (const video of this.videos.values()) video.settle();
     this.listen();
@@ -69,7 +81,8 @@ export class MediaRoom {
     return {
       feedback: feedback?.event ?? null,
       tolerance: settings.tolerance[kind],
-      enabled: settings.gateEnabled,
+      gate: settings.gate,
+      wallMs: performance.timeOrigin + performance.now(),
     };
   }
 
@@ -85,7 +98,10 @@ export class MediaRoom {
     const hasPicture = [...this.videos.values()].some((video) => video.lastDrawnMs !== null);
     if (!hasPicture && this.waitingSounds.every((sound) => performance.now() < sound.untilMs)) return;
     for (const { info, section } of this.waitingSounds.splice(0))
-      this.sounds.set(info.stream, new SoundStream(info, section, this.reader, this.audio.open()));
+      this.sounds.set(
+        info.stream,
+        new SoundStream(info, section, this.reader, this.audio.open(), () => this.context("audio")),
+      );
   }
 
   private openVideo(info: StreamInfo, section: Section): VideoStream {

@@ -1,6 +1,7 @@
 import { gateState, type GateState, type Pacing } from "./core/command_gate";
 import { holdsSeat } from "./core/console_state";
-import type { MediumCounts } from "./core/medium_counts";
+import type { GateMode } from "./core/media_gate";
+import { meanGap, takeLag, type MediumCounts } from "./core/medium_counts";
 import { quantile, rateOf } from "./core/samples";
 import { staleness } from "./core/staleness";
 import { GATE_WORDS } from "./core/words";
@@ -17,6 +18,8 @@ export interface StreamStatistics {
   readonly stamp: number | null;
   readonly gap: number | null;
   readonly max_gap: number;
+  readonly mean_gap: number | null;
+  readonly received: number;
   readonly rendered: number;
   readonly discarded: number;
   readonly held: number;
@@ -40,12 +43,14 @@ export interface Statistics {
   readonly pacing: Pacing;
   readonly tolerance: { readonly video: number; readonly audio: number };
   readonly gate_enabled: boolean;
+  readonly media_gate: GateMode;
   readonly streams: Readonly<Record<string, StreamStatistics>>;
   readonly picture_delay_ms: number | null;
   readonly picture_delay_p50_ms: number | null;
   readonly picture_delay_p95_ms: number | null;
   readonly round_trip_ms: number | null;
   readonly command_to_feedback_ms: { readonly median: number | null; readonly p99: number | null };
+  readonly command_to_picture_ms: Readonly<Record<"median" | "p95" | "p99" | "maximum", number | null>>;
   readonly event_rate: number;
   readonly stop: { readonly stopped: boolean; readonly by: string; readonly reason: string };
   readonly stale: string | null; // why the large view must not be trusted
@@ -73,7 +78,8 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     gate: { state: gate, reason: GATE_WORDS[gate] },
     pacing: settings.pacing,
     tolerance: { ...settings.tolerance },
-    gate_enabled: settings.gateEnabled,
+    gate_enabled: settings.gate === "event",
+    media_gate: settings.gate,
     streams: streamsOf(app, now),
     picture_delay_ms: driver?.latency.pictureMs ?? null,
     picture_delay_p50_ms: driver === null ? null : quantile(driver.latency.toPicture, 0.5),
@@ -82,6 +88,12 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     command_to_feedback_ms: {
       median: driver === null ? null : quantile(driver.latency.toFeedback, 0.5),
       p99: driver === null ? null : quantile(driver.latency.toFeedback, 0.99),
+    },
+    command_to_picture_ms: {
+      median: driver === null ? null : quantile(driver.latency.toPicture, 0.5),
+      p95: driver === null ? null : quantile(driver.latency.toPicture, 0.95),
+      p99: driver === null ? null : quantile(driver.latency.toPicture, 0.99),
+      maximum: driver === null ? null : quantile(driver.latency.toPicture, 1),
     },
     event_rate: rateOf(app.events, now),
     stop: { ...state.stop },
@@ -100,17 +112,21 @@ export function stalenessOf(app: ConsoleApp, video: VideoStream, now: number): s
 
 /** What the console is told twice a second. */
 export function reportOf(app: ConsoleApp): Report {
+  const { settings } = app.state;
   return {
     type: "report",
     event: app.state.feedback?.event ?? 0,
     armed: app.arming.state !== "disarmed",
-    streams: [...app.room.videos.values(), ...app.room.sounds.values()].map(streamReport),
+    streams: [
+      ...[...app.room.videos.values()].map((stream) => streamReport(stream, settings.tolerance.video)),
+      ...[...app.room.sounds.values()].map((stream) => streamReport(stream, settings.tolerance.audio)),
+    ],
     picture_delay_ms: app.driver?.latency.pictureMs ?? null,
     round_trip_ms: app.state.roundTripMs,
   };
 }
 
-function streamReport(stream: VideoStream | SoundStream): StreamReport {
+function streamReport(stream: VideoStream | SoundStream, tolerance: number): StreamReport {
   const { counts } = stream.gate;
   return {
     stream: stream.info.stream,
@@ -121,6 +137,8 @@ function streamReport(stream: VideoStream | SoundStream): StreamReport {
     rendered: counts.rendered,
     discarded: "discarded" in stream ? stream.discarded() : counts.discarded,
     held: counts.held,
+    tolerance,
+    lag: takeLag(counts),
   };
 }
 
@@ -137,7 +155,14 @@ function streamsOf(app: ConsoleApp, now: number): Record<string, StreamStatistic
   }
   for (const [name, sound] of app.room.sounds) {
     const counts = common(sound.info, sound.gate.counts);
-    found[name] = { ...counts, discarded: sound.discarded(), frame_rate: null, width: 0, height: 0 };
+    found[name] = {
+      ...counts,
+      received: sound.received(),
+      discarded: sound.discarded(),
+      frame_rate: null,
+      width: 0,
+      height: 0,
+    };
   }
   return found;
 }
@@ -146,7 +171,8 @@ function common(
   info: StreamInfo,
   counts: MediumCounts,
 ): Omit<StreamStatistics, "frame_rate" | "width" | "height"> {
-  const { stamp, gap, rendered, discarded, held, violations } = counts;
+  const { stamp, gap, received, rendered, discarded, held, violations } = counts;
   const { kind, carrier, codec } = info;
-  return { kind, carrier, codec, stamp, gap, max_gap: counts.maxGap, rendered, discarded, held, violations };
+  const gaps = { gap, max_gap: counts.maxGap, mean_gap: meanGap(counts) };
+  return { kind, carrier, codec, stamp, ...gaps, received, rendered, discarded, held, violations };
 }

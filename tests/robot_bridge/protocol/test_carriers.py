@@ -10,6 +10,7 @@ from robot_bridge.protocol.carriers import (
     pack_event_reference,
     pack_playout_delay,
     split_trailer,
+    unpack_capture_moment,
     unpack_capture_time,
     unpack_event_reference,
 )
@@ -45,6 +46,16 @@ def test_capture_time_is_ntp_time_and_a_signed_offset() -> None:
 )
 def test_an_offset_that_is_no_reference_reads_as_none(value: bytes) -> None:
     assert unpack_capture_time(value) is None
+
+
+@given(events, st.floats(0, 2e9))
+def test_the_moment_of_capture_comes_back(event: int, time: float) -> None:
+    assert unpack_capture_moment(pack_capture_time(event, time)) == pytest.approx(time, abs=1e-6)
+
+
+@pytest.mark.parametrize("value", [b"", bytes(4), bytes(17)])
+def test_an_extension_of_another_length_is_no_moment_of_capture(value: bytes) -> None:
+    assert unpack_capture_moment(value) is None
 
 
 def test_playout_delay_is_two_12_bit_numbers_of_10_ms() -> None:

@@ -1,5 +1,14 @@
 import { judge } from "./media_gate";
-import { createCounts, noteRendered, type GateContext, type MediumCounts } from "./medium_counts";
+import {
+  UNMARKED,
+  ageOf,
+  createCounts,
+  noteRendered,
+  noteSeen,
+  type FrameMark,
+  type GateContext,
+  type MediumCounts,
+} from "./medium_counts";
 
 /** A picture in memory; whoever keeps it last closes it. */
 export interface Closable {
@@ -19,9 +28,9 @@ export interface PictureGate<P extends Closable> {
   shown: number | null; // stamp of the picture on screen
 }
 
-/** `undefined`: nothing known yet; null: the picture has no stamp. */
-export type StampLookup = (rtpTimestamp: number) => number | null | undefined;
-export type Draw<P> = (picture: P, stamp: number | null, gap: number | null) => void;
+/** `undefined`: nothing known yet. */
+export type MarkLookup = (rtpTimestamp: number) => FrameMark | undefined;
+export type Draw<P> = (picture: P, stamp: number | null, gap: number | null, ageMs: number | null) => void;
 
 export function createPictureGate<P extends Closable>(): PictureGate<P> {
   return { counts: createCounts(), kept: null, shown: null };
@@ -32,11 +41,12 @@ export function offerPicture<P extends Closable>(
   gate: PictureGate<P>,
   picture: P,
   rtpTimestamp: number,
-  lookup: StampLookup,
+  lookup: MarkLookup,
   context: GateContext,
   draw: Draw<P>,
 ): void {
   dropKept(gate);
+  gate.counts.received += 1;
   gate.kept = { picture, rtpTimestamp, counted: false };
   settlePicture(gate, lookup, context, draw);
 }
@@ -44,16 +54,20 @@ export function offerPicture<P extends Closable>(
 /** Judges the kept picture again: after a feedback, a stamp, or a change of the settings. */
 export function settlePicture<P extends Closable>(
   gate: PictureGate<P>,
-  lookup: StampLookup,
+  lookup: MarkLookup,
   context: GateContext,
   draw: Draw<P>,
 ): void {
   const { kept, counts } = gate;
   if (kept === null) return;
-  const stamp = lookup(kept.rtpTimestamp);
-  if (stamp === undefined && context.enabled) return;
-  if (stamp !== null && stamp !== undefined) counts.stamp = stamp;
-  const { verdict, gap } = judge(context.feedback, stamp ?? null, context.tolerance, context.enabled);
+  const found = lookup(kept.rtpTimestamp);
+  if (found === undefined && context.gate !== "off") return;
+  const mark = found ?? UNMARKED;
+  const { stamp } = mark;
+  if (stamp !== null) counts.stamp = stamp;
+  const ageMs = ageOf(mark, context);
+  const { verdict, gap } = judge(context.feedback, stamp, context.tolerance, context.gate, ageMs);
+  noteSeen(counts, gap);
   if (verdict === "hold") {
     if (!kept.counted) counts.held += 1;
     kept.counted = true;
@@ -61,8 +75,8 @@ export function settlePicture<P extends Closable>(
   }
   gate.kept = null;
   if (verdict === "render") {
-    draw(kept.picture, stamp ?? null, gap);
-    gate.shown = stamp ?? null;
+    draw(kept.picture, stamp, gap, ageMs);
+    gate.shown = stamp;
     noteRendered(counts, gap, context);
   } else counts.discarded += 1;
   kept.picture.close();

@@ -1,5 +1,14 @@
 import { judge } from "./media_gate";
-import { createCounts, noteRendered, type GateContext, type MediumCounts } from "./medium_counts";
+import {
+  UNMARKED,
+  ageOf,
+  createCounts,
+  noteRendered,
+  noteSeen,
+  type FrameMark,
+  type GateContext,
+  type MediumCounts,
+} from "./medium_counts";
 
 /** When no new segment came for this long, what plays is the decoder's concealment: its own invention. */
 const CONCEALED_MS = 200;
@@ -18,12 +27,12 @@ export function createSoundGate(): SoundGate {
 
 /**
  * Takes the segment being played; says whether it may be heard now.
- * `stamp` is undefined while nothing is known of it. `audible`: whether sound is on; silence renders nothing.
+ * `found` is undefined while nothing is known of it. `audible`: whether sound is on; silence renders nothing.
  */
 export function observeSound(
   gate: SoundGate,
   rtpTimestamp: number,
-  stamp: number | null | undefined,
+  found: FrameMark | undefined,
   context: GateContext,
   audible: boolean,
   now: number,
@@ -34,12 +43,22 @@ export function observeSound(
     gate.playingSinceMs = now;
     gate.judged = false;
   }
-  if (stamp === undefined && context.enabled) return false;
-  const { verdict, gap } = judge(context.feedback, stamp ?? null, context.tolerance, context.enabled);
-  if (stamp !== null && stamp !== undefined) counts.stamp = stamp;
+  if (found === undefined && context.gate !== "off") return false;
+  const mark = found ?? UNMARKED;
+  const { stamp } = mark;
+  const { verdict, gap } = judge(
+    context.feedback,
+    stamp,
+    context.tolerance,
+    context.gate,
+    ageOf(mark, context),
+  );
+  if (stamp !== null) counts.stamp = stamp;
+  noteSeen(counts, gap);
   counts.gap = gap;
   if (!gate.judged && audible) {
     gate.judged = true;
+    counts.received += 1;
     if (verdict === "render") noteRendered(counts, gap, context);
     else if (verdict === "hold") counts.held += 1;
     else counts.discarded += 1;

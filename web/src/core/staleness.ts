@@ -16,7 +16,7 @@ export function staleness(
   if (lastDrawnMs === null) return "Waiting for the first picture";
   if (lastPictureMs === null || now - lastPictureMs > FROZEN_MS)
     return `No picture for ${Math.max(1, Math.round((now - (lastPictureMs ?? lastDrawnMs)) / 1000))} s`;
-  if (!context.enabled || context.feedback === null || shown === null) return null;
+  if (context.gate !== "event" || context.feedback === null || shown === null) return null;
   const gap = eventGap(context.feedback, shown);
   return gap > context.tolerance ? eventsBehind(gap) : null;
 }

@@ -1,23 +1,25 @@
-/** Which RTP timestamp belongs to which event: the newest `limit` entries of one receiver. */
+import type { FrameMark } from "./medium_counts";
+
+/** What the frame of each RTP timestamp said: the newest `limit` entries of one receiver. */
 export interface StampBook {
   readonly limit: number; // 512
-  readonly stamps: Map<number, number | null>; // in order of arrival; null: the frame came without a stamp
+  readonly marks: Map<number, FrameMark>; // in order of arrival
 }
 
 export function createStampBook(limit: number): StampBook {
-  return { limit, stamps: new Map() };
+  return { limit, marks: new Map() };
 }
 
-export function noteStamp(book: StampBook, rtpTimestamp: number, stamp: number | null): void {
-  book.stamps.delete(rtpTimestamp);
-  book.stamps.set(rtpTimestamp, stamp);
-  for (const oldest of book.stamps.keys()) {
-    if (book.stamps.size <= book.limit) break;
-    book.stamps.delete(oldest);
+export function noteMark(book: StampBook, rtpTimestamp: number, mark: FrameMark): void {
+  book.marks.delete(rtpTimestamp);
+  book.marks.set(rtpTimestamp, mark);
+  for (const oldest of book.marks.keys()) {
+    if (book.marks.size <= book.limit) break;
+    book.marks.delete(oldest);
   }
 }
 
-/** The stamp, null when the frame has none, undefined while nothing is known of the frame. */
-export function findStamp(book: StampBook, rtpTimestamp: number): number | null | undefined {
-  return book.stamps.get(rtpTimestamp);
+/** Undefined while nothing is known of the frame. */
+export function findMark(book: StampBook, rtpTimestamp: number): FrameMark | undefined {
+  return book.marks.get(rtpTimestamp);
 }

@@ -1,23 +1,13 @@
-/** One picture as it was drawn. */
+import { NewestLog } from "../core/newest_log";
+
+/** One picture as it was drawn, or one segment of sound as it began to be heard. */
 export interface Rendering {
   readonly stamp: number | null;
   readonly gap: number | null;
   readonly feedback: number | null; // newest event at that moment
   readonly at: number; // ms, performance.now()
+  readonly age: number | null; // ms since its capture by synchronised clocks
 }
 
-const LIMIT = 1000;
-
-/** The newest pictures drawn on one canvas, for tests and operators' own tools. */
-export class RenderLog {
-  private readonly entries: Rendering[] = [];
-
-  add(entry: Rendering): void {
-    this.entries.push(entry);
-    if (this.entries.length > LIMIT) this.entries.shift();
-  }
-
-  all(): readonly Rendering[] {
-    return [...this.entries];
-  }
-}
+/** The newest renderings of one stream. */
+export class RenderLog extends NewestLog<Rendering> {}

@@ -1,15 +1,18 @@
-import type { GateContext } from "../core/medium_counts";
+import { judge } from "../core/media_gate";
+import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../core/medium_counts";
 import { createSoundBacklog, skipTarget } from "../core/sound_backlog";
 import { createSoundGate, observeSound } from "../core/sound_gate";
-import { findStamp } from "../core/stamp_book";
+import { findMark } from "../core/stamp_book";
 import type { Section } from "../rtc/peer";
 import type { StreamInfo } from "../wire";
 import type { StampReader } from "../rtc/stamp_reader";
+import { RenderLog } from "./render_log";
 import { SoundOutput } from "./sound_output";
 
 /** One microphone: the segment being played is judged, and heard only while it passes. */
 export class SoundStream {
   readonly gate = createSoundGate();
+  readonly log = new RenderLog();
   isOpen = false;
   private readonly output: SoundOutput;
   private readonly backlog = createSoundBacklog();
@@ -19,22 +22,41 @@ export class SoundStream {
     readonly section: Section,
     private readonly reader: StampReader | null,
     audio: AudioContext,
+    private readonly context: () => GateContext,
   ) {
     this.output = new SoundOutput(audio, section.transceiver.receiver.track);
+    if (section.stamps !== null) section.stamps.onstamp = () => this.arrived();
   }
 
   /** Judges what plays now. Called at every feedback and every few milliseconds. */
   observe(context: GateContext, audible: boolean): void {
     const source = this.section.transceiver.receiver.getSynchronizationSources()[0];
     const { stamps } = this.section;
-    const stamp =
-      source === undefined || stamps === null ? null : findStamp(stamps.book, source.rtpTimestamp);
+    const mark =
+      source === undefined || stamps === null ? UNMARKED : findMark(stamps.book, source.rtpTimestamp);
+    const before = this.gate.counts.rendered;
     if (source !== undefined) this.catchUp(source.rtpTimestamp);
     const passes =
       source !== undefined &&
-      observeSound(this.gate, source.rtpTimestamp, stamp, context, audible, performance.now());
+      observeSound(this.gate, source.rtpTimestamp, mark, context, audible, performance.now());
+    if (this.gate.counts.rendered > before) this.note(mark ?? UNMARKED, context);
     this.isOpen = passes && audible;
     this.output.open(this.isOpen);
+  }
+
+  private note(mark: FrameMark, context: GateContext): void {
+    const { gap } = this.gate.counts;
+    const { feedback } = context;
+    this.log.add({ stamp: mark.stamp, gap, feedback, at: performance.now(), age: ageOf(mark, context) });
+  }
+
+  /** A segment came; what is dropped before it is decoded is never observed. */
+  private arrived(): void {
+    const { stamps } = this.section;
+    if (stamps === null || stamps.newest === null) return;
+    const mark = findMark(stamps.book, stamps.newest) ?? UNMARKED;
+    const { feedback, tolerance, gate } = this.context();
+    noteSeen(this.gate.counts, judge(feedback, mark.stamp, tolerance, gate, null).gap);
   }
 
   private catchUp(playing: number): void {
@@ -43,6 +65,11 @@ export class SoundStream {
     const clockRate = this.info.codec === "PCMU" ? 8000 : 48_000;
     const before = skipTarget(this.backlog, stamps.newest, playing, clockRate, performance.now());
     if (before !== null) this.reader.skip(stamps, before);
+  }
+
+  /** Put to the gate, and dropped before. */
+  received(): number {
+    return this.gate.counts.received + (this.section.stamps?.dropped ?? 0);
   }
 
   /** Discarded at the gate, and before decoding. */

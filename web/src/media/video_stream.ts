@@ -1,7 +1,7 @@
 import { closePictureGate, createPictureGate, offerPicture, settlePicture } from "../core/picture_gate";
-import type { GateContext } from "../core/medium_counts";
+import { UNMARKED, type FrameMark, type GateContext } from "../core/medium_counts";
 import { createRateMeter, noteHappening } from "../core/samples";
-import { findStamp } from "../core/stamp_book";
+import { findMark } from "../core/stamp_book";
 import type { Section } from "../rtc/peer";
 import type { StreamInfo } from "../wire";
 import { openFrames } from "./frame_source";
@@ -49,12 +49,17 @@ export class VideoStream {
     closePictureGate(this.gate);
   }
 
-  private readonly lookup = (rtpTimestamp: number): number | null | undefined => {
+  private readonly lookup = (rtpTimestamp: number): FrameMark | undefined => {
     const { stamps } = this.section;
-    return stamps === null ? null : findStamp(stamps.book, rtpTimestamp);
+    return stamps === null ? UNMARKED : findMark(stamps.book, rtpTimestamp);
   };
 
-  private readonly draw = (picture: Picture, stamp: number | null, gap: number | null): void => {
+  private readonly draw = (
+    picture: Picture,
+    stamp: number | null,
+    gap: number | null,
+    age: number | null,
+  ): void => {
     const { canvas } = this;
     this.width = picture.width;
     this.height = picture.height;
@@ -64,7 +69,7 @@ export class VideoStream {
     const at = performance.now();
     this.lastDrawnMs = at;
     noteHappening(this.frames, at);
-    this.log.add({ stamp, gap, feedback: this.events.context().feedback, at });
+    this.log.add({ stamp, gap, feedback: this.events.context().feedback, at, age });
     this.events.drawn(this, stamp, at);
   };
 }

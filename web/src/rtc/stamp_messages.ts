@@ -1,4 +1,6 @@
 /** Between the page and the transform worker. */
+import type { GateMode } from "../core/media_gate";
+import type { FrameMark } from "../core/medium_counts";
 
 /** Options of one RTCRtpScriptTransform. */
 export interface TransformOptions {
@@ -11,7 +13,7 @@ export interface TransformOptions {
 export interface SoundContext {
   readonly feedback: number | null;
   readonly tolerance: number;
-  readonly enabled: boolean;
+  readonly gate: GateMode;
 }
 
 /** Page to worker: leave out sound of this receiver that is older than `before`, to work off a backlog. */
@@ -24,7 +26,7 @@ export interface SoundSkip {
 export interface FrameNote {
   readonly receiver: number;
   readonly rtpTimestamp: number;
-  readonly stamp: number | null; // null: none that is valid
+  readonly mark: FrameMark;
   readonly dropped: boolean; // too old already or skipped; never decoded
 }
 

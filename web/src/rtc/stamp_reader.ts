@@ -1,4 +1,4 @@
-import { createStampBook, noteStamp, type StampBook } from "../core/stamp_book";
+import { createStampBook, noteMark, type StampBook } from "../core/stamp_book";
 import { isFrameNote, type SoundContext, type SoundSkip, type TransformOptions } from "./stamp_messages";
 
 const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
@@ -64,7 +64,7 @@ export class StampReader {
     if (!isFrameNote(data)) return;
     const stamps = this.receivers.get(data.receiver);
     if (stamps === undefined) return;
-    noteStamp(stamps.book, data.rtpTimestamp, data.stamp);
+    noteMark(stamps.book, data.rtpTimestamp, data.mark);
     stamps.newest = data.rtpTimestamp;
     if (data.dropped) stamps.dropped += 1;
     stamps.onstamp?.();

@@ -1,13 +1,14 @@
 /** Transform worker: reads the stamp of every encoded frame before it is decoded, and takes the trailer off. */
 import { eventOfOffset } from "../core/capture_time";
 import { judge } from "../core/media_gate";
+import { UNMARKED, ageOf, type FrameMark, type GateContext } from "../core/medium_counts";
 import { rtpGap } from "../core/sound_backlog";
 import { splitTrailer } from "../core/trailer";
 import type { FrameNote, SoundContext, SoundSkip, TransformOptions } from "./stamp_messages";
 
 interface EncodedFrame {
   data: ArrayBuffer;
-  getMetadata(): { rtpTimestamp?: number; senderCaptureTimeOffset?: number };
+  getMetadata(): { rtpTimestamp?: number; senderCaptureTimeOffset?: number; captureTime?: number };
 }
 
 interface Transformer {
@@ -23,7 +24,7 @@ interface TransformScope {
 }
 
 const scope = self as unknown as TransformScope;
-let context: SoundContext = { feedback: null, tolerance: 0, enabled: true };
+let context: SoundContext = { feedback: null, tolerance: 0, gate: "event" };
 const skips = new Map<number, number>(); // receiver -> RTP timestamp before which its sound is left out
 
 scope.onmessage = ({ data }) => {
@@ -47,19 +48,29 @@ scope.onrtctransform = ({ transformer }) => {
 
 function passes(frame: EncodedFrame, options: TransformOptions): boolean {
   const metadata = frame.getMetadata();
-  const stamp = options.trailer ? takeTrailer(frame) : eventOfOffset(metadata.senderCaptureTimeOffset);
+  const mark = options.trailer ? takeTrailer(frame) : markOf(metadata);
   const dropped =
-    options.kind === "audio" && (isSkipped(options.receiver, metadata.rtpTimestamp) || isTooOld(stamp));
+    options.kind === "audio" && (isSkipped(options.receiver, metadata.rtpTimestamp) || isTooOld(mark));
   if (metadata.rtpTimestamp !== undefined)
-    scope.postMessage({ receiver: options.receiver, rtpTimestamp: metadata.rtpTimestamp, stamp, dropped });
+    scope.postMessage({ receiver: options.receiver, rtpTimestamp: metadata.rtpTimestamp, mark, dropped });
   return !dropped;
 }
 
-function takeTrailer(frame: EncodedFrame): number | null {
+/** `captureTime` counts from this worker's own time origin. */
+function markOf(metadata: ReturnType<EncodedFrame["getMetadata"]>): FrameMark {
+  const { captureTime } = metadata;
+  return {
+    stamp: eventOfOffset(metadata.senderCaptureTimeOffset),
+    capturedMs: captureTime === undefined ? null : performance.timeOrigin + captureTime,
+  };
+}
+
+function takeTrailer(frame: EncodedFrame): FrameMark {
   const { length, trailer } = splitTrailer(new Uint8Array(frame.data));
-  if (trailer === null) return null;
+  if (trailer === null) return UNMARKED;
   frame.data = frame.data.slice(0, length);
-  return trailer.event;
+  const microseconds = trailer.captureTimeUs;
+  return { stamp: trailer.event, capturedMs: microseconds === null ? null : Number(microseconds) / 1000 };
 }
 
 function isSkipped(receiver: number, rtpTimestamp: number | undefined): boolean {
@@ -70,8 +81,10 @@ function isSkipped(receiver: number, rtpTimestamp: number | undefined): boolean 
   return false;
 }
 
-/** The gap of a sound only grows, so one that is too old now would never be heard. */
-function isTooOld(stamp: number | null): boolean {
-  if (stamp === null) return false;
-  return judge(context.feedback, stamp, context.tolerance, context.enabled).verdict === "discard";
+/** The gap of a sound only grows, and so does its age: one that is too old now would never be heard. */
+function isTooOld(mark: FrameMark): boolean {
+  if (mark.stamp === null) return false;
+  const now: GateContext = { ...context, wallMs: performance.timeOrigin + performance.now() };
+  const ageMs = ageOf(mark, now);
+  return judge(context.feedback, mark.stamp, context.tolerance, context.gate, ageMs).verdict === "discard";
 }

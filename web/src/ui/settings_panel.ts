@@ -12,9 +12,9 @@ export function createSettingsPanel(app: ConsoleApp): Panel {
     createStepper(app, "Picture tolerance", "video"),
     createStepper(app, "Sound tolerance", "audio"),
     createPacing(app),
-    createSwitch(app, "Slow down with delay", "speedCap", "Speed limited to 0.2 s ÷ delay"),
-    createSwitch(app, "Contact tone", "contactTone", "A tone that rises with the force"),
-    createSwitch(app, "Media gate", "gateEnabled", "Off shows everything, however old"),
+    createFlag(app, "Slow down with delay", "speedCap", "Speed limited to 0.2 s ÷ delay"),
+    createFlag(app, "Contact tone", "contactTone", "A tone that rises with the force"),
+    createGate(app),
   ];
   const head = h("div", "card-head", {}, h("h2", "", {}, "Gate and pacing"));
   return {
@@ -68,14 +68,33 @@ function createPacing(app: ConsoleApp): Part {
   };
 }
 
+function createFlag(app: ConsoleApp, label: string, name: "contactTone" | "speedCap", about: string): Part {
+  const { settings } = app.state;
+  return createSwitch(
+    app,
+    label,
+    about,
+    () => settings[name],
+    () => (settings[name] = !settings[name]),
+  );
+}
+
+function createGate(app: ConsoleApp): Part {
+  const { settings } = app.state;
+  const isOn = (): boolean => settings.gate === "event";
+  const turn = (): void => void (settings.gate = isOn() ? "off" : "event");
+  return createSwitch(app, "Media gate", "Off shows everything, however old", isOn, turn);
+}
+
 function createSwitch(
   app: ConsoleApp,
   label: string,
-  name: "contactTone" | "gateEnabled" | "speedCap",
   about: string,
+  isOn: () => boolean,
+  turn: () => void,
 ): Part {
   const control = button("switch", "", () => {
-    app.state.settings[name] = !app.state.settings[name];
+    turn();
     app.settingsChanged();
   });
   control.setAttribute("role", "switch");
@@ -84,7 +103,7 @@ function createSwitch(
   return {
     element,
     update() {
-      const on = app.state.settings[name];
+      const on = isOn();
       setData(control, "on", String(on));
       if (control.getAttribute("aria-checked") !== String(on))
         control.setAttribute("aria-checked", String(on));

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { judge } from "../../src/core/media_gate";
+import { judge, type GateMode } from "../../src/core/media_gate";
 import { readVectors } from "../vectors";
 
 interface GateCase {
@@ -7,7 +7,8 @@ interface GateCase {
   feedback: number | null;
   stamp: number | null;
   tolerance: number;
-  enabled: boolean;
+  mode: GateMode;
+  age_ms: number | null;
   verdict: string;
   gap: number | null;
 }
@@ -17,7 +18,7 @@ const { cases } = readVectors("gate") as { cases: GateCase[] };
 describe("the media gate", () => {
   it("has a table of cases", () => expect(cases.length).toBeGreaterThan(20));
 
-  it.each(cases)("$name", ({ feedback, stamp, tolerance, enabled, verdict, gap }) => {
-    expect(judge(feedback, stamp, tolerance, enabled)).toEqual({ verdict, gap });
+  it.each(cases)("$name", ({ feedback, stamp, tolerance, mode, age_ms, verdict, gap }) => {
+    expect(judge(feedback, stamp, tolerance, mode, age_ms)).toEqual({ verdict, gap });
   });
 });

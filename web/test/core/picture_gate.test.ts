@@ -1,5 +1,6 @@
 import { beforeEach, describe, expect, it } from "vitest";
-import type { GateContext } from "../../src/core/medium_counts";
+import type { GateMode } from "../../src/core/media_gate";
+import { takeLag, type FrameMark, type GateContext } from "../../src/core/medium_counts";
 import {
   closePictureGate,
   createPictureGate,
@@ -28,11 +29,15 @@ beforeEach(() => {
   made = [];
 });
 
-function contextOf(feedback: number | null, enabled = true): GateContext {
-  return { feedback, tolerance: 4, enabled };
+function contextOf(feedback: number | null, mode: GateMode = "event"): GateContext {
+  return { feedback, tolerance: 4, gate: mode, wallMs: 10_000 };
 }
 
-const lookup = (rtp: number): number | null | undefined => stamps.get(rtp);
+/** Every picture was captured as many ms ago as its RTP timestamp says. */
+function lookup(rtp: number): FrameMark | undefined {
+  const stamp = stamps.get(rtp);
+  return stamp === undefined ? undefined : { stamp, capturedMs: 10_000 - rtp };
+}
 
 function draw(picture: FakePicture, stamp: number | null, gap: number | null): void {
   expect(picture.closed).toBe(0);
@@ -116,15 +121,31 @@ describe("the picture gate", () => {
     expect(drawn).toEqual([[90, 1, 0]]);
   });
 
-  it("draws everything while it is off, and counts no violation for it", () => {
+  it("draws everything while it is off, and counts what is beyond the tolerance", () => {
     stamps.set(91, 2);
-    offer(90, contextOf(100, false));
-    offer(91, contextOf(100, false));
+    offer(90, contextOf(100, "off"));
+    offer(91, contextOf(100, "off"));
     expect(drawn).toEqual([
       [90, null, null],
       [91, 2, 98],
     ]);
-    expect(gate.counts.violations).toBe(0);
+    expect(gate.counts).toMatchObject({ received: 2, violations: 1, gapSum: 98, gapsKnown: 1 });
+  });
+
+  it("by age draws what is young, however far behind, and nothing that is old", () => {
+    stamps.set(90, 2).set(600, 100);
+    offer(90, contextOf(100, "age"));
+    offer(600, contextOf(100, "age"));
+    expect(drawn).toEqual([[90, 2, 98]]);
+    expect(gate.counts).toMatchObject({ rendered: 1, discarded: 1, violations: 1 });
+  });
+
+  it("remembers the largest lag of all that came, drawn or not, until it is reported", () => {
+    stamps.set(90, 10).set(91, 99);
+    offer(90, contextOf(100));
+    offer(91, contextOf(100));
+    expect(takeLag(gate.counts)).toBe(90);
+    expect(takeLag(gate.counts)).toBe(0);
   });
 
   it("closes the kept picture when it ends", () => {

@@ -1,6 +1,7 @@
 import { beforeEach, describe, expect, it } from "vitest";
-import type { GateContext } from "../../src/core/medium_counts";
-import { createSoundGate, observeSound, type SoundGate } from "../../src/core/sound_gate";
+import type { GateMode } from "../../src/core/media_gate";
+import { meanGap, type FrameMark, type GateContext } from "../../src/core/medium_counts";
+import { createSoundGate, observeSound as observe, type SoundGate } from "../../src/core/sound_gate";
 
 let gate: SoundGate;
 
@@ -8,8 +9,20 @@ beforeEach(() => {
   gate = createSoundGate();
 });
 
-function contextOf(feedback: number | null, enabled = true): GateContext {
-  return { feedback, tolerance: 6, enabled };
+function contextOf(feedback: number | null, mode: GateMode = "event"): GateContext {
+  return { feedback, tolerance: 6, gate: mode, wallMs: 10_000 };
+}
+
+function observeSound(
+  of: SoundGate,
+  rtp: number,
+  stamp: number | null | undefined,
+  context: GateContext,
+  audible: boolean,
+  now: number,
+): boolean {
+  const mark: FrameMark | undefined = stamp === undefined ? undefined : { stamp, capturedMs: 10_000 - rtp };
+  return observe(of, rtp, mark, context, audible, now);
 }
 
 describe("the sound gate", () => {
@@ -56,8 +69,15 @@ describe("the sound gate", () => {
   });
 
   it("lets everything through while it is off", () => {
-    expect(observeSound(gate, 960, undefined, contextOf(100, false), true, 0)).toBe(true);
-    expect(observeSound(gate, 1920, 1, contextOf(100, false), true, 0)).toBe(true);
-    expect(gate.counts).toMatchObject({ rendered: 2, violations: 0 });
+    expect(observeSound(gate, 960, undefined, contextOf(100, "off"), true, 0)).toBe(true);
+    expect(observeSound(gate, 1920, 1, contextOf(100, "off"), true, 0)).toBe(true);
+    expect(gate.counts).toMatchObject({ received: 2, rendered: 2, violations: 1 });
+    expect(meanGap(gate.counts)).toBe(99);
+  });
+
+  it("by age lets young sound through, and none that is old", () => {
+    expect(observeSound(gate, 300, 1, contextOf(100, "age"), true, 0)).toBe(true);
+    expect(observeSound(gate, 960, 100, contextOf(100, "age"), true, 0)).toBe(false);
+    expect(meanGap(createSoundGate().counts)).toBeNull();
   });
 });

@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
 import { staleness } from "../../src/core/staleness";
 
-const context = { feedback: 10, tolerance: 4, enabled: true };
+const context = { feedback: 10, tolerance: 4, gate: "event", wallMs: 0 } as const;
 
 it("a picture within tolerance is not stale", () => expect(staleness(6, 0, 0, context, 100)).toBeNull());
 
@@ -20,7 +20,7 @@ it("says that the first picture is awaited", () => {
 });
 
 it("judges no gap while the gate is off or nothing is known", () => {
-  expect(staleness(1, 0, 0, { ...context, enabled: false }, 0)).toBeNull();
+  expect(staleness(1, 0, 0, { ...context, gate: "off" }, 0)).toBeNull();
   expect(staleness(1, 0, 0, { ...context, feedback: null }, 0)).toBeNull();
   expect(staleness(null, 0, 0, context, 0)).toBeNull();
 });

@@ -1,27 +1,32 @@
 import { expect, it } from "vitest";
-import { createStampBook, findStamp, noteStamp } from "../../src/core/stamp_book";
+import { createStampBook, findMark, noteMark } from "../../src/core/stamp_book";
+import type { FrameMark } from "../../src/core/medium_counts";
+
+function markOf(stamp: number | null): FrameMark {
+  return { stamp, capturedMs: null };
+}
 
 it("tells a frame without a stamp from a frame not seen", () => {
   const book = createStampBook(4);
-  noteStamp(book, 90, null);
-  noteStamp(book, 91, 7);
-  expect(findStamp(book, 90)).toBeNull();
-  expect(findStamp(book, 91)).toBe(7);
-  expect(findStamp(book, 92)).toBeUndefined();
+  noteMark(book, 90, markOf(null));
+  noteMark(book, 91, markOf(7));
+  expect(findMark(book, 90)).toEqual(markOf(null));
+  expect(findMark(book, 91)).toEqual(markOf(7));
+  expect(findMark(book, 92)).toBeUndefined();
 });
 
 it("forgets the oldest beyond its limit", () => {
   const book = createStampBook(3);
-  for (let index = 1; index <= 5; index++) noteStamp(book, index, index);
-  expect([...book.stamps.keys()]).toEqual([3, 4, 5]);
+  for (let index = 1; index <= 5; index++) noteMark(book, index, markOf(index));
+  expect([...book.marks.keys()]).toEqual([3, 4, 5]);
 });
 
 it("a timestamp that comes again counts as new", () => {
   const book = createStampBook(2);
-  noteStamp(book, 1, 1);
-  noteStamp(book, 2, 2);
-  noteStamp(book, 1, 9);
-  noteStamp(book, 3, 3);
-  expect(findStamp(book, 1)).toBe(9);
-  expect(findStamp(book, 2)).toBeUndefined();
+  noteMark(book, 1, markOf(1));
+  noteMark(book, 2, markOf(2));
+  noteMark(book, 1, markOf(9));
+  noteMark(book, 3, markOf(3));
+  expect(findMark(book, 1)).toEqual(markOf(9));
+  expect(findMark(book, 2)).toBeUndefined();
 });
