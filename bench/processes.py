@@ -5,7 +5,7 @@ import json
 import os
 import shutil
 import signal
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,15 @@ class Running:
         """After `pause`."""
         self._signal(signal.SIGCONT)
 
+    async def kill(self) -> None:
+        """End it as a crash does."""
+        self._signal(signal.SIGKILL)
+        await self._process.wait()
+
+    def resident_bytes(self) -> int:
+        """Memory in use (proc(5), statm field 2)."""
+        return int(Path(f"/proc/{self.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
     async def keep_output(self) -> None:
         """Read its standard error until it ends."""
         if self._process.stderr is None:
@@ -109,7 +118,7 @@ class Running:
 
 @asynccontextmanager
 async def running_process(
-    *command: str, ready_seconds: float = READY_SECONDS
+    *command: str, ready_seconds: float = READY_SECONDS, environment: Mapping[str, str] | None = None
 ) -> AsyncIterator[tuple[Running, dict[str, Any]]]:
     """The process and the line with which it says that it is ready. Ended on leaving, and when we are killed.
 
@@ -124,6 +133,7 @@ async def running_process(
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
         limit=LINE_LIMIT,
+        env=None if environment is None else os.environ | environment,
     )
     running = Running(process, command)
     reader = asyncio.get_running_loop().create_task(running.keep_output())

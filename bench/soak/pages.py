@@ -1,0 +1,112 @@
+"""Pages in Chromium through a soak: the operator's, whose person keeps driving, and an observer's, who watches."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Any
+
+from playwright.async_api import Error, Page
+
+__all__ = ["OperatorPage", "WatchedPage"]
+
+LOOK_SECONDS = 0.25
+LIVE_SECONDS = 2.0
+PATIENCE = 30.0  # s of calm in which a page has to be live again by itself
+START, RB = 9, 5  # W3C standard mapping
+LEFT_X, LEFT_Y = 0, 1
+PRESS = "([button, pressed]) => window.testPad.press(button, pressed)"
+TILT = "([axis, value]) => window.testPad.tilt(axis, value)"
+
+
+class WatchedPage:
+    """Looks at what the page says of itself, and reloads it only when it does not come back: that is counted."""
+
+    def __init__(self, page: Page, calm_seconds: Callable[[], float]) -> None:
+        self.page = page
+        self.reloads = 0
+        self.violations = 0
+        self.slowest_return = 0.0  # s of calm until it was live again
+        self.events = 0  # seen to advance
+        self._calm_seconds = calm_seconds
+        self._live_at = time.monotonic()
+        self._last: dict[str, Any] | None = None
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            await asyncio.sleep(LOOK_SECONDS)
+            try:
+                await self.look()
+            except Error:
+                continue  # the page is between two documents
+
+    async def look(self) -> None:
+        statistics: dict[str, Any] | None = await self.page.evaluate("window.lockstep?.stats() ?? null")
+        if statistics is not None:
+            self._count(statistics)
+        now = time.monotonic()
+        if statistics is not None and statistics["connected"] and self._shows_something_new(statistics):
+            waited = min(now - self._live_at, self._calm_seconds())
+            self.slowest_return = max(self.slowest_return, waited)
+            self._live_at = now
+        elif min(now - self._live_at, self._calm_seconds()) > PATIENCE:
+            self.reloads += 1
+            self._live_at = now
+            await self.page.reload()
+        self._last = statistics
+        if statistics is not None:
+            await self.act(statistics)
+
+    def is_live(self) -> bool:
+        """Whether it showed something new in the last moments."""
+        return time.monotonic() - self._live_at < LIVE_SECONDS
+
+    async def act(self, statistics: dict[str, Any]) -> None:
+        """What its person does now."""
+
+    def _count(self, statistics: dict[str, Any]) -> None:
+        self.violations = max(self.violations, sum(each["violations"] for each in statistics["streams"].values()))
+
+    def _shows_something_new(self, statistics: dict[str, Any]) -> bool:
+        """Pictures advance: the one thing that needs everything to work."""
+        shown = _rendered(statistics)
+        return self._last is None or shown != _rendered(self._last)
+
+
+class OperatorPage(WatchedPage):
+    """Its person wants to drive: asks for the seat, arms and pushes the stick, whenever the page lets them."""
+
+    arms = 0
+    seat_requests = 0
+
+    async def act(self, statistics: dict[str, Any]) -> None:
+        if not statistics["connected"] or statistics["stopped"]:
+            await self._let_go()
+        elif not (statistics["seat"] and statistics["seat"]["mine"]):
+            await self._let_go()
+            await self._ask_for_the_seat()
+        elif not statistics["armed"]:
+            await self._let_go()
+            await self.page.evaluate(PRESS, [START, True])
+            await asyncio.sleep(0.08)  # a finger is no faster
+            await self.page.evaluate(PRESS, [START, False])
+            self.arms += 1
+        else:
+            await self.page.evaluate(PRESS, [RB, True])
+            await self.page.evaluate(TILT, [LEFT_Y, -0.6])
+            await self.page.evaluate(TILT, [LEFT_X, 0.4 if int(time.monotonic()) % 4 < 2 else -0.4])
+
+    async def _let_go(self) -> None:
+        await self.page.evaluate(PRESS, [RB, False])
+        await self.page.evaluate(TILT, [LEFT_Y, 0])
+        await self.page.evaluate(TILT, [LEFT_X, 0])
+
+    async def _ask_for_the_seat(self) -> None:
+        button = self.page.get_by_role("button", name="Request control").first
+        if await button.is_visible() and await button.is_enabled():
+            await button.click(timeout=1000)
+            self.seat_requests += 1
+
+
+def _rendered(statistics: dict[str, Any]) -> int:
+    return sum(each["rendered"] for each in statistics["streams"].values() if each["kind"] == "video")

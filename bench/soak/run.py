@@ -1,0 +1,176 @@
+"""The soak: one operator and an observer in Chromium, headless observers that come and go, intruders, and a seeded plan
+of what goes wrong (schedule.py). The bridge's own record is the judge (judge.py)."""
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import AsyncExitStack, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import httpx
+
+from bench.browser import open_probed_page
+from bench.emulator import Network, load_profile
+from bench.soak.crowd import Crowd, Intruder
+from bench.soak.judge import Judge
+from bench.soak.memory import growth
+from bench.soak.pages import OperatorPage, WatchedPage
+from bench.soak.schedule import Action, schedule
+from bench.soak.world import World
+from bench.stack import Metrics
+from tests.support.chromium import PAD, running_chromium
+
+__all__ = ["OBSERVERS", "soak"]
+
+OBSERVERS = 20
+SAMPLE_SECONDS = 1.0
+LAST_LOOK = 45.0  # s at the end for everybody to be live again
+MAX_EVENT_AGE, HOLD = 2.0, 0.3  # of the planar robot
+
+
+async def soak(minutes: float, seed: int, say: Callable[[str], None]) -> dict[str, Any]:
+    """What happened, by name; the first six must be 0, memory_growth small.
+
+    Raises:
+        ProcessFailed: the bridge or the console did not start.
+    """
+    with TemporaryDirectory(prefix="lockstep-soak-") as folder:
+        async with AsyncExitStack() as stack:
+            world = await stack.enter_async_context(World(Path(folder)))
+            network = await stack.enter_async_context(
+                Network(load_profile("perfect"), console_url=world.console_url, seed=seed)
+            )
+            return await _Soak(world, network, minutes, seed, say).run(stack)
+
+
+class _Soak:
+    def __init__(self, world: World, network: Network, minutes: float, seed: int, say: Callable[[str], None]) -> None:
+        self._world = world
+        self._network = network
+        self._minutes = minutes
+        self._seed = seed
+        self._say = say
+        self._done: Counter[str] = Counter()
+        self._memory: list[float] = []  # of the server's present life
+        self._crowd = Crowd(self._through(world.observer), OBSERVERS, seed)
+        self._intruders = [
+            Intruder(self._through(world.observer), "observer that commands"),
+            Intruder(self._through(world.operator), "operator without the seat"),
+        ]
+
+    async def run(self, stack: AsyncExitStack) -> dict[str, Any]:
+        world = self._world
+        browser = await stack.enter_async_context(running_chromium())
+        operator = OperatorPage(
+            await stack.enter_async_context(open_probed_page(browser, self._through(world.operator), PAD)),
+            world.calm_seconds,
+        )
+        observer = WatchedPage(
+            await stack.enter_async_context(open_probed_page(browser, self._through(world.observer))),
+            world.calm_seconds,
+        )
+        self._crowd.fill()
+        background = [asyncio.get_running_loop().create_task(each.run()) for each in (operator, observer)]
+        background += [asyncio.get_running_loop().create_task(each.run()) for each in self._intruders]
+        background.append(asyncio.get_running_loop().create_task(self._sample_memory()))
+        try:
+            await self._play(schedule(self._minutes, self._seed))
+            self._say("the plan is played; waiting for everybody to be back")
+            await self._until_live(operator, observer)
+            refused = await self._refusals()
+        finally:
+            for task in background:
+                task.cancel()
+            await asyncio.gather(*background, return_exceptions=True)
+            await self._crowd.close()
+        return self._verdict(operator, observer, refused)
+
+    async def _play(self, plan: list[Action]) -> None:
+        began = time.monotonic()
+        for action in plan:
+            await asyncio.sleep(max(0.0, began + action.at - time.monotonic()))
+            self._say(f"{time.monotonic() - began:6.1f} s  {action.kind} {action.seconds or ''}")
+            await self._act(action)
+            self._done[action.kind] += 1
+        await asyncio.sleep(max(0.0, began + self._minutes * 60 - LAST_LOOK - time.monotonic()))
+
+    async def _act(self, action: Action) -> None:
+        match action.kind:
+            case "kill_bridge":
+                await self._world.kill_bridge()
+            case "restart_server":
+                self._memory.clear()
+                await self._world.restart_server(gently=self._done["restart_server"] % 2 == 0)
+                self._memory.clear()
+            case "cut_network":
+                self._world.trouble_begins()
+                try:
+                    await self._network.outage(action.seconds)
+                finally:
+                    self._world.trouble_ends()
+            case "stop":
+                self._world.trouble_begins()
+                try:
+                    await self._world.stop_for(action.seconds)
+                    await self._world.until_reset()
+                finally:
+                    self._world.trouble_ends()
+            case "join":
+                self._crowd.come()
+            case "leave":
+                await self._crowd.go()
+
+    async def _until_live(self, *pages: WatchedPage) -> None:
+        """Every page shows new pictures after all is calm; a page that does not is reloaded, and that is counted."""
+        end = time.monotonic() + LAST_LOOK
+        while time.monotonic() < end and not all(page.is_live() for page in pages):
+            await asyncio.sleep(SAMPLE_SECONDS)
+        for page in pages:
+            if not page.is_live():
+                page.reloads += 1
+
+    async def _sample_memory(self) -> None:
+        while True:
+            memory = self._world.server_memory()
+            if memory is not None:
+                self._memory.append(float(memory))
+            await asyncio.sleep(SAMPLE_SECONDS)
+
+    async def _refusals(self) -> dict[str, float]:
+        """By reason, since the server's last start."""
+        async with httpx.AsyncClient(base_url=self._world.console_url, trust_env=False) as http:
+            with suppress(httpx.TransportError):
+                return Metrics((await http.get("/metrics")).text).values("lockstep_refusals_total", "reason")
+        return {}
+
+    def _verdict(self, operator: OperatorPage, observer: WatchedPage, refused: dict[str, float]) -> dict[str, Any]:
+        judge = Judge(MAX_EVENT_AGE, HOLD)
+        judge.read(self._world.records())
+        found = judge.verdict
+        return {
+            "executed_twice": found["executed_twice"],
+            "executed_late": found["executed_late"],
+            "moved_without_seat": found["moved_without_seat"],
+            "moved_while_stopped": found["moved_while_stopped"],
+            "reloads_needed": operator.reloads + observer.reloads,
+            "violations": operator.violations + observer.violations,
+            "memory_growth": growth(self._memory),
+            "minutes": self._minutes,
+            "seed": self._seed,
+            "executed": found["executed"],
+            "epochs": found["epochs"],
+            "done": dict(self._done),
+            "operator_armed": operator.arms,
+            "seat_requests": operator.seat_requests,
+            "slowest_return_seconds": round(max(operator.slowest_return, observer.slowest_return), 1),
+            "observers_joined": self._crowd.joined,
+            "intrusions": sum(each.tries for each in self._intruders),
+            "refused": refused,
+        }
+
+    def _through(self, link: str) -> str:
+        """The link by way of the emulated network."""
+        return self._network.console_url + "/#" + link.partition("#")[2]

@@ -1,0 +1,156 @@
+"""The bridge and the console of a soak, each a process that is killed and started again at the same address."""
+
+import asyncio
+import json
+import secrets
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import AsyncExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import httpx
+
+from bench.processes import Running, running_process
+
+__all__ = ["World"]
+
+DOWN_SECONDS = 1.0  # between a death and the next life
+HTTP_SECONDS = 10.0
+
+
+class World:
+    """Enter it, and both run. `calm_since` says since when nothing is down or cut, on the monotonic clock."""
+
+    def __init__(self, folder: Path, robot: str = "planar") -> None:
+        self.event_log = folder / "events.jsonl"
+        self.console_url = ""
+        self.operator = self.observer = ""
+        self.bridge_kills = self.server_restarts = 0
+        self._robot = robot
+        self._environment = {
+            "LOCKSTEP_STATE_DIR": str(folder / "state"),
+            "LOCKSTEP_SECRET": secrets.token_urlsafe(32),  # so that links outlive a restart
+        }
+        self._bridge_life, self._server_life = AsyncExitStack(), AsyncExitStack()
+        self._bridge: Running | None = None
+        self._server: Running | None = None
+        self._bridge_port = self._server_port = 0
+        self._troubles = 0
+        self._calm_since = time.monotonic()
+
+    async def __aenter__(self) -> Self:
+        await self._start_bridge()
+        await self._start_server()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        await self._server_life.aclose()
+        await self._bridge_life.aclose()
+
+    # What goes wrong
+
+    def trouble_begins(self) -> None:
+        self._troubles += 1
+
+    def trouble_ends(self) -> None:
+        self._troubles -= 1
+        self._calm_since = time.monotonic()
+
+    def calm_seconds(self) -> float:
+        """How long everything has been in order; 0 while something is not."""
+        return 0.0 if self._troubles else time.monotonic() - self._calm_since
+
+    async def kill_bridge(self) -> None:
+        self.trouble_begins()
+        try:
+            if self._bridge is not None:
+                await self._bridge.kill()
+            await self._bridge_life.aclose()
+            await asyncio.sleep(DOWN_SECONDS)
+            await self._start_bridge()
+            self.bridge_kills += 1
+        finally:
+            self.trouble_ends()
+
+    async def restart_server(self, *, gently: bool) -> None:
+        self.trouble_begins()
+        try:
+            if self._server is not None and not gently:
+                await self._server.kill()
+            await self._server_life.aclose()
+            await asyncio.sleep(DOWN_SECONDS)
+            await self._start_server()
+            self.server_restarts += 1
+        finally:
+            self.trouble_ends()
+
+    async def stop_for(self, seconds: float) -> bool:
+        """STOP by an observer over HTTP, and the operator's reset after a while. False when the console was away."""
+        async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
+            try:
+                stopped = await http.post("/api/stop", headers=_bearer(self.observer), json={"reason": "soak"})
+                await asyncio.sleep(seconds)
+                await http.post("/api/reset", headers=_bearer(self.operator))
+            except httpx.TransportError:
+                return False
+            return stopped.is_success
+
+    async def until_reset(self) -> None:
+        """Ask for the reset until the robot is not stopped: one may have been lost in a restart."""
+        async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
+            while True:
+                try:
+                    session = await http.get("/api/session", headers=_bearer(self.operator))
+                    if session.is_success and not session.json()["stopped"]:
+                        return
+                    await http.post("/api/reset", headers=_bearer(self.operator))
+                except httpx.TransportError:
+                    pass
+                await asyncio.sleep(0.5)
+
+    # What is measured
+
+    def server_memory(self) -> int | None:
+        """Bytes; None while it is down."""
+        try:
+            return None if self._server is None else self._server.resident_bytes()
+        except (OSError, ValueError, IndexError):
+            return None
+
+    def records(self) -> Iterator[Mapping[str, Any]]:
+        """The bridge's record of all epochs. A killed bridge may leave half a line: it is passed over."""
+        with self.event_log.open() as lines:
+            for line in lines:
+                try:
+                    yield json.loads(line)
+                except ValueError:
+                    continue
+
+    async def _start_bridge(self) -> None:
+        command = (sys.executable, "-m", "robot_bridge", self._robot, "--port", str(self._bridge_port), "--json")
+        life = AsyncExitStack()
+        self._bridge, ready = await life.enter_async_context(
+            running_process(*command, "--event-log", str(self.event_log), environment=self._environment)
+        )
+        self._bridge_life = life
+        self._bridge_port = int(ready["robot"].rsplit(":", 1)[1])
+
+    async def _start_server(self) -> None:
+        command = (str(Path(sys.executable).with_name("lockstep")), "serve", "--json", "--quiet")
+        where = ("--robot", f"tcp://127.0.0.1:{self._bridge_port}", "--port", str(self._server_port))
+        life = AsyncExitStack()
+        self._server, ready = await life.enter_async_context(
+            running_process(*command, *where, environment=self._environment)
+        )
+        self._server_life = life
+        self.console_url, self.operator, self.observer = ready["console"], ready["operator"], ready["observer"]
+        self._server_port = int(self.console_url.rsplit(":", 1)[1])
+
+
+def _bearer(link: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {link.partition('#token=')[2]}"}
