@@ -34,9 +34,10 @@ class AudioStream(Stream[SoundJob]):
     """Takes pcm_s16le, mono or stereo, at any rate; encoded to Opus and PCMU."""
 
     kind = "audio"
-    codecs = AUDIO_CODECS
+    codecs: tuple[str, ...] = AUDIO_CODECS
 
     def __init__(self, microphone: Microphone, settings: MediaSettings, fan_out: FanOut, metrics: MediaMetrics) -> None:
+        self.codecs = settings.sound_codecs
         super().__init__(microphone.name, microphone.label, settings, fan_out, metrics)
         self._waiting: deque[tuple[Media, float]] = deque()
         self._encoders: dict[str, SoundEncoder] = {}

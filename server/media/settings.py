@@ -1,5 +1,7 @@
 """Settings of the media plane."""
 
+from typing import Literal
+
 from pydantic import BaseModel, Field
 
 __all__ = ["MediaSettings"]
@@ -9,8 +11,10 @@ class MediaSettings(BaseModel):
     """How pictures and sound are encoded and sent."""
 
     video_bitrate_bps: int = Field(default=800_000, ge=50_000, le=20_000_000)
+    video_frames_per_second: float | None = Field(default=None, ge=1, le=120)  # at most; None: as the camera gives
     keyframe_interval_seconds: float = Field(default=10.0, ge=0.5, le=300.0)
     keyframe_spacing_seconds: float = Field(default=0.3, ge=0.0, le=10.0)  # least time between two requested keyframes
+    sound_codecs: tuple[Literal["opus", "PCMU"], ...] = Field(default=("opus", "PCMU"), min_length=1)  # answered
     opus_bitrate_bps: int = Field(default=32_000, ge=6_000, le=256_000)
     opus_packet_loss_percent: int = Field(default=10, ge=0, le=100)  # what in-band FEC is sized for
     slice_seconds: float = Field(default=0.001, gt=0.0, le=0.05)  # of one loop turn that observers may use

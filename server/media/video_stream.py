@@ -11,6 +11,7 @@ from robot_bridge.protocol.messages import Media
 from server.media.errors import MediaError, PayloadError, UnsupportedCodecError
 from server.media.fanout import FanOut
 from server.media.frame import EncodedFrame
+from server.media.frame_pace import FramePace
 from server.media.media_clock import PictureClock
 from server.media.metrics import MediaMetrics
 from server.media.output import Output
@@ -48,6 +49,7 @@ class VideoStream(Stream[PictureJob]):
         super().__init__(camera.name, camera.label, settings, fan_out, metrics)
         self._frame_rate = camera.frame_rate
         self._clock = PictureClock()
+        self._pace = FramePace(settings.video_frames_per_second)
         self._newest: tuple[Media, float, float] | None = None  # medium, now, capture time
         self._decoder = PictureDecoder()
         self._encoders: dict[str, PictureEncoder] = {}
@@ -56,6 +58,9 @@ class VideoStream(Stream[PictureJob]):
     def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
         if media.codec == "h264":
             self._pass_on(media, capture_time)
+            return
+        if not self._pace.admit(media.time):
+            self._drop("thinned")
             return
         if self._newest is not None:
             self._drop("encoder_busy")
