@@ -1,0 +1,69 @@
+"""Which packets are lost: the Gilbert–Elliott model, of which independent loss is a case. No I/O.
+
+The path is in a good or a bad state and changes between them with fixed probabilities at every packet; each state
+loses packets with a probability of its own.
+"""
+
+from dataclasses import dataclass
+
+__all__ = ["NO_LOSS", "Loss", "LossState", "bursty", "independent"]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """The four probabilities."""
+
+    to_bad: float = 0.0  # good → bad, at each packet
+    to_good: float = 1.0  # bad → good
+    good: float = 0.0  # loss while good
+    bad: float = 0.0  # loss while bad
+
+    @property
+    def mean(self) -> float:
+        """The share of packets lost in the long run."""
+        changing = self.to_bad + self.to_good
+        if changing == 0:
+            return self.good
+        bad = self.to_bad / changing
+        return bad * self.bad + (1 - bad) * self.good
+
+
+NO_LOSS = Loss()
+
+
+def independent(share: float) -> Loss:
+    """Each packet for itself."""
+    return Loss(good=share, bad=share)
+
+
+def bursty(share: float, length: float, *, good: float = 0.0, bad: float = 1.0) -> Loss:
+    """`share` of all packets, and the bad state lasts `length` packets on average.
+
+    Args:
+        good, bad: share lost in each state; unless given, all of it is lost in the bad state and nothing in the good
+
+    Raises:
+        ValueError: no such path exists.
+    """
+    if length < 1:
+        raise ValueError("a burst lasts at least 1 packet")
+    if not good <= share < bad:
+        raise ValueError("the mean loss lies between the loss of the good state and that of the bad one")
+    in_bad = (share - good) / (bad - good)
+    to_good = 1 / length
+    to_bad = to_good * in_bad / (1 - in_bad)
+    if to_bad > 1:
+        raise ValueError(f"bursts of {length:g} packets are too short for so much loss")
+    return Loss(to_bad=to_bad, to_good=to_good, good=good, bad=bad)
+
+
+class LossState:
+    """Where one path is. Two uniform numbers a packet."""
+
+    def __init__(self) -> None:
+        self._bad = False
+
+    def loses(self, loss: Loss, change: float, fate: float) -> bool:
+        """Whether the next packet is lost."""
+        self._bad = change >= loss.to_good if self._bad else change < loss.to_bad
+        return fate < (loss.bad if self._bad else loss.good)

@@ -1,0 +1,65 @@
+"""When nothing passes: on a schedule, and on demand. No I/O."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+__all__ = ["Outages", "PlannedOutage", "Silence"]
+
+
+@dataclass(frozen=True)
+class PlannedOutage:
+    """Times in seconds; the schedule's clock starts with `Outages.start`."""
+
+    at: float
+    lasts: float
+    every: float | None = None  # again and again; None: once
+    hold: bool = False  # packets wait in the network until it is over; else they are lost
+
+
+class Silence(NamedTuple):
+    """An outage that holds now."""
+
+    until: float
+    hold: bool
+
+
+class Outages:
+    """Those of one place, shared by all paths that lead through it."""
+
+    def __init__(self, planned: tuple[PlannedOutage, ...] = ()) -> None:
+        self._planned = planned
+        self._started: float | None = None
+        self._demanded: Silence | None = None
+
+    @property
+    def started(self) -> bool:
+        return self._started is not None
+
+    def start(self, now: float) -> None:
+        """Start the schedule, or start it again from its beginning."""
+        self._started = now
+
+    def demand(self, now: float, seconds: float, *, hold: bool = False) -> None:
+        """One more from now on; it takes the place of the one demanded before."""
+        self._demanded = Silence(now + seconds, hold)
+
+    def at(self, now: float) -> Silence | None:
+        """The outage that holds at `now`; of several the one that lasts longest."""
+        found = self._demanded if self._demanded is not None and now < self._demanded.until else None
+        if self._started is not None:
+            for planned in self._planned:
+                silence = _holding(planned, now - self._started, self._started)
+                if silence is not None and (found is None or silence.until > found.until):
+                    found = silence
+        return found
+
+
+def _holding(planned: PlannedOutage, passed: float, started: float) -> Silence | None:
+    since = passed - planned.at
+    rounds = 0
+    if since >= 0 and planned.every is not None:
+        rounds = int(since // planned.every)
+        since -= rounds * planned.every
+    if not 0 <= since < planned.lasts:
+        return None
+    return Silence(started + planned.at + rounds * (planned.every or 0.0) + planned.lasts, planned.hold)
