@@ -10,7 +10,6 @@ from playwright.async_api import Error, Page
 __all__ = ["OperatorPage", "WatchedPage"]
 
 LOOK_SECONDS = 0.25
-LIVE_SECONDS = 2.0
 PATIENCE = 30.0  # s of calm in which a page has to be live again by itself
 START, RB = 9, 5  # W3C standard mapping
 LEFT_X, LEFT_Y = 0, 1
@@ -30,6 +29,7 @@ class WatchedPage:
         self._calm_seconds = calm_seconds
         self._live_at = time.monotonic()
         self._last: dict[str, Any] | None = None
+        self._news = asyncio.Event()
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -49,6 +49,7 @@ class WatchedPage:
             waited = min(now - self._live_at, self._calm_seconds())
             self.slowest_return = max(self.slowest_return, waited)
             self._live_at = now
+            self._news.set()
         elif min(now - self._live_at, self._calm_seconds()) > PATIENCE:
             self.reloads += 1
             self._live_at = now
@@ -57,9 +58,10 @@ class WatchedPage:
         if statistics is not None:
             await self.act(statistics)
 
-    def is_live(self) -> bool:
-        """Whether it showed something new in the last moments."""
-        return time.monotonic() - self._live_at < LIVE_SECONDS
+    async def until_live(self) -> None:
+        """Until it shows something new."""
+        self._news.clear()
+        await self._news.wait()
 
     async def act(self, statistics: dict[str, Any]) -> None:
         """What its person does now."""
