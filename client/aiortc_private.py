@@ -1,5 +1,5 @@
-"""The only file of client/ that touches private parts of aiortc and aioice; tests/client/test_aiortc_private.py pins
-each of them.
+"""Private parts of aiortc and aioice; tests/client/test_aiortc_private.py pins each of them. Those of an ICE restart
+are in client/ice_restart_private.py; nothing else in client/ touches any.
 
 Why each is needed:
 
@@ -29,7 +29,16 @@ from client.frame_assembler import MediaPacket
 from client.rtp_header import find_extension
 from robot_bridge.protocol.carriers import unpack_capture_moment
 
-__all__ = ["PacketSink", "drain_dtls", "gather_only_on", "hasten_sctp", "take_packets", "take_raw_rtp"]
+__all__ = [
+    "PacketSink",
+    "drain_dtls",
+    "gather_here",
+    "gather_only_on",
+    "hasten_sctp",
+    "take_packets",
+    "take_raw_rtp",
+    "transport_of",
+]
 
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
@@ -47,7 +56,7 @@ class PacketSink(Protocol):
         """Sequence numbers to ask the sender for again."""
 
 
-def _transport_of(pc: RTCPeerConnection) -> RTCDtlsTransport:
+def transport_of(pc: RTCPeerConnection) -> RTCDtlsTransport:
     """The one transport: all sections are bundled."""
     transceivers = pc.getTransceivers()
     if transceivers:
@@ -59,15 +68,18 @@ def _transport_of(pc: RTCPeerConnection) -> RTCDtlsTransport:
 
 def gather_only_on(pc: RTCPeerConnection, addresses: Sequence[str]) -> None:
     """Gather host candidates on exactly these addresses, loopback included. Call before setLocalDescription."""
-    connection: Any = _transport_of(pc).transport.iceGatherer._connection
-    gather = connection.get_component_candidates
+    gather_here(transport_of(pc).transport.iceGatherer._connection, addresses)
 
+
+def gather_here(connection: Any, addresses: Sequence[str]) -> None:
+    """The same for one ICE connection of aioice."""
+    gather = connection.get_component_candidates
     chosen = list(addresses)
 
-    async def gather_here(component: int, addresses: list[str]) -> Any:
+    async def gather_chosen(component: int, addresses: list[str]) -> Any:
         return await gather(component=component, addresses=chosen)
 
-    connection.get_component_candidates = gather_here
+    connection.get_component_candidates = gather_chosen
 
 
 class _StampMap(HeaderExtensionsMap):
@@ -118,7 +130,7 @@ def take_packets(
     Call before setRemoteDescription(answer). aiortc goes on sending receiver reports, REMB and the first request
     for a lost packet.
     """
-    transport: Any = _transport_of(pc)
+    transport: Any = transport_of(pc)
     transport._rtp_header_extensions_map = _StampMap(extension_id)
     for transceiver in pc.getTransceivers():
         sink = sinks.get(transceiver.mid or "")
@@ -147,7 +159,7 @@ def _tap(receiver: Any, tap: _PacketTap, sink: PacketSink) -> None:
 
 def take_raw_rtp(pc: RTCPeerConnection, take: Callable[[bytes], None]) -> None:
     """Give every decrypted RTP packet to `take` and do nothing else with it: no thread, no buffer, no reports."""
-    transport: Any = _transport_of(pc)
+    transport: Any = transport_of(pc)
 
     async def handle(data: bytes, arrival_time_ms: int) -> None:
         take(data)

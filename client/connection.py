@@ -326,6 +326,10 @@ class Connection:
                 refusal.reason, refusal.detail or (f"{self.seat.name} holds it" if self.seat.name else "")
             )
 
+    async def restart_ice(self) -> None:
+        """Raises SignallingRefused or ConnectFailed."""
+        await self._peer.restart_ice(self.options.connect_seconds)
+
     def release_seat(self) -> None:
         self._peer.send("session", SeatRelease())
 

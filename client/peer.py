@@ -4,12 +4,20 @@ import asyncio
 from collections.abc import Callable
 from typing import Literal, Protocol
 
-from aiortc import RTCBundlePolicy, RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from aiortc import (
+    RTCBundlePolicy,
+    RTCConfiguration,
+    RTCDataChannel,
+    RTCIceGatherer,
+    RTCPeerConnection,
+    RTCSessionDescription,
+)
 from aiortc.rtcrtpparameters import RTCRtpCodecCapability
 from aiortc.rtcrtpreceiver import RTCRtpReceiver
 
 from client.aiortc_private import PacketSink, drain_dtls, gather_only_on, hasten_sctp, take_packets, take_raw_rtp
 from client.errors import ConnectFailed, ConsoleError
+from client.ice_restart_private import IceRestart
 from client.link import ConsoleLink
 from client.sdp import Section, offer_extension, read_sections
 from client.whep import Whep
@@ -163,6 +171,28 @@ class Peer:
             self.skipped += 1
             return
         target.send(encode_console_message(message))
+
+    async def restart_ice(self, seconds: float) -> None:
+        """Look for a new path to the console; channels and media live on, and move to it when it is found.
+
+        Raises:
+            SignallingRefused: the console does not restart this session.
+            ConnectFailed: no other path within `seconds`; the old one is as it was.
+        """
+        first = read_sections(self._answer)[0]
+        addresses = ["127.0.0.1"] if self._link.loopback else None
+        restart = IceRestart(self._pc, RTCIceGatherer(iceServers=[]), addresses)
+        try:
+            async with asyncio.timeout(seconds):
+                await restart.gather()
+                fragment = restart.fragment(first.kind, first.mid)
+                sent = fragment if self._route is None else self._route.offer(fragment)
+                answer = await self._whep.restart_ice(self._resource, sent)
+                await restart.connect(answer if self._route is None else self._route.answer(answer))
+        except (ValueError, ConnectionError, TimeoutError) as error:
+            raise ConnectFailed(f"no new path to the console: {error or 'none within the time'}") from error
+        finally:
+            await restart.close()
 
     async def stop_by_http(self, reason: str) -> None:
         """The way to stop that needs no data channel; raises as `Whep.stop`."""

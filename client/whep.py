@@ -63,6 +63,12 @@ class Whep:
             raise SignallingRefused(response.status_code, "", "not a WHEP answer: is this link a Lockstep console's?")
         return Answer(response.text, resource)
 
+    async def restart_ice(self, resource: str, fragment: str) -> str:
+        """Offer new ICE credentials and candidates (RFC 9725 4.3.3); the console's. Raises as `offer`."""
+        headers = {"Content-Type": "application/trickle-ice-sdpfrag", "If-Match": "*"}
+        response = await self._request("PATCH", resource, content=fragment.encode(), headers=headers)
+        return response.text
+
     async def end(self, resource: str) -> None:
         """End the session; raises as `offer`."""
         await self._request("DELETE", resource)

@@ -11,8 +11,13 @@ ConsoleError
 │   ├── BadSdp
 │   ├── BadSdpFragment
 │   ├── BodyTooLarge
-│   ├── IceRestartUnsupported
+│   ├── BodyTooSlow
+│   ├── HostRefused         a host name that is not ours
+│   ├── NotConnected
 │   ├── NotFound
+│   ├── PreconditionFailed
+│   ├── PreconditionRequired
+│   ├── TooManyRequests
 │   └── WrongMediaType
 ├── ChannelError            a data channel message that is not understood
 │   ├── BinaryMessage
@@ -40,18 +45,22 @@ __all__ = [
     "BadSdpFragment",
     "BinaryMessage",
     "BodyTooLarge",
+    "BodyTooSlow",
     "ChannelError",
     "ConsoleError",
     "DuplicateChannel",
     "Flood",
+    "HostRefused",
     "HttpError",
-    "IceRestartUnsupported",
     "LinkDown",
     "MalformedMessage",
     "MessageTooLarge",
     "NotAllowed",
+    "NotConnected",
     "NotFound",
     "OriginRefused",
+    "PreconditionFailed",
+    "PreconditionRequired",
     "RequestError",
     "RobotUnreachable",
     "SceneUnavailable",
@@ -59,6 +68,7 @@ __all__ = [
     "TokenInvalid",
     "TokenMissing",
     "TooManyPeers",
+    "TooManyRequests",
     "Unavailable",
     "UnknownChannel",
     "WrongChannel",
@@ -119,7 +129,27 @@ class BodyTooLarge(RequestError):
     pass
 
 
-class IceRestartUnsupported(RequestError):
+class BodyTooSlow(RequestError):
+    pass
+
+
+class HostRefused(RequestError):
+    pass
+
+
+class NotConnected(RequestError):
+    pass
+
+
+class PreconditionFailed(RequestError):
+    pass
+
+
+class PreconditionRequired(RequestError):
+    pass
+
+
+class TooManyRequests(RequestError):
     pass
 
 
@@ -208,7 +238,12 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     NotFound: HttpError(404, "not_found"),
     BodyTooLarge: HttpError(413, "too_large"),
     WrongMediaType: HttpError(415, "wrong_media_type"),
-    IceRestartUnsupported: HttpError(422, "ice_restart_unsupported"),
+    BodyTooSlow: HttpError(408, "too_slow", {"Connection": "close"}),
+    NotConnected: HttpError(409, "not_connected"),
+    PreconditionFailed: HttpError(412, "precondition_failed"),
+    HostRefused: HttpError(421, "host_refused"),
+    PreconditionRequired: HttpError(428, "precondition_required"),
+    TooManyRequests: HttpError(429, "too_many_requests", {"Retry-After": "2"}),
     LinkDown: HttpError(503, "link_down", {"Retry-After": "1"}),
     RobotUnreachable: HttpError(503, "robot_unreachable", {"Retry-After": "1"}),
     SceneUnavailable: HttpError(503, "scene_unavailable", {"Retry-After": "5"}),

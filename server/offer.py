@@ -1,16 +1,28 @@
 """Checks a WHEP offer before anything is built on it, and takes out what aiortc should not see. No I/O."""
 
+import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from aiortc import sdp
 
-from server.errors import BadSdp, BadSdpFragment, IceRestartUnsupported
+from server.errors import BadSdp, BadSdpFragment
 
-__all__ = ["MAX_CANDIDATES", "MAX_SECTIONS", "FragmentCandidate", "parse_fragment", "prepare_offer"]
+__all__ = [
+    "MAX_CANDIDATES",
+    "MAX_SECTIONS",
+    "Fragment",
+    "FragmentCandidate",
+    "format_fragment",
+    "parse_fragment",
+    "prepare_offer",
+]
 
 MAX_SECTIONS = 40  # media sections
 MAX_CANDIDATES = 100
 DEFAULT_MESSAGE_SIZE = "a=max-message-size:65536"
+ICE_USERNAME = re.compile(r"[A-Za-z0-9+/]{4,256}")
+ICE_PASSWORD = re.compile(r"[A-Za-z0-9+/]{22,256}")
 
 
 def prepare_offer(text: str) -> str:
@@ -84,30 +96,54 @@ class FragmentCandidate(NamedTuple):
     line: str  # "candidate:..." without the "a="
 
 
-def parse_fragment(text: str, username: str, first_mid: str) -> list[FragmentCandidate]:
-    """The candidates in an application/trickle-ice-sdpfrag (RFC 8840 9).
+class Fragment(NamedTuple):
+    """What an application/trickle-ice-sdpfrag says (RFC 8840 9)."""
+
+    username: str  # ice-ufrag; "" when it names none
+    password: str  # ice-pwd; "" likewise
+    candidates: list[FragmentCandidate]
+
+
+def parse_fragment(text: str, first_mid: str) -> Fragment:
+    """The credentials and candidates in `text`.
 
     Its a=end-of-candidates is not passed on: the peer may still be reached from an address that only its checks show.
+    mDNS candidates are left out for the reason that `prepare_offer` gives.
 
     Args:
-        username: the ice-ufrag of the peer's offer
         first_mid: for lines before the first media section; with BUNDLE all candidates are for it
 
     Raises:
-        IceRestartUnsupported: the fragment brings another ice-ufrag.
         BadSdpFragment: not a fragment.
     """
+    username = password = ""
     candidates: list[FragmentCandidate] = []
     mid = first_mid
     for line in text.splitlines():
         if line.startswith("a=mid:"):
             mid = line[6:].strip()
-        elif line.startswith("a=ice-ufrag:") and line[12:].strip() != username:
-            raise IceRestartUnsupported("ICE restart is not supported: DELETE this resource and POST a new offer")
+        elif line.startswith("a=ice-ufrag:"):
+            username = _ice_chars(line[12:].strip(), ICE_USERNAME, username)
+        elif line.startswith("a=ice-pwd:"):
+            password = _ice_chars(line[10:].strip(), ICE_PASSWORD, password)
         elif line.startswith("a=candidate:"):
             if len(candidates) == MAX_CANDIDATES:
                 raise BadSdpFragment(f"more than {MAX_CANDIDATES} candidates")
-            candidates.append(FragmentCandidate(mid, line[2:]))
+            if ".local " not in line:
+                candidates.append(FragmentCandidate(mid, line[2:]))
         elif line and line[1:2] != "=":
             raise BadSdpFragment("a line that is not SDP")
-    return candidates
+    return Fragment(username, password, candidates)
+
+
+def _ice_chars(value: str, allowed: re.Pattern[str], before: str) -> str:
+    """RFC 8839 5.4; all sections of a bundle have the same."""
+    if not allowed.fullmatch(value) or before not in ("", value):
+        raise BadSdpFragment("ice-ufrag or ice-pwd is not valid")
+    return value
+
+
+def format_fragment(username: str, password: str, kind: str, mid: str, candidates: Sequence[str]) -> str:
+    """The answer to an ICE restart: our credentials, and all of our candidates ("candidate:...")."""
+    lines = [f"a=ice-ufrag:{username}", f"a=ice-pwd:{password}", f"m={kind} 9 UDP/TLS/RTP/SAVPF 0", f"a=mid:{mid}"]
+    return "\r\n".join([*lines, *(f"a={each}" for each in candidates), "a=end-of-candidates", ""])

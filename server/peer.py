@@ -20,13 +20,15 @@ from robot_bridge.protocol.messages import Stop
 from server.access import Identity
 from server.channel_writer import ChannelWriter
 from server.channels import ChannelName, MessageBudget, channel_name, parse_message
-from server.errors import ChannelError, DuplicateChannel
+from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
+from server.ice_restart_private import IceSession
 
 __all__ = ["Peer", "PeerHost", "PeerLimits", "PeerStreams"]
 
 log = structlog.get_logger(__name__)
 
 CLOSE_TIMEOUT = 5.0  # s; aiortc says goodbye to the remote, which may not answer
+MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
 MAX_NAME = 60
 
 
@@ -69,6 +71,7 @@ class Peer:
         self,
         pc: RTCPeerConnection,
         media: PeerStreams,
+        ice: IceSession,
         identity: Identity,
         host: PeerHost,
         limits: PeerLimits,
@@ -76,6 +79,7 @@ class Peer:
         self.id = secrets.token_hex(4)  # public: the others see it
         self.resource = secrets.token_urlsafe(16)  # secret: the path of the WHEP resource
         self.pc = pc
+        self.ice = ice
         self.identity = identity
         self.name = identity.name
         self.report = Report()  # newest
@@ -86,6 +90,7 @@ class Peer:
         self._loop = asyncio.get_running_loop()
         self._writers: dict[ChannelName, ChannelWriter] = {}
         self._budget = MessageBudget(limits.max_message_rate, self._loop.time())
+        self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
         self._heard_at = self._loop.time()
         self._connected = asyncio.Event()
         self._end = asyncio.Event()
@@ -115,6 +120,13 @@ class Peer:
             self._end.set()
             self._connected.set()
             self._host.peer_ended(self)
+
+    def take_request(self) -> None:
+        """Count a PATCH. Raises TooManyRequests."""
+        try:
+            self._requests.spend(self._loop.time())
+        except Flood as error:
+            raise TooManyRequests(f"more than {MAX_REQUESTS:g} requests a second for one session") from error
 
     def rename(self, name: str) -> None:
         printable = "".join(character for character in name if character.isprintable()).strip()
@@ -173,6 +185,7 @@ class Peer:
         try:
             async with asyncio.timeout(CLOSE_TIMEOUT):
                 await self._media.close()
+                await self.ice.close()
                 await self.pc.close()
         except TimeoutError:
             log.warning("peer did not close in time", peer=self.id)

@@ -5,16 +5,26 @@ import ipaddress
 from typing import Annotated, Literal
 
 import structlog
-from aiortc import RTCPeerConnection, RTCSessionDescription
-from aiortc.sdp import SessionDescription, candidate_from_sdp
+from aiortc import RTCIceCandidate, RTCIceGatherer, RTCPeerConnection, RTCSessionDescription
+from aiortc.sdp import SessionDescription, candidate_from_sdp, candidate_to_sdp
 from fastapi import APIRouter, Depends, Request, Response
 
 from server.access import Identity
 from server.body import read_text
 from server.data_transport_private import tune_data_transport
-from server.errors import BadSdp, BadSdpFragment, ConsoleError, NotFound, RobotUnreachable
+from server.errors import (
+    BadSdp,
+    BadSdpFragment,
+    ConsoleError,
+    NotConnected,
+    NotFound,
+    PreconditionFailed,
+    PreconditionRequired,
+    RobotUnreachable,
+)
+from server.ice_restart_private import IceSession
 from server.media.aiortc_private import create_peer_connection
-from server.offer import parse_fragment, prepare_offer
+from server.offer import FragmentCandidate, format_fragment, parse_fragment, prepare_offer
 from server.peer import Peer
 from server.services import Services, authorized, services
 
@@ -42,30 +52,65 @@ async def create(
     with here.console.peers.place():
         peer, answer = await _negotiate(here, identity, offer, trailer=stamp == "trailer")
         here.console.peers.admit(peer)
-    headers = {"Location": f"/whep/{peer.resource}", "Accept-Patch": FRAGMENT, "Cache-Control": "no-store"}
+    headers = {
+        "Location": f"/whep/{peer.resource}",
+        "Accept-Patch": FRAGMENT,
+        "Cache-Control": "no-store",
+        "ETag": peer.ice.tag,
+    }
     return Response(answer, status_code=201, media_type=SDP, headers=headers)
 
 
 @router.patch("/whep/{resource}")
-async def trickle(resource: str, request: Request, identity: Annotated[Identity, Depends(authorized)]) -> Response:
-    """More candidates (RFC 8840). An ICE restart is refused: a new connection is as quick and always clean."""
+async def patch(resource: str, request: Request, identity: Annotated[Identity, Depends(authorized)]) -> Response:
+    """More candidates (RFC 8840), or an ICE restart, which says `If-Match: *` (RFC 9725 4.3.1, 4.3.3)."""
     here = services(request)
     peer = _own(here, resource, identity)
+    peer.take_request()
+    expected = _precondition(request, peer.ice.tag)
     text = await read_text(request, FRAGMENT, here.settings.max_sdp_bytes)
     first = SessionDescription.parse(peer.pc.remoteDescription.sdp).media[0]
-    candidates = parse_fragment(text, "" if first.ice is None else first.ice.usernameFragment or "", first.rtp.muxId)
-    for each in candidates:
-        if ".local " in each.line:
-            continue  # prepare_offer says why
-        try:
-            candidate = candidate_from_sdp(each.line.removeprefix("candidate:"))
-            ipaddress.ip_address(candidate.ip)
-            candidate.sdpMid = each.mid
-            await peer.pc.addIceCandidate(candidate)
-        except Exception as error:
-            # aiortc's parser has no error of its own.
-            raise BadSdpFragment("a candidate that is not valid") from error
-    return Response(status_code=204)
+    fragment = parse_fragment(text, first.rtp.muxId)
+    candidates = [_candidate(each) for each in fragment.candidates]
+    if fragment.username in ("", peer.ice.username):
+        for candidate in candidates:
+            if not await peer.ice.add_candidate(candidate):
+                raise BadSdpFragment("too many candidates for one session")
+        return Response(status_code=204)
+    if expected != "*" or not fragment.password:
+        raise BadSdpFragment("another ice-ufrag: a restart says If-Match: * and has an ice-pwd")
+    if not peer.ice.connected:
+        raise NotConnected("there is no ICE session that could be restarted")
+    try:
+        async with asyncio.timeout(NEGOTIATION_TIMEOUT):
+            local = await peer.ice.restart(fragment.username, fragment.password, candidates)
+    except TimeoutError as error:
+        raise NotConnected("no candidates were gathered in time") from error
+    lines = [f"candidate:{candidate_to_sdp(each)}" for each in local.candidates]
+    body = format_fragment(local.username, local.password, first.kind, first.rtp.muxId, lines)
+    headers = {"ETag": peer.ice.tag, "Cache-Control": "no-store"}
+    return Response(body, status_code=200, media_type=FRAGMENT, headers=headers)
+
+
+def _precondition(request: Request, tag: str) -> str:
+    """What the request expects of the ICE session: `*` (any), or its tag (RFC 9110 13.1.1)."""
+    expected = request.headers.get("if-match", "").strip()
+    if not expected:
+        raise PreconditionRequired("a PATCH needs If-Match: the ETag of the ICE session, or * to restart it")
+    if expected != "*" and tag not in [each.strip() for each in expected.split(",")]:
+        raise PreconditionFailed("that is not the newest ICE session")
+    return expected
+
+
+def _candidate(each: FragmentCandidate) -> RTCIceCandidate:
+    try:
+        candidate = candidate_from_sdp(each.line.removeprefix("candidate:"))
+        ipaddress.ip_address(candidate.ip)
+    except Exception as error:
+        # aiortc's parser has no error of its own.
+        raise BadSdpFragment("a candidate that is not valid") from error
+    candidate.sdpMid = each.mid
+    return candidate
 
 
 @router.delete("/whep/{resource}")
@@ -92,7 +137,8 @@ async def _negotiate(here: Services, identity: Identity, offer: str, *, trailer:
             media = here.media.attach(pc, offer, priority=identity.role == "operator", trailer=trailer)
             try:
                 # Before the answer: the first events can come while it is still on its way.
-                peer = Peer(pc, media, identity, here.console, here.settings)
+                ice = IceSession(pc, _username(offer), _new_gatherer, here.settings.peer_connect_timeout)
+                peer = Peer(pc, media, ice, identity, here.console, here.settings)
                 await pc.setLocalDescription(await pc.createAnswer())
             except BaseException:
                 await media.close()
@@ -108,6 +154,16 @@ async def _negotiate(here: Services, identity: Identity, offer: str, *, trailer:
         await _discard(pc)
         raise
     return peer, pc.localDescription.sdp
+
+
+def _new_gatherer() -> RTCIceGatherer:
+    return RTCIceGatherer(iceServers=[])
+
+
+def _username(offer: str) -> str:
+    """The peer's ice-ufrag: that of the first section, with which all others are bundled."""
+    first = SessionDescription.parse(offer).media[0].ice
+    return "" if first is None else first.usernameFragment or ""
 
 
 async def _discard(pc: RTCPeerConnection) -> None:

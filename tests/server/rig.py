@@ -80,6 +80,8 @@ class TestPeer:
         self.heard: list[ServerMessage] = []
         self.closed = asyncio.Event()
         self.location = ""
+        self.tag = ""  # of its ICE session
+        self.headers: dict[str, str] = {}  # with its token
         self._news = asyncio.Event()
 
     async def join(self, rig: Rig, headers: dict[str, str], labels: tuple[str, ...]) -> None:
@@ -94,7 +96,7 @@ class TestPeer:
         offer = await self.offer()
         answer = await rig.http.post("/whep", content=offer, headers={**headers, "Content-Type": "application/sdp"})
         assert answer.status_code == 201, answer.text
-        self.location = answer.headers["location"]
+        self.headers, self.location, self.tag = headers, answer.headers["location"], answer.headers["etag"]
         await self.pc.setRemoteDescription(RTCSessionDescription(answer.text, "answer"))
         async with asyncio.timeout(PATIENCE):
             await asyncio.gather(*opened)

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.errors import BadSdp, BadSdpFragment, ConsoleError, IceRestartUnsupported
-from server.offer import MAX_CANDIDATES, MAX_SECTIONS, parse_fragment, prepare_offer
+from server.errors import BadSdp, BadSdpFragment
+from server.offer import MAX_CANDIDATES, MAX_SECTIONS, format_fragment, parse_fragment, prepare_offer
 from tests.server.offers import FINGERPRINT, offer, section
 
 GOOD = offer(section("0"), section("1", "audio"), section("2", "application"))
@@ -84,24 +84,41 @@ def test_no_order_of_lines_raises_anything_else(lines: list[str]) -> None:
         prepare_offer("\r\n".join(lines))
 
 
+PASSWORD = "0123456789abcdef0123456789"
+
+
 def test_a_fragment_gives_its_candidates_with_their_section() -> None:
-    text = f"a=ice-ufrag:abcd\r\na=ice-pwd:x\r\n{HOST}m=audio 9 RTP/AVP 0\r\na=mid:1\r\n{HOST}a=end-of-candidates\r\n"
-    found = parse_fragment(text, "abcd", "0")
-    assert [(each.mid, each.line[:10]) for each in found] == [("0", "candidate:"), ("1", "candidate:")]
+    text = f"a=ice-ufrag:abcd\r\n{HOST}m=audio 9 RTP/AVP 0\r\na=mid:1\r\n{HOST}{LOCAL}a=end-of-candidates\r\n"
+    found = parse_fragment(text, "0")
+    assert (found.username, found.password) == ("abcd", "")
+    assert [(each.mid, each.line[:10]) for each in found.candidates] == [("0", "candidate:"), ("1", "candidate:")]
 
 
-def test_a_fragment_with_another_ufrag_is_an_ice_restart() -> None:
-    with pytest.raises(IceRestartUnsupported):
-        parse_fragment("a=ice-ufrag:other\r\na=ice-pwd:x\r\n", "abcd", "0")
+def test_our_own_fragment_can_be_read_back() -> None:
+    text = format_fragment("abcd", PASSWORD, "video", "1", [HOST.strip().removeprefix("a=")])
+    assert parse_fragment(text, "") == ("abcd", PASSWORD, [("1", HOST.strip().removeprefix("a="))])
+    assert text.endswith("a=end-of-candidates\r\n")
 
 
-@pytest.mark.parametrize("text", ["hello", HOST * (MAX_CANDIDATES + 1)])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hello",
+        HOST * (MAX_CANDIDATES + 1),
+        "a=ice-ufrag:abc",
+        "a=ice-ufrag:" + "x" * 257,
+        "a=ice-ufrag:ab cd",
+        "a=ice-ufrag:abcd\r\na=ice-ufrag:efgh",
+        "a=ice-pwd:short",
+        "a=ice-pwd:",
+    ],
+)
 def test_what_is_no_fragment_is_refused(text: str) -> None:
     with pytest.raises(BadSdpFragment):
-        parse_fragment(text, "abcd", "0")
+        parse_fragment(text, "0")
 
 
 @given(st.text())
 def test_no_fragment_raises_anything_else(text: str) -> None:
-    with contextlib.suppress(ConsoleError):
-        parse_fragment(text, "abcd", "0")
+    with contextlib.suppress(BadSdpFragment):
+        parse_fragment(text, "0")

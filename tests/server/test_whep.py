@@ -8,11 +8,14 @@ from aiortc import RTCConfiguration, RTCPeerConnection
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from robot_bridge.protocol.messages import Ping, Pong
+from server.offer import parse_fragment
 from tests.server.offers import offer, section
 from tests.server.rig import PATIENCE, Rig, TestPeer, running_console, running_rig
 
 SDP = {"Content-Type": "application/sdp"}
 FRAGMENT = {"Content-Type": "application/trickle-ice-sdpfrag"}
+RESTART = "a=ice-ufrag:other\r\na=ice-pwd:0123456789abcdef0123456789\r\n"
 CANDIDATE = "a=candidate:1 1 udp 2130706431 127.0.0.1 5000 typ host\r\n"
 
 
@@ -56,26 +59,79 @@ async def test_who_made_a_peer_can_trickle_to_it_and_end_it() -> None:
     async with running_rig() as rig:
         headers = rig.token("observer")
         answer = await rig.http.post("/whep", content=await _real_offer(), headers={**headers, **SDP})
-        location = answer.headers["location"]
-        patch = await rig.http.patch(location, content=CANDIDATE, headers={**headers, **FRAGMENT})
-        assert patch.status_code == 204
-        local = CANDIDATE.replace("127.0.0.1", "0a1b.local")
-        patch = await rig.http.patch(location, content=local, headers={**headers, **FRAGMENT})
-        assert patch.status_code == 204
-        for content, content_type, status, name in [
-            ("a=ice-ufrag:new\r\n", FRAGMENT, 422, "ice_restart_unsupported"),
-            ("a=candidate:what\r\n", FRAGMENT, 400, "bad_sdp_fragment"),
-            (CANDIDATE.replace("5000", "x"), FRAGMENT, 400, "bad_sdp_fragment"),
-            (CANDIDATE.replace("127.0.0.1", "example"), FRAGMENT, 400, "bad_sdp_fragment"),
-            ("rubbish", FRAGMENT, 400, "bad_sdp_fragment"),
-            (CANDIDATE, SDP, 415, "wrong_media_type"),
+        location, tag = answer.headers["location"], {"If-Match": answer.headers["etag"]}
+        for content, more, status, name in [
+            (CANDIDATE, {**FRAGMENT, **tag}, 204, ""),
+            (CANDIDATE.replace("127.0.0.1", "0a1b.local"), {**FRAGMENT, **tag}, 204, ""),
+            (CANDIDATE, {**FRAGMENT, "If-Match": f'"other", {tag["If-Match"]}'}, 204, ""),
+            (CANDIDATE, FRAGMENT, 428, "precondition_required"),
+            (CANDIDATE, {**FRAGMENT, "If-Match": '"other"'}, 412, "precondition_failed"),
+            (RESTART, {**FRAGMENT, **tag}, 400, "bad_sdp_fragment"),
+            ("a=ice-ufrag:other\r\n", {**FRAGMENT, "If-Match": "*"}, 400, "bad_sdp_fragment"),
+            (RESTART, {**FRAGMENT, "If-Match": "*"}, 409, "not_connected"),
+            ("a=candidate:what\r\n", {**FRAGMENT, **tag}, 400, "bad_sdp_fragment"),
         ]:
-            patch = await rig.http.patch(location, content=content, headers={**headers, **content_type})
-            assert (patch.status_code, patch.json()["error"]) == (status, name), content
+            patch = await rig.http.patch(location, content=content, headers={**headers, **more})
+            assert (patch.status_code, patch.json()["error"] if name else "") == (status, name), content
         assert (await rig.http.delete(location, headers=headers)).status_code == 200
         await _until_no_peers(rig)
         assert (await rig.http.delete(location, headers=headers)).status_code == 404
         assert rig.count("lockstep_peers_ended_total", why="deleted") == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "content_type", "status", "name"),
+    [
+        (CANDIDATE.replace("5000", "x"), FRAGMENT, 400, "bad_sdp_fragment"),
+        (CANDIDATE.replace("127.0.0.1", "example"), FRAGMENT, 400, "bad_sdp_fragment"),
+        ("rubbish", FRAGMENT, 400, "bad_sdp_fragment"),
+        (CANDIDATE, SDP, 415, "wrong_media_type"),
+    ],
+)
+async def test_what_is_no_fragment_is_refused_by_name(
+    content: str, content_type: dict[str, str], status: int, name: str
+) -> None:
+    async with running_rig() as rig:
+        headers = rig.token("observer")
+        answer = await rig.http.post("/whep", content=await _real_offer(), headers={**headers, **SDP})
+        headers |= {**content_type, "If-Match": answer.headers["etag"]}
+        patch = await rig.http.patch(answer.headers["location"], content=content, headers=headers)
+        assert (patch.status_code, patch.json()["error"]) == (status, name)
+
+
+async def test_no_more_requests_and_candidates_than_a_session_needs_are_taken() -> None:
+    async with running_rig() as rig:
+        headers = rig.token("observer")
+        answer = await rig.http.post("/whep", content=await _real_offer(), headers={**headers, **SDP})
+        headers |= {**FRAGMENT, "If-Match": answer.headers["etag"]}
+        many = "".join(CANDIDATE.replace("5000", str(5000 + each)) for each in range(60))
+        answers = [await rig.http.patch(answer.headers["location"], content=many, headers=headers) for _ in range(15)]
+        assert answers[0].status_code == 204
+        assert answers[1].json() == {"error": "bad_sdp_fragment", "detail": "too many candidates for one session"}
+        assert answers[14].status_code == 429
+        assert answers[14].json()["error"] == "too_many_requests"
+        assert answers[14].headers["retry-after"] == "2"
+
+
+async def test_an_ice_restart_is_answered_with_new_credentials_and_a_new_tag() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        headers = {**peer.headers, **FRAGMENT, "If-Match": "*"}
+        answer = await rig.http.patch(peer.location, content=RESTART, headers=headers)
+        assert answer.status_code == 200
+        assert answer.headers["content-type"].startswith("application/trickle-ice-sdpfrag")
+        fragment = parse_fragment(answer.text, "")
+        assert fragment.username not in peer.pc.remoteDescription.sdp
+        assert len(fragment.password) >= 22
+        assert fragment.candidates
+        old = await rig.http.patch(peer.location, content=CANDIDATE, headers={**headers, "If-Match": peer.tag})
+        assert old.json()["error"] == "precondition_failed"
+        tag = {"If-Match": answer.headers["etag"]}
+        more = await rig.http.patch(peer.location, content="a=ice-ufrag:other\r\n" + CANDIDATE, headers=headers | tag)
+        assert more.status_code == 204
+        again = await rig.http.patch(peer.location, content=RESTART.replace("other", "third"), headers=headers)
+        assert again.status_code == 200, "a restart under way is given up for a newer one"
+        peer.send("control", Ping(id=7))
+        await peer.until(lambda each: each == Pong(id=7))
 
 
 @pytest.mark.parametrize(

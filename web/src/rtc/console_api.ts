@@ -15,6 +15,7 @@ export class ConsoleError extends Error {
 export interface WhepAnswer {
   readonly sdp: string;
   readonly location: string; // of the session, to end it
+  readonly tag: string; // entity tag of its ICE session
 }
 
 /** The console's HTTP interface (docs/console-api.md), for the holder of one token. */
@@ -32,12 +33,13 @@ export class ConsoleApi {
   async offer(sdp: string, trailer: boolean, signal: AbortSignal): Promise<WhepAnswer> {
     const path = trailer ? "/whep?stamp=trailer" : "/whep";
     const response = await this.fetch("POST", path, { "Content-Type": "application/sdp" }, sdp, signal);
-    return { sdp: await response.text(), location: response.headers.get("Location") ?? "" };
+    const { headers } = response;
+    return { sdp: await response.text(), location: headers.get("Location") ?? "", tag: headers.get("ETag") ?? "" };
   }
 
   /** Candidates found after the offer was sent. */
-  async trickle(location: string, fragment: string): Promise<void> {
-    const headers = { "Content-Type": "application/trickle-ice-sdpfrag" };
+  async trickle(location: string, tag: string, fragment: string): Promise<void> {
+    const headers = { "Content-Type": "application/trickle-ice-sdpfrag", "If-Match": tag };
     await this.fetch("PATCH", location, headers, fragment, undefined);
   }
 

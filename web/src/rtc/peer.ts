@@ -29,6 +29,7 @@ export class Peer {
   private readonly channels: Record<ChannelName, RTCDataChannel>;
   private readonly abort = new AbortController();
   private location = "";
+  private tag = "";
   private timer: ReturnType<typeof setTimeout> | undefined;
   private isOver = false;
 
@@ -59,6 +60,7 @@ export class Peer {
     const offer = this.connection.localDescription?.sdp ?? "";
     const answer = await this.api.offer(offer, trailer, signal);
     this.location = answer.location;
+    this.tag = answer.tag;
     if (this.isOver) throw new ConsoleError(0, "closed", "closed while connecting", null);
     await this.connection.setRemoteDescription({ type: "answer", sdp: answer.sdp });
     if (this.connection.iceGatheringState === "complete") this.sendCandidates();
@@ -142,7 +144,7 @@ export class Peer {
     );
     const fragment = [...head, ...new Set(candidates), "a=end-of-candidates", ""].join("\r\n");
     // Only a help: without them the connection is still found.
-    this.api.trickle(this.location, fragment).catch(() => undefined);
+    this.api.trickle(this.location, this.tag, fragment).catch(() => undefined);
   }
 
   private finish(why: string | null): void {

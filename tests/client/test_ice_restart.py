@@ -1,0 +1,170 @@
+"""A new path under a connection that lives on, between a real console and the headless client."""
+
+import asyncio
+import re
+import socket
+
+import pytest
+from aiortc import RTCIceGatherer
+
+from client import Console
+from client.aiortc_private import transport_of
+from client.errors import ConnectFailed, SignallingRefused
+from client.ice_restart_private import MONITOR, IceRestart
+from tests.server.rig import PATIENCE, Rig, running_rig
+
+CANDIDATE = re.compile(r"^a=candidate:(\S+ \d+ \S+ \d+) (\S+) (\d+) typ host", re.MULTILINE)
+
+
+class Paths:
+    """A `Route` that sends every ICE session through a forwarder of its own, so that the older ones can be cut."""
+
+    def __init__(self) -> None:
+        self.forwarders: list[Forwarder] = []
+
+    def offer(self, sdp: str) -> str:
+        """Without candidates: the console is to answer only to where checks come from."""
+        kept = [line for line in sdp.splitlines() if not line.startswith(("a=candidate:", "a=end-of-candidates"))]
+        return "\r\n".join(kept) + "\r\n"
+
+    def answer(self, sdp: str) -> str:
+        found = CANDIDATE.search(sdp)
+        assert found is not None, sdp
+        forwarder = Forwarder((found[2], int(found[3])))
+        self.forwarders.append(forwarder)
+        return CANDIDATE.sub(rf"a=candidate:\1 127.0.0.1 {forwarder.port} typ host", sdp)
+
+    def close(self) -> None:
+        for forwarder in self.forwarders:
+            forwarder.cut()
+
+
+class Forwarder:
+    """Passes datagrams between whoever writes to `port` and the console, until it is cut."""
+
+    def __init__(self, console: tuple[str, int]) -> None:
+        self.passed = 0
+        self._here, self._there = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        self._client: tuple[str, int] | None = None
+        self._console = console
+        self._loop = asyncio.get_running_loop()
+        for each in (self._here, self._there):
+            each.bind(("127.0.0.1", 0))
+            each.setblocking(False)
+        self.port: int = self._here.getsockname()[1]
+        self._loop.add_reader(self._here, self._from_client)
+        self._loop.add_reader(self._there, self._from_console)
+
+    def _from_client(self) -> None:
+        data, self._client = self._here.recvfrom(2048)
+        self.passed += 1
+        self._there.sendto(data, self._console)
+
+    def _from_console(self) -> None:
+        data = self._there.recv(2048)
+        if self._client is not None:
+            self._here.sendto(data, self._client)
+
+    def cut(self) -> None:
+        """Idempotent."""
+        if self._here.fileno() < 0:
+            return
+        for each in (self._here, self._there):
+            self._loop.remove_reader(each)
+            each.close()
+
+
+def _link(rig: Rig) -> str:
+    return f"{rig.url}/#token={rig.access.issue('operator', 'operator')}"
+
+
+async def test_after_the_path_is_cut_a_restart_brings_commands_and_pictures_back_on_the_same_connection() -> None:
+    paths = Paths()
+    async with running_rig(ice_hosts="127.0.0.1") as rig:
+        try:
+            async with Console(_link(rig), route=paths) as console:
+                await console.take_seat()
+                values = [0.1] * len(console.description.axes)
+                before = await console.drive(values)
+                peer = console.peer
+                paths.forwarders[0].cut()
+                waiting = asyncio.create_task(console.drive(values))
+                await console.restart_ice()
+                async with asyncio.timeout(PATIENCE):
+                    after = await waiting
+                    async for picture in console.pictures():
+                        if picture.stamp is not None and picture.stamp >= after.event:
+                            break
+                assert after.event > before.event, "events go on where they were"
+                assert console.peer == peer
+                assert console.seat.holder == peer, "and nobody else could drive meanwhile"
+                assert len(rig.services.console.peers) == 1
+                await console.rest()
+                assert paths.forwarders[1].passed > 10
+        finally:
+            paths.close()
+    assert rig.count("lockstep_rests_total", why="disconnected") == 0
+
+
+async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was() -> None:
+    class Nowhere(Paths):
+        def answer(self, sdp: str) -> str:
+            sent = super().answer(sdp)
+            if len(self.forwarders) > 1:
+                self.forwarders[1].cut()
+            return sent
+
+    paths = Nowhere()
+    async with running_rig(ice_hosts="127.0.0.1", peer_connect_timeout=2.0) as rig:
+        try:
+            async with Console(_link(rig), route=paths, connect_seconds=3.0) as console:
+                await console.take_seat()
+                with pytest.raises(ConnectFailed):
+                    await console.restart_ice()
+                feedback = await console.drive([0.0] * len(console.description.axes))
+                assert feedback.event > 1
+        finally:
+            paths.close()
+
+
+async def test_the_path_can_be_changed_again_and_again_without_a_repeat() -> None:
+    async with running_rig(ice_hosts="127.0.0.1") as rig, Console(_link(rig), video=False, audio=False) as console:
+        await console.take_seat()
+        values = [0.1] * len(console.description.axes)
+        first = await console.drive(values)
+        for _ in range(3):
+            await console.restart_ice()
+            for _ in range(5):
+                last = await console.drive(values)
+        assert last.event == first.event + 15
+
+
+async def test_a_session_that_has_ended_is_not_restarted() -> None:
+    async with running_rig() as rig, Console(_link(rig), video=False, audio=False) as console:
+        next(iter(rig.services.console.peers)).end("for the test")
+        async with asyncio.timeout(PATIENCE):
+            await rig.services.console.peers.all_gone()
+        with pytest.raises(SignallingRefused, match="not_found"):
+            await console.restart_ice()
+
+
+async def test_the_private_parts_of_aiortc_are_where_they_were() -> None:
+    """When this fails after an upgrade, client/ice_restart_private.py is where to look."""
+    async with running_rig() as rig, Console(_link(rig), video=False, audio=False) as console:
+        pc = console._live()._peer._pc
+        transport = transport_of(pc).transport
+        connection = transport._connection
+        assert getattr(transport, MONITOR) is not None
+        assert transport.iceGatherer._connection is connection
+        assert connection._query_consent_task is not None
+        assert (transport._recv, transport._send) == (connection.recv, connection.send)
+        restart = IceRestart(pc, RTCIceGatherer(iceServers=[]), ["127.0.0.1"])
+        try:
+            await restart.gather()
+            with pytest.raises(ValueError, match="ice-pwd"):
+                await restart.connect("a=ice-ufrag:abcd\r\n")
+            with pytest.raises(ValueError, match="candidate"):
+                await restart.connect("a=ice-ufrag:abcd\r\na=ice-pwd:" + "x" * 22 + "\r\na=candidate:what\r\n")
+        finally:
+            await restart.close()
+        assert pc.connectionState == "connected", "a restart that came to nothing has touched nothing"
