@@ -7,16 +7,17 @@ from dataclasses import dataclass
 
 from client.command_gate import CommandGate, Pacing
 from client.driving import Driver
-from client.errors import CommandRefused, ConnectFailed, ConsoleError, ConsoleLost, SeatRefused, SignallingRefused
+from client.errors import ConnectFailed, ConsoleError, ConsoleLost, SignallingRefused
 from client.link import ConsoleLink
 from client.media_gate import GateMode
 from client.newest_queue import NewestQueue
-from client.peer import ChannelName, Peer, Route
+from client.peer import Peer, Route
 from client.pilot import Pilot
 from client.ping_ledger import PingLedger
 from client.reception import Reception
 from client.render_log import LIMIT, FeedbackArrival
 from client.sdp import Section
+from client.session import Session
 from client.statistics import ConsoleStatistics, EventRate, percentiles
 from robot_bridge.protocol.carriers import Carrier
 from robot_bridge.protocol.console import (
@@ -25,21 +26,19 @@ from robot_bridge.protocol.console import (
     Report,
     RobotState,
     Seat,
-    SeatRelease,
-    SeatRequest,
+    SharedNote,
     StopStateNotice,
     Welcome,
     decode_server_message,
 )
 from robot_bridge.protocol.errors import MessageError
-from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Reset, Stop, StopState
+from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Stop, StopState
 
 __all__ = ["Connection", "ConnectionOptions"]
 
 HEARTBEAT = 0.5  # s between two reports, and between two pings
 EARLY_PINGS = 5  # to know the path before the first command
 EARLY_PING = 0.05  # s between them
-ANSWER_SECONDS = 5.0  # for the console to answer a request
 STOP_SECONDS = 0.3  # for the stop to be confirmed before HTTP is tried as well
 RETRY_SECONDS = 1.0  # while the robot is not reached yet; what the console's Retry-After says
 
@@ -70,25 +69,21 @@ class Connection:
     def __init__(self, options: ConnectionOptions) -> None:
         self.options = options
         self.lost: ConsoleLost | None = None
-        self.seat = Seat()
-        self.stop_state = StopState()
-        self.participants = Participants(participants=[])
         self.malformed = 0  # messages from the console that could not be read
         self.feedback_readers: list[NewestQueue[Feedback]] = []
         self.feedback_log: deque[FeedbackArrival] = deque(maxlen=LIMIT)
         self.media = Reception(options.carrier, options.tolerance, options.gate, self._rendered)
         self._loop = asyncio.get_running_loop()
         self._changed = asyncio.Event()  # a message came, or the connection ended
-        self._welcome: Welcome | None = None
         self._robot: RobotState | None = None
         self._driver: Driver | None = None
         self._early_feedback: Feedback | None = None  # came before the robot's description
-        self._refusals: deque[Refusal] = deque(maxlen=16)  # of requests, not of commands
         self._event_rate = EventRate()
         self._pings = PingLedger()
         self._heard_at = self._loop.time()
         self._running: asyncio.Task[None] | None = None
         self._peer = self._new_peer()
+        self.session = Session(lambda channel, message: self._peer.send(channel, message), self._until)
 
     def _new_peer(self) -> Peer:
         options = self.options
@@ -115,7 +110,7 @@ class Connection:
         self._running = self._loop.create_task(self._run(), name="console connection")
         try:
             async with asyncio.timeout_at(deadline):
-                await self._until(lambda: self._welcome is not None and self._driver is not None)
+                await self._until(lambda: self.session.welcome is not None and self._driver is not None)
         except TimeoutError:
             raise ConnectFailed("connected, but the console said nothing of its robot") from None
         except ConsoleLost as error:
@@ -210,16 +205,12 @@ class Connection:
                 round_trip = self._pings.answered(number, self._heard_at)
                 if round_trip is not None and self._driver is not None:
                     self._driver.pilot.ping_answered(round_trip)
-            case Welcome():
-                self._welcome = message
             case RobotState():
                 self._take_robot(message)
-            case Seat():
-                self.seat = message
             case StopStateNotice():
-                self.stop_state = message.stop
-            case Participants():
-                self.participants = message
+                self.session.stop_state = message.stop
+            case Welcome() | Seat() | Participants() | SharedNote():
+                self.session.hear(message)
         self._wake_waiters()
 
     def _take_feedback(self, feedback: Feedback) -> None:
@@ -228,7 +219,7 @@ class Connection:
             return
         if not self._driver.feedback(feedback):
             return
-        self.stop_state = feedback.stop
+        self.session.stop_state = feedback.stop
         now = self._loop.time()
         self._event_rate.event(feedback.event, now)
         self.feedback_log.append(FeedbackArrival(now, feedback.event))
@@ -238,7 +229,7 @@ class Connection:
 
     def _take_refusal(self, refusal: Refusal) -> None:
         if refusal.event == 0:
-            self._refusals.append(refusal)
+            self.session.refused(refusal)
         if self._driver is not None and (refusal.event or refusal.reason == "link_down"):
             self._driver.refusal(refusal)
 
@@ -251,6 +242,7 @@ class Connection:
         gate = CommandGate(self.options.pacing, self.options.tolerance["video"], 1 / rate)
         pilot = Pilot(gate, [axis.rest for axis in description.axes])
         self._driver = Driver(pilot, lambda message: self._peer.send("control", message))
+        self.session.seated = pilot.seated
         if self._early_feedback is not None:
             self._take_feedback(self._early_feedback)
 
@@ -275,20 +267,16 @@ class Connection:
 
     @property
     def welcome(self) -> Welcome:
-        if self._welcome is None:
+        if self.session.welcome is None:
             raise ConsoleLost("not connected yet")
-        return self._welcome
-
-    @property
-    def holds_seat(self) -> bool:
-        return self._welcome is not None and self.seat.holder == self._welcome.peer
+        return self.session.welcome
 
     def statistics(self) -> ConsoleStatistics:
         now = self._loop.time()
         pilot, delays = self.driver.pilot, self.driver.picture_delay.samples
         delay = percentiles(delays, 1000)
         return ConsoleStatistics(
-            peer=self._welcome.peer if self._welcome is not None else "",
+            peer=self.session.peer,
             epoch=self.robot.epoch,
             event=pilot.newest.event if pilot.newest is not None else 0,
             armed=pilot.armed,
@@ -318,55 +306,24 @@ class Connection:
 
     # What is asked of the console
 
-    async def take_seat(self) -> None:
-        """Raises SeatRefused."""
-        refusal = await self._ask(lambda: self.holds_seat, "session", SeatRequest())
-        if refusal is not None:
-            raise SeatRefused(
-                refusal.reason, refusal.detail or (f"{self.seat.name} holds it" if self.seat.name else "")
-            )
-
     async def restart_ice(self) -> None:
         """Raises SignallingRefused or ConnectFailed."""
         await self._peer.restart_ice(self.options.connect_seconds)
-
-    def release_seat(self) -> None:
-        self._peer.send("session", SeatRelease())
-
-    async def reset(self) -> StopState:
-        """Raises CommandRefused."""
-        refusal = await self._ask(lambda: not self.stop_state.stopped, "stop", Reset(by=self.options.name))
-        if refusal is not None:
-            raise CommandRefused(refusal.reason, refusal.detail)
-        return self.stop_state
-
-    async def _ask(
-        self, granted: Callable[[], bool], channel: ChannelName, message: SeatRequest | Reset
-    ) -> Refusal | None:
-        """Send a request; None when it was granted, else the refusal."""
-        self._refusals.clear()
-        self._peer.send(channel, message)
-        try:
-            async with asyncio.timeout(ANSWER_SECONDS):
-                await self._until(lambda: granted() or bool(self._refusals))
-        except TimeoutError:
-            raise ConsoleLost(f"no answer from the console within {ANSWER_SECONDS:g} s") from None
-        return None if granted() else self._refusals.popleft()
 
     async def stop(self, reason: str) -> StopState:
         """Raises ConsoleLost when neither the data channel nor HTTP reached the console."""
         self._peer.send("stop", Stop(by=self.options.name, reason=reason))
         try:
             async with asyncio.timeout(STOP_SECONDS):
-                await self._until(lambda: self.stop_state.stopped)
+                await self._until(lambda: self.session.stop_state.stopped)
         except (TimeoutError, ConsoleLost):
             await self._stop_by_http(reason)
-        return self.stop_state
+        return self.session.stop_state
 
     async def _stop_by_http(self, reason: str) -> None:
         try:
             await self._peer.stop_by_http(reason)
         except ConsoleError as error:
             raise ConsoleLost(f"the stop was not confirmed: {error}") from error
-        if not self.stop_state.stopped:
-            self.stop_state = StopState(stopped=True, by=self.options.name, reason=reason)
+        if not self.session.stop_state.stopped:
+            self.session.stop_state = StopState(stopped=True, by=self.options.name, reason=reason)

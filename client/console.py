@@ -17,7 +17,7 @@ from client.render_log import FeedbackArrival, Rendering
 from client.statistics import ConsoleStatistics
 from client.stream import Picture, Sound, Stream
 from robot_bridge.protocol.carriers import Carrier
-from robot_bridge.protocol.console import Seat
+from robot_bridge.protocol.console import Participant, Role, Seat, SharedNote
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Feedback, StopState
 
@@ -111,14 +111,14 @@ class Console:
         """Let go of the robot and the seat, then close."""
         connection = self._live()
         try:
-            if connection.holds_seat and connection.lost is None:
+            if connection.session.holds_seat and connection.lost is None:
                 async with asyncio.timeout(LEAVE_SECONDS):
                     await connection.driver.rest()
         except (ConsoleError, TimeoutError):
             pass  # the robot comes to rest by itself when its operator is gone
         finally:
-            if connection.holds_seat:
-                connection.release_seat()
+            if connection.session.holds_seat:
+                connection.session.release_seat()
             await connection.close()
 
     # What is known
@@ -146,12 +146,27 @@ class Console:
     @property
     def seat(self) -> Seat:
         """Who may drive."""
-        return self._live().seat
+        return self._live().session.seat
 
     @property
     def peer(self) -> str:
         """This connection's id, as in `seat.holder`."""
         return self._live().welcome.peer
+
+    @property
+    def role(self) -> Role:
+        """What this link permits."""
+        return self._live().welcome.role
+
+    @property
+    def participants(self) -> list[Participant]:
+        """Everyone who is connected, this connection included."""
+        return list(self._live().session.participants.participants)
+
+    @property
+    def notes(self) -> list[SharedNote]:
+        """What was written to everyone, oldest first; the last hundred."""
+        return list(self._live().session.notes)
 
     def stats(self) -> ConsoleStatistics:
         """Figures since the connection began."""
@@ -180,16 +195,34 @@ class Console:
     # Driving
 
     async def take_seat(self) -> None:
-        """Take the control seat.
+        """Take the control seat: an operator when it is free, a supervisor from whoever holds it.
 
         Raises:
             SeatRefused: somebody else holds it, or this link is an observer's.
         """
-        await self._live().take_seat()
+        await self._live().session.take_seat()
+
+    async def request_seat(self, seconds: float = 65.0) -> None:
+        """Ask whoever holds the control seat for it; returns when it is granted, or at once when it is free.
+
+        `seconds` covers the 60 s after which the console counts no answer as no. Cancelled, the request is withdrawn.
+
+        Raises:
+            SeatRefused: the holder declined, nobody answered, or this link is an observer's.
+        """
+        await self._live().session.request_seat(seconds)
+
+    def grant(self, peer: str) -> None:
+        """Hand the control seat to a peer that asked for it: one of `seat.claims`."""
+        self._live().session.answer(peer, grant=True)
+
+    def decline(self, peer: str) -> None:
+        """Refuse a peer that asked for the control seat."""
+        self._live().session.answer(peer, grant=False)
 
     def release_seat(self) -> None:
-        """Give the control seat back."""
-        self._live().release_seat()
+        """Give the control seat back, or take a request for it back."""
+        self._live().session.release_seat()
 
     async def drive(self, values: Mapping[str, float] | Sequence[float]) -> Feedback:
         """Send one command as soon as the gate is open; the feedback that answers it.
@@ -241,7 +274,16 @@ class Console:
         Raises:
             CommandRefused: this link's role does not permit it.
         """
-        return await self._live().reset()
+        connection = self._live()
+        return await connection.session.reset(connection.options.name)
+
+    async def note(self, text: str) -> SharedNote:
+        """Write a note to everyone; it keeps the event reference of that moment.
+
+        Raises:
+            CommandRefused: too many notes, or nothing in it can be printed.
+        """
+        return await self._live().session.note(text)
 
     # Watching
 

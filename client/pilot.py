@@ -6,6 +6,7 @@ and hand out what `outcomes` returns.
 - One command is in flight; its repeats carry the newest intention under the same event number, and answer the newest
   issue of its feedback.
 - Armed and without a new intention for `IDLE`, it sends neutral values at that interval.
+- New in the control seat, the first command is neutral: the console refuses a moving one.
 - While the path loses packets every command is sent twice, `ECHO` apart: the copy covers the loss of the command,
   and, being answered from the stored feedback, the loss of the answer too. On a clean path nothing is doubled.
 """
@@ -26,7 +27,7 @@ __all__ = ["Outcome", "Pilot"]
 IDLE = 0.2  # s; 5 Hz
 ECHO = 0.020  # s; longer than the console's own path to the robot and back
 LOSSY_SPELL = 60.0  # s to go on doubling after the last loss that was seen
-PATIENT_REASONS = {"late", "out_of_order", "rested"}  # another try, on fresh feedback, can succeed
+PATIENT_REASONS = {"late", "out_of_order", "rested", "not_neutral"}  # another try, on fresh feedback, can succeed
 NEEDLESS = 0.25  # an answer that follows the last repeat within this part of the whole wait answers an earlier sending
 FEW_SAMPLES = 8
 NEVER = float("inf")
@@ -83,6 +84,7 @@ class Pilot:
         self._flight: _Flight | None = None
         self._lossy_until = float("-inf")
         self._void: int | None = None  # an event that only neutral values may use
+        self._unproven = False  # this console has the seat and no neutral command of it was answered yet
         self._used_up: tuple[int, int] | None = None  # a feedback that can no longer be answered
         self._moved = False  # values were sent since the robot was last proven to be at rest
         self._rest: RestCall | None = None
@@ -104,6 +106,10 @@ class Pilot:
             self._moved = False
         return True
 
+    def seated(self) -> None:
+        """This console holds the control seat from now on."""
+        self._unproven = True
+
     def refusal(self, refusal: Refusal) -> None:
         """Take a refusal. Those that fresh feedback can cure lead to another try, the others to an outcome."""
         flight = self._flight
@@ -112,6 +118,8 @@ class Pilot:
         self._flight = None
         if refusal.reason == "rested":
             self._void = flight.command.event
+        elif refusal.reason == "not_neutral":
+            self._unproven = True
         elif refusal.reason in PATIENT_REASONS and self.newest is not None:
             self._used_up = (self.newest.event, flight.issue)
         if refusal.reason not in PATIENT_REASONS:
@@ -207,7 +215,7 @@ class Pilot:
 
     def _next(self, now: float) -> Command:
         event, issue = self.gate.next()
-        want = _Want.NEUTRAL if event == self._void else self._want
+        want = _Want.NEUTRAL if self._only_neutral(event) else self._want
         command = Command(event=event, issue=issue, values=self._values_for(want))
         flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now)
         flight.repeat_at = now + self._wait(1)
@@ -237,13 +245,16 @@ class Pilot:
             self.echoes += 1
         flight.echo_at = NEVER
         flight.issue = self.gate.next().issue
-        want = _Want.NEUTRAL if flight.command.event == self._void else _Want.VALUES
+        want = _Want.NEUTRAL if self._only_neutral(flight.command.event) else _Want.VALUES
         return [Command(event=flight.command.event, issue=flight.issue, values=self._values_for(want))]
 
     def _wait(self, sends: int) -> float:
         """A ping does not reach the robot: until its share is known, pings may lengthen the wait but not shorten it."""
         least = INITIAL if len(self.samples) < FEW_SAMPLES else 0.0
         return max(least, self.timer.wait(sends))
+
+    def _only_neutral(self, event: int) -> bool:
+        return self._unproven or event == self._void
 
     def _values_for(self, want: _Want) -> list[float]:
         return self._values if want is _Want.VALUES else self._neutral
@@ -252,6 +263,7 @@ class Pilot:
 
     def _landed(self, flight: _Flight, feedback: Feedback, now: float) -> None:
         self._flight = None
+        self._unproven = False  # whatever it carried, the console let it pass
         taken = now - flight.first_sent_at
         self.samples.append(taken)
         if flight.sends == 1 or now - flight.last_sent_at < NEEDLESS * taken:

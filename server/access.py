@@ -1,20 +1,22 @@
-"""Access tokens: signed (JWT, HS256, RFC 7519), with a role and a name."""
+"""Access tokens: signed (JWT, HS256, RFC 7519), with a role, a name, an id and an end."""
 
 import secrets
 import time
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Annotated, Literal, NamedTuple, TypeVar
 
 import jwt
+import msgspec
 
 from robot_bridge.protocol.console import Role
-from server.errors import NotAllowed, TokenInvalid, TokenMissing
+from server.audit import Actor
+from server.errors import LinkExpired, LinkRevoked, NotAllowed, TokenInvalid, TokenMissing
 
 __all__ = ["Access", "Identity", "require_role"]
 
 ALGORITHM = "HS256"
-AUDIENCE = "lockstep"
-SCENE_AUDIENCE = "lockstep-scene"
 MAX_TOKEN = 2048  # characters; ours have about 200
+INVALID = "the token is not valid"
 
 
 class Identity(NamedTuple):
@@ -23,71 +25,122 @@ class Identity(NamedTuple):
     role: Role
     name: str
     token_id: str
+    expires: float  # s since 1970
+
+    @property
+    def actor(self) -> Actor:
+        """For the audit."""
+        return Actor(self.name, self.role, "", self.token_id)
+
+
+class _LinkClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    aud: Literal["lockstep"]
+    exp: float
+    iat: float
+    role: Role
+    name: Annotated[str, msgspec.Meta(max_length=60)]
+    jti: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+
+
+class _TicketClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    aud: Literal["lockstep-scene"]
+    exp: float
+    link: Annotated[str, msgspec.Meta(max_length=64)]  # id of the link it was made for; it ends with it
+
+
+Claims = TypeVar("Claims", _LinkClaims, _TicketClaims)
+
+
+def _nothing_revoked(token_id: str) -> bool:
+    return False
 
 
 class Access:
-    """Issues and checks tokens. A refused token is never told why: all refusals are the same."""
+    """Issues and checks tokens. Who brings one that we did not sign is never told what is wrong with it.
 
-    def __init__(self, secret: str, token_seconds: float, ticket_seconds: float) -> None:
+    Args:
+        is_revoked: by the id of a token
+    """
+
+    def __init__(
+        self,
+        secret: str,
+        token_seconds: float,
+        ticket_seconds: float,
+        is_revoked: Callable[[str], bool] = _nothing_revoked,
+    ) -> None:
         self._secret = secret
         self._token_seconds = token_seconds
         self._ticket_seconds = ticket_seconds
+        self._is_revoked = is_revoked
 
     def issue(self, role: Role, name: str) -> str:
-        return self._sign({"role": role, "name": name, "jti": secrets.token_hex(8)}, AUDIENCE, self._token_seconds)
+        """A token with a new id, for as long as the settings say."""
+        now = time.time()
+        return self.sign(Identity(role, name, secrets.token_hex(8), now + self._token_seconds), now)
+
+    def sign(self, identity: Identity, issued: float) -> str:
+        """The token that stands for `identity`; the same one whenever the arguments are."""
+        role, name, token_id, expires = identity
+        return self._encode(_LinkClaims("lockstep", expires, issued, role, name, token_id))
 
     def verify(self, token: str) -> Identity:
         """Whom `token` stands for.
 
         Raises:
-            TokenInvalid: not a token of this console, or expired.
+            TokenInvalid: not a token of this console.
+            LinkExpired, LinkRevoked: it was one.
         """
-        claims = self._claims(token, AUDIENCE, ["role", "name", "jti"])
-        role, name, token_id = claims["role"], claims["name"], claims["jti"]
-        if (role != "operator" and role != "observer") or not isinstance(name, str) or not isinstance(token_id, str):
-            raise TokenInvalid("the token is not valid")
-        return Identity(role, name[:60], token_id)
+        claims = self._decode(token, _LinkClaims)
+        self._check(claims.jti, claims.exp)
+        return Identity(claims.role, claims.name, claims.jti, claims.exp)
 
     def bearer(self, authorization: str | None) -> Identity:
         """Whom an Authorization header stands for (RFC 6750 2.1).
 
         Raises:
             TokenMissing: there is no bearer token.
-            TokenInvalid: the token is not valid.
+            AccessError: as `verify`.
         """
         scheme, _, token = (authorization or "").partition(" ")
         if scheme.lower() != "bearer" or not token.strip():
             raise TokenMissing("send the token as: Authorization: Bearer TOKEN")
         return self.verify(token.strip())
 
-    def issue_ticket(self) -> str:
-        """A short-lived permission to watch the 3D scene. It may stand in a path: it opens nothing else."""
-        return self._sign({}, SCENE_AUDIENCE, self._ticket_seconds)
+    def issue_ticket(self, token_id: str = "") -> str:
+        """A short-lived permission to watch the 3D scene, for the holder of the link `token_id`.
 
-    def verify_ticket(self, ticket: str) -> None:
-        """Raises TokenInvalid as `verify` does."""
-        self._claims(ticket, SCENE_AUDIENCE, [])
+        It may stand in a path: it opens nothing else.
+        """
+        return self._encode(_TicketClaims("lockstep-scene", time.time() + self._ticket_seconds, token_id))
 
-    def _sign(self, claims: dict[str, str], audience: str, seconds: float) -> str:
-        return jwt.encode({**claims, "aud": audience, "exp": time.time() + seconds}, self._secret, ALGORITHM)
+    def verify_ticket(self, ticket: str) -> str:
+        """The id of the link it was made for; raises as `verify` does."""
+        claims = self._decode(ticket, _TicketClaims)
+        self._check(claims.link, claims.exp)
+        return claims.link
 
-    def _claims(self, token: str, audience: str, required: list[str]) -> dict[str, object]:
+    def _check(self, token_id: str, expires: float) -> None:
+        if not expires > time.time():  # also when it is not a number
+            raise LinkExpired("this link has expired; ask for a new one")
+        if self._is_revoked(token_id):
+            raise LinkRevoked("this link was revoked")
+
+    def _encode(self, claims: _LinkClaims | _TicketClaims) -> str:
+        return jwt.encode(msgspec.structs.asdict(claims), self._secret, ALGORITHM)
+
+    def _decode(self, token: str, kind: type[Claims]) -> Claims:
+        """The claims, strictly: exactly these, of these types. PyJWT only checks the signature."""
         try:
             if len(token) > MAX_TOKEN:
-                raise TokenInvalid("the token is not valid")
-            claims: dict[str, object] = jwt.decode(
-                token,
-                self._secret,
-                algorithms=[ALGORITHM],
-                audience=audience,
-                options={"require": ["exp", "aud", *required]},
-            )
-        except (jwt.InvalidTokenError, UnicodeError, RecursionError) as error:
-            raise TokenInvalid("the token is not valid") from error
-        return claims
+                raise TokenInvalid(INVALID)
+            payload = jwt.api_jws.decode(token, self._secret, algorithms=[ALGORITHM])
+            return msgspec.json.decode(payload, type=kind)
+        except (jwt.InvalidTokenError, msgspec.DecodeError, UnicodeError, RecursionError) as error:
+            raise TokenInvalid(INVALID) from error
 
 
-def require_role(identity: Identity, role: Role) -> None:
-    """Raises NotAllowed unless `identity` has `role`."""
-    if identity.role != role:
-        raise NotAllowed(f"only the {role} may do this")
+def require_role(identity: Identity, *roles: Role) -> None:
+    """Raises NotAllowed unless `identity` has one of `roles`."""
+    if identity.role not in roles:
+        raise NotAllowed(f"only the {' or the '.join(roles)} may do this")

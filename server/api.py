@@ -76,7 +76,7 @@ async def session(request: Request, caller: Caller) -> Response:
             event=console.clock.event,
             stopped=console.clock.stop.stopped,
             stop=console.clock.stop,
-            seat=console.seat.seat,
+            seat=console.seat.message(),
             participants=console.peers.participants().participants,
             link=LinkInfo(up=console.robot.up, detail=console.robot.detail),
             you={"role": caller.role, "name": caller.name},
@@ -92,16 +92,16 @@ async def stop(request: Request, caller: Caller) -> Response:
     """Anyone with a token."""
     console = services(request).console
     wanted = await read_json(request, StopRequest)
-    if not console.stop(caller.name, "http", wanted.reason):
+    if not console.stop(caller.actor, "http", wanted.reason):
         raise LinkDown("the robot cannot be told now; the stop is kept and sent first when the link is back")
     return _json(Delivered(True, console.clock.event))
 
 
 @router.post("/api/reset")
 async def reset(request: Request, caller: Caller) -> Response:
-    require_role(caller, "operator")
+    require_role(caller, "operator", "supervisor")
     console = services(request).console
-    console.reset(caller.name, "http")
+    console.reset(caller.actor, "http")
     return _json(Delivered(True, console.clock.event))
 
 
@@ -111,7 +111,7 @@ async def scene(request: Request, caller: Caller) -> Response:
     here = services(request)
     here.scene_or_error()
     base = str(request.base_url).replace("http", "ws", 1)
-    ticket = here.access.issue_ticket()
+    ticket = here.access.issue_ticket(caller.token_id)
     return _json(ScenePath(f"/scene/?websocket={base}scene/ws/{ticket}&darkMode&hideViserLogo"))
 
 

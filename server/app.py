@@ -14,6 +14,7 @@ from starlette.requests import HTTPConnection
 
 from server import api, scene_proxy, whep
 from server.access import Access
+from server.audit_tail import AuditTail
 from server.console import Console
 from server.errors import ConsoleError, http_error
 from server.media.aiortc_private import own_addresses, restrict_ice_hosts
@@ -41,7 +42,7 @@ def create_app(settings: Settings, access: Access | None = None) -> FastAPI:
         metrics = Metrics()
         media = MediaPlane(settings.media, metrics.registry)
         scene = await _start_scene(settings, metrics)
-        console = Console(settings, metrics, media, scene)
+        console = Console(settings, metrics, media, scene, AuditTail())
         app.state.services = Services(settings, access or make_access(settings), metrics, console, media, scene)
         try:
             async with asyncio.TaskGroup() as tasks:

@@ -4,10 +4,14 @@ from typing import Literal
 
 from robot_bridge.protocol.console import (
     ClientMessage,
+    Note,
     Rename,
     Report,
+    SeatDecline,
+    SeatGrant,
     SeatRelease,
     SeatRequest,
+    SeatTake,
     decode_client_message,
 )
 from robot_bridge.protocol.errors import MessageError
@@ -20,7 +24,7 @@ ChannelName = Literal["control", "session", "stop"]
 
 CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
     "control": (Command, Rest, Report, Ping, Stop),  # a stop is never turned away for the channel it took
-    "session": (SeatRequest, SeatRelease, Rename, Stop),
+    "session": (SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, Rename, Note, Stop),
     "stop": (Stop, Reset),
 }
 

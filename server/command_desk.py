@@ -13,10 +13,14 @@ What happens to a command, in this order:
 | not one value per axis | refused `wrong_size` |
 | a value is NaN or infinite | refused `not_a_number` |
 | stopped, or a stop is on its way to the bridge | refused `stopped` |
-| its event is the current one | answered with the current feedback |
-| its event is the one in flight | absorbed |
-| its event is the next one, nothing is in flight | clamped, forwarded |
-| else | refused `out_of_order` |
+| its event is the current one, and was the sender's own | answered with the current feedback |
+| its event is the one in flight, and is the sender's own | absorbed |
+| not the next event, or something is in flight | refused `out_of_order` |
+| it moves, and the sender has sent no neutral command since it got the seat | refused `not_neutral` |
+| else | clamped, forwarded |
+
+A repeat of somebody else's event is not answered: after a hand-over the new holder would take the old one's
+execution for its own.
 """
 
 import math
@@ -69,7 +73,8 @@ class CommandDesk:
         self._description: RobotDescription | None = None
         self._link_is_up = False
         self._in_flight: Command | None = None
-        self._sender = ""  # peer whose command is in flight
+        self._sender = ""  # peer whose command was forwarded last
+        self._sent_event = 0  # of that command; 0 before the first of this epoch
         self._resting: Rest | None = None  # forwarded and not yet followed by a feedback
         self._unconfirmed_stop: Stop | None = None  # asked for, no feedback has shown it yet; outlives the link
         self._last_stop_at = -math.inf
@@ -87,6 +92,7 @@ class CommandDesk:
 
     def epoch_ends(self) -> None:
         """Call before the clock begins another epoch: a bridge that starts anew must not release a latched stop."""
+        self._sent_event = 0
         stop = self._clock.stop
         if stop.stopped:
             self._unconfirmed_stop = self._unconfirmed_stop or Stop(by=stop.by, reason=stop.reason)
@@ -107,15 +113,25 @@ class CommandDesk:
             return self._refuse(command, "not_a_number")
         if self._unconfirmed_stop is not None or feedback.stop.stopped:
             return self._refuse(command, "stopped")
-        if command.event == feedback.event:
+        is_repeat = self._sender == peer and self._sent_event == command.event
+        if is_repeat and command.event == feedback.event:
             return Answer(feedback)
-        if self._in_flight is not None and command.event == self._in_flight.event:
+        if is_repeat and self._in_flight is not None:
             return Absorbed()
         if self._in_flight is not None or command.event != event_after(feedback.event):
             return self._refuse(command, "out_of_order")
+        if not self.moves(command):
+            self._seat.neutral(peer)
+        elif not self._seat.may_move(peer):
+            return self._refuse(command, "not_neutral", "send a neutral command first")
         self._in_flight = self._clamped(command, description)
-        self._sender = peer
+        self._sender, self._sent_event = peer, command.event
         return Forward(self._in_flight)
+
+    def moves(self, command: Command) -> bool:
+        """Whether `command` is an intention to move."""
+        axes = () if self._description is None else self._description.axes
+        return any(value != axis.rest for value, axis in zip(command.values, axes, strict=False))
 
     def rest(self, peer: str, rest: Rest) -> Outcome:
         """A rest of the holder always passes. One that names an event that is far ahead names the next instead."""
@@ -159,7 +175,7 @@ class CommandDesk:
         if self._in_flight is not None and refusal.event in (0, self._in_flight.event):
             self._in_flight = None
             return self._sender
-        return self._seat.seat.holder
+        return self._seat.holder
 
     def _forget(self) -> None:
         self._in_flight = None

@@ -9,37 +9,43 @@ import structlog
 
 from robot_bridge.protocol.console import (
     ClientMessage,
+    Note,
     Notice,
     Participants,
     Rename,
     RobotState,
-    Seat,
+    SeatDecline,
+    SeatGrant,
     SeatRelease,
     SeatRequest,
+    SeatTake,
+    SharedNote,
     StopStateNotice,
     Welcome,
     encode_console_message,
 )
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback, Media, Ping, Pong, Refusal, Reset, Rest, Stop, StopState
+from server.audit import Actor
+from server.audit_trail import AuditLog, AuditTrail
 from server.channels import ChannelName
 from server.command_desk import Absorbed, Answer, CommandDesk, Forward, Outcome, Refuse
 from server.errors import ChannelError, Flood, LinkDown
 from server.event_clock import EventClock
 from server.feedback_fanout import FeedbackFanout
 from server.metrics import Metrics
+from server.notes import NoteBoard
 from server.peer import Peer
 from server.peers import Peers
 from server.robot_connection import RobotConnection
-from server.seat import ControlSeat, SeatOutcome
+from server.seat import SeatRefusal, SeatTimes
+from server.seat_keeper import SeatKeeper
 from server.settings import Settings
 
 __all__ = ["Console", "FeedbackViewer", "MediaFeed"]
 
 log = structlog.get_logger(__name__)
-audit = structlog.get_logger("lockstep.audit")
 
-SEAT_CHECKS = 12  # within one seat timeout
 CROWD = 10  # peers; the list of participants goes out at most once a second, ten times more rarely to 100
 UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
@@ -62,17 +68,26 @@ class FeedbackViewer(Protocol):
 class Console:
     """Enter `run` once; it returns when cancelled, with all peers and links closed."""
 
-    def __init__(self, settings: Settings, metrics: Metrics, media: MediaFeed, viewer: FeedbackViewer | None) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        metrics: Metrics,
+        media: MediaFeed,
+        viewer: FeedbackViewer | None,
+        audit_log: AuditLog,
+    ) -> None:
         self.clock = EventClock()
-        self.seat = ControlSeat(settings.seat_timeout)
+        self.audit = AuditTrail(self.clock, audit_log)
         self.robot = RobotConnection(settings, self)
         self.peers = Peers(settings.max_peers, metrics)
-        self._settings = settings
+        times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
+        self.seat = SeatKeeper(times, self.peers, self, self.audit)
+        self.notes = NoteBoard(time.monotonic())
         self._metrics = metrics
         self._media = media
         self._viewer = viewer
-        self._desk = CommandDesk(self.clock, self.seat)
-        self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.operators, self.peers.observers)
+        self._desk = CommandDesk(self.clock, self.seat.rules)
+        self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.drivers, self.peers.observers)
         self._forwarded_at = 0.0  # when the command in flight left
         self._shown_stop = StopState()  # what everyone was told last
         self._link_was_up = False
@@ -81,7 +96,8 @@ class Console:
         """Until cancelled. The peers end before the links: the last thing that leaves is the rest."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._guard("feedback", self._fanout.run))
-            tasks.create_task(self._guard("seat", self._watch_seat))
+            tasks.create_task(self._guard("seat", self.seat.watch))
+            tasks.create_task(self._guard("audit", self.audit.run))
             tasks.create_task(self._guard("participants", self._share_participants))
             tasks.create_task(self._guard("robot", self.robot.run))
             try:
@@ -99,10 +115,10 @@ class Console:
 
     # what peers and HTTP ask for
 
-    def stop(self, by: str, where: str, reason: str) -> bool:
+    def stop(self, by: Actor, where: str, reason: str) -> bool:
         """Latch the stop. False when no link lives: then it is sent as soon as one does, before all else."""
         self._metrics.stops.labels(where).inc()
-        outcome = self._desk.stop(by, reason, time.monotonic())
+        outcome = self._desk.stop(by.name, reason, time.monotonic())
         if isinstance(outcome, Absorbed):
             return True
         stop = outcome.message
@@ -111,20 +127,22 @@ class Console:
         delivered = self.robot.send_stop(stop)
         if not delivered:
             self.peers.tell("session", Notice(level="error", text=UNDELIVERED))
-        audit.warning("stop", by=by, where=where, reason=reason, reference=self.clock.event, delivered=delivered)
+        self.audit.record("stop", by, where if delivered else f"{where}, not delivered yet", reason)
+        log.warning("stop", by=by.name, where=where, reason=reason, delivered=delivered)
         return delivered
 
-    def reset(self, by: str, where: str) -> None:
+    def reset(self, by: Actor, where: str) -> None:
         """Release the latched stop; the caller has checked the role.
 
         Raises:
             LinkDown: the robot cannot be told.
         """
-        outcome = self._desk.reset(by)
+        outcome = self._desk.reset(by.name)
         if not isinstance(outcome, Forward) or not self._forward(outcome):
             raise LinkDown(self.robot.detail)
         self._metrics.resets.inc()
-        audit.warning("reset", by=by, where=where, reference=self.clock.event)
+        self.audit.record("reset", by, where)
+        log.warning("reset", by=by.name, where=where)
 
     # PeerHost
 
@@ -138,11 +156,13 @@ class Console:
             peer.send("session", Welcome(peer=peer.id, role=peer.role, name=peer.name, streams=peer.streams))
             if self.robot.description is not None:
                 peer.send("session", self.state_of_robot(self.robot.description))
-            peer.send("session", self.seat.seat)
+            peer.send("session", self.seat.message())
             peer.send("session", self.peers.participants())
+            for note in self.notes:
+                peer.send("session", note)
 
     def message_received(self, peer: Peer, channel: ChannelName, message: ClientMessage) -> None:
-        self.seat.heard(peer.id, time.monotonic())
+        self.seat.heard(peer)
         match message:
             case Command():
                 self._settle(peer, "control", self._desk.command(peer.id, message), command=True)
@@ -151,15 +171,16 @@ class Console:
             case Ping():
                 peer.send("control", Pong(id=message.id))
             case Stop():
-                self.stop(peer.name, channel, message.reason)
+                self.stop(peer.actor, channel, message.reason)
             case Reset():
                 self._reset_by(peer)
-            case SeatRequest():
-                self._seat_step(peer, self.seat.request(peer.id, peer.name, peer.role, time.monotonic()))
-            case SeatRelease():
-                self._seat_step(peer, self.seat.release(peer.id))
+            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatRelease():
+                self.seat.handle(peer, message)
             case Rename():
-                self._rename(peer, message.name)
+                peer.rename(message.name)
+                self._settle_names()
+            case Note():
+                self._write_note(peer, message.text)
             case _:
                 pass  # a report: the peer keeps it
 
@@ -173,7 +194,22 @@ class Console:
         peer.send("control" if channel == "control" else "session", answer)
 
     def peer_ended(self, peer: Peer) -> None:
-        self._seat_step(None, self.seat.gone(peer.id))
+        self.seat.gone(peer)
+        self.notes.forget(peer.id)
+        self.audit.record("left", peer.actor, peer.ended)
+
+    # SeatHost
+
+    def rest_robot(self, why: str) -> None:
+        """Before anybody else drives: what the last holder has under way is void too."""
+        rest = self._desk.abandon()
+        if isinstance(rest, Forward) and self._forward(rest):
+            self._metrics.rests.labels(why).inc()
+
+    def refuse(self, peer: Peer, refusal: SeatRefusal) -> None:
+        self._refuse(
+            peer, "session", Refusal(event=0, reason=refusal.reason, current=self.clock.event, detail=refusal.detail)
+        )
 
     # RobotHost
 
@@ -181,6 +217,7 @@ class Console:
         """References of different epochs are never compared: every peer starts anew."""
         self._desk.epoch_ends()
         self.clock.begin(epoch)
+        self.audit.record("epoch", detail=description.label)
         self._shown_stop = StopState()
         self.peers.end_all("new epoch")
         self._media.configure(description)
@@ -195,12 +232,14 @@ class Console:
         stop = self._desk.link_up(self.robot.description)
         if stop is not None:
             self.robot.send_stop(stop)
-            audit.warning("stop sent again", by=stop.by, reason=stop.reason)
+            self.audit.record("stop", Actor(stop.by), "sent again", stop.reason)
+        self.audit.record("link_up")
         self.peers.tell("session", self.state_of_robot(self.robot.description))
 
     def link_down(self, detail: str) -> None:
         if self._link_was_up:
             self._metrics.link_losses.inc()
+            self.audit.record("link_down", detail=detail)
         self._link_was_up = False
         self._metrics.link_up.set(0)
         self._desk.link_down()
@@ -229,6 +268,7 @@ class Console:
         self._metrics.refusals.labels(refusal.reason).inc()
         peer = self.peers.by_id(self._desk.refused(refusal))
         if peer is not None:
+            self.audit.refused(peer.actor, refusal.reason)
             peer.send("control", refusal)
 
     def media_received(self, media: Media) -> None:
@@ -243,10 +283,18 @@ class Console:
             case Answer(feedback):
                 peer.send_feedback(encode_console_message(feedback))
             case Refuse(refusal):
-                self._metrics.refusals.labels(refusal.reason).inc()
-                peer.send(channel, refusal)
+                self._refuse(peer, channel, refusal)
+                if refusal.reason == "out_of_order" and self.clock.feedback is not None:
+                    peer.send_feedback(encode_console_message(self.clock.feedback))
+            case Forward(Command() as forwarded) if self._desk.moves(forwarded):
+                self.seat.moved(peer)
         if command:
             self._metrics.commands.labels(type(outcome).__name__.lower()).inc()
+
+    def _refuse(self, peer: Peer, channel: ChannelName, refusal: Refusal) -> None:
+        self._metrics.refusals.labels(refusal.reason).inc()
+        self.audit.refused(peer.actor, refusal.reason)
+        peer.send(channel, refusal)
 
     def _forward(self, outcome: Forward) -> bool:
         message = outcome.message
@@ -257,34 +305,29 @@ class Console:
         return self.robot.send(message)
 
     def _reset_by(self, peer: Peer) -> None:
-        refusal = Refusal(event=0, reason="not_allowed", current=self.clock.event, detail="only an operator resets")
-        if peer.role == "operator":
+        refusal = Refusal(event=0, reason="not_allowed", current=self.clock.event, detail="observers do not reset")
+        if peer.role != "observer":
             try:
-                self.reset(peer.name, "stop")
+                self.reset(peer.actor, "stop")
                 return
             except LinkDown as error:
                 refusal = Refusal(event=0, reason="link_down", current=self.clock.event, detail=error.detail[:500])
-        self._metrics.refusals.labels(refusal.reason).inc()
-        peer.send("stop", refusal)
+        self._refuse(peer, "stop", refusal)
 
-    def _seat_step(self, peer: Peer | None, outcome: SeatOutcome) -> None:
-        if outcome.refusal is not None and peer is not None:
-            self._metrics.refusals.labels(outcome.refusal).inc()
-            peer.send("session", Refusal(event=0, reason=outcome.refusal, current=self.clock.event))
-        if outcome.rest:
-            rest = self._desk.abandon()
-            if isinstance(rest, Forward) and self._forward(rest):
-                self._metrics.rests.labels(self.seat.seat.why).inc()
-        if outcome.changed:
-            seat = self.seat.seat
-            audit.info("seat", holder=seat.holder, name=seat.name, why=seat.why, reference=self.clock.event)
-            self.peers.tell("session", seat)
+    def _settle_names(self) -> None:
+        changed = self.peers.settle_names()
+        if any(self.seat.concerns(peer) for peer in changed):
+            self.peers.tell("session", self.seat.message())
 
-    def _rename(self, peer: Peer, name: str) -> None:
-        peer.rename(name)
-        if self.seat.holds(peer.id):
-            self.seat.seat = Seat(holder=peer.id, name=peer.name, why=self.seat.seat.why)
-            self.peers.tell("session", self.seat.seat)
+    def _write_note(self, peer: Peer, text: str) -> None:
+        note = self.notes.write(
+            peer.id, peer.name, peer.role, text, self.clock.epoch, self.clock.event, time.monotonic(), time.time()
+        )
+        if isinstance(note, SharedNote):
+            self.audit.record("note", peer.actor, detail=note.text)
+            self.peers.tell("session", note)
+        else:
+            self._refuse(peer, "session", Refusal(event=0, reason=note, current=self.clock.event, detail="note"))
 
     # background tasks
 
@@ -298,15 +341,11 @@ class Console:
                 log.exception("background task failed", task=name)
             await asyncio.sleep(RESTART_AFTER)
 
-    async def _watch_seat(self) -> None:
-        while True:
-            await asyncio.sleep(self._settings.seat_timeout / SEAT_CHECKS)
-            self._seat_step(None, self.seat.expire(time.monotonic()))
-
     async def _share_participants(self) -> None:
         shown = Participants(participants=[])
         while True:
             await asyncio.sleep(max(1.0, len(self.peers) / CROWD))
+            self._settle_names()  # somebody may have left whose name others wanted
             current = self.peers.participants()
             if current != shown:
                 shown = current

@@ -3,7 +3,9 @@
 ConsoleError
 ├── AccessError             who are you
 │   ├── TokenMissing
-│   ├── TokenInvalid        wrong signature, expired, malformed: never said which
+│   ├── TokenInvalid        wrong signature, malformed: never said which
+│   ├── LinkExpired         our own signature, too old
+│   ├── LinkRevoked         our own signature, called back
 │   ├── NotAllowed          the role does not permit it
 │   └── OriginRefused       a page of another site
 ├── RequestError            the request is not understood
@@ -53,6 +55,8 @@ __all__ = [
     "HostRefused",
     "HttpError",
     "LinkDown",
+    "LinkExpired",
+    "LinkRevoked",
     "MalformedMessage",
     "MessageTooLarge",
     "NotAllowed",
@@ -98,6 +102,14 @@ class TokenMissing(AccessError):
 
 
 class TokenInvalid(AccessError):
+    pass
+
+
+class LinkExpired(AccessError):
+    pass
+
+
+class LinkRevoked(AccessError):
     pass
 
 
@@ -230,6 +242,8 @@ class HttpError(NamedTuple):
 HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     TokenMissing: HttpError(401, "unauthorized", {"WWW-Authenticate": "Bearer"}),
     TokenInvalid: HttpError(401, "unauthorized", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
+    LinkExpired: HttpError(401, "link_expired", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
+    LinkRevoked: HttpError(401, "link_revoked", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     NotAllowed: HttpError(403, "not_allowed"),
     OriginRefused: HttpError(403, "origin_refused"),
     BadJson: HttpError(400, "bad_json"),

@@ -17,6 +17,7 @@ class ConsoleLinks(NamedTuple):
     console: str
     operator: str
     observer: str
+    supervisor: str
     robot: str
 
     def for_people(self) -> str:
@@ -24,7 +25,9 @@ class ConsoleLinks(NamedTuple):
             f"\n  Lockstep is ready. The robot is at {self.robot}.\n"
             f"\n  To drive, open:   {self.operator}\n"
             f"\n  To watch, open:   {self.observer}\n"
-            "\n  Whoever has the first link can drive the robot; share the second. Ctrl-C ends everything.\n\n"
+            f"\n  To supervise:     {self.supervisor}\n"
+            "\n  Whoever has the first link can drive the robot; share the second. The third may take control from anybody."
+            "\n  `lockstep invite` makes links that end when you say. Ctrl-C ends everything.\n\n"
         )
 
 
@@ -37,6 +40,7 @@ def console_links(settings: Settings, listener: socket.socket, access: Access) -
         console=console,
         operator=f"{console}/#token={access.issue('operator', 'operator')}",
         observer=f"{console}/#token={access.issue('observer', 'observer')}",
+        supervisor=f"{console}/#token={access.issue('supervisor', 'supervisor')}",
         robot=settings.robot,
     )
 

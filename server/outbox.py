@@ -8,7 +8,7 @@ from collections import deque
 
 __all__ = ["ChannelOutbox"]
 
-MAX_WAITING = 64
+MAX_WAITING = 160  # a newcomer is told a hundred notes at once
 
 
 class ChannelOutbox:

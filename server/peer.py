@@ -18,10 +18,12 @@ from robot_bridge.protocol.console import (
 )
 from robot_bridge.protocol.messages import Stop
 from server.access import Identity
+from server.audit import Actor
 from server.channel_writer import ChannelWriter
 from server.channels import ChannelName, MessageBudget, channel_name, parse_message
 from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
 from server.ice_restart_private import IceSession
+from server.names import clean_name
 
 __all__ = ["Peer", "PeerHost", "PeerLimits", "PeerStreams"]
 
@@ -29,7 +31,6 @@ log = structlog.get_logger(__name__)
 
 CLOSE_TIMEOUT = 5.0  # s; aiortc says goodbye to the remote, which may not answer
 MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
-MAX_NAME = 60
 
 
 class PeerLimits(Protocol):
@@ -81,7 +82,8 @@ class Peer:
         self.pc = pc
         self.ice = ice
         self.identity = identity
-        self.name = identity.name
+        self.wanted_name = clean_name(identity.name, identity.role)
+        self.name = self.wanted_name  # what others see; `Peers` keeps it unique
         self.report = Report()  # newest
         self.ended = ""  # why; "" while it lives
         self._media = media
@@ -128,9 +130,13 @@ class Peer:
         except Flood as error:
             raise TooManyRequests(f"more than {MAX_REQUESTS:g} requests a second for one session") from error
 
+    @property
+    def actor(self) -> Actor:
+        """For the audit."""
+        return Actor(self.name, self.role, self.id, self.identity.token_id)
+
     def rename(self, name: str) -> None:
-        printable = "".join(character for character in name if character.isprintable()).strip()
-        self.name = printable[:MAX_NAME] or self.identity.name
+        self.wanted_name = clean_name(name, clean_name(self.identity.name, self.identity.role))
 
     def send(self, channel: ChannelName, message: ServerMessage) -> None:
         self.send_text(channel, encode_console_message(message))
@@ -153,6 +159,7 @@ class Peer:
             carrier=carriers[0] if carriers else "none",
             gap=max((stream.gap for stream in self.report.streams), key=abs, default=0),
             picture_delay_ms=self.report.picture_delay_ms,
+            round_trip_ms=self.report.round_trip_ms,
         )
 
     def dropped(self) -> int:

@@ -10,6 +10,7 @@ from robot_bridge.protocol.console import Participant, Participants, ServerMessa
 from server.channels import ChannelName
 from server.errors import NotFound, ShuttingDown, TooManyPeers
 from server.metrics import Metrics
+from server.names import unique_name
 from server.peer import Peer
 
 __all__ = ["Peers"]
@@ -36,11 +37,27 @@ class Peers:
     def __len__(self) -> int:
         return len(self._sessions)
 
-    def operators(self) -> list[Peer]:
-        return [peer for peer in self._sessions if peer.role == "operator"]
+    def drivers(self) -> list[Peer]:
+        """Those whose role may drive."""
+        return [peer for peer in self._sessions if peer.role != "observer"]
 
     def observers(self) -> list[Peer]:
         return [peer for peer in self._sessions if peer.role == "observer"]
+
+    def settle_names(self) -> list[Peer]:
+        """Give everyone the name they asked for, or that with a number; those who came first keep theirs.
+
+        Returns those whose name changed.
+        """
+        taken: list[str] = []
+        changed = []
+        for peer in self._sessions:
+            name = unique_name(peer.wanted_name, taken)
+            taken.append(name)
+            if peer.name != name:
+                peer.name = name
+                changed.append(peer)
+        return changed
 
     @contextmanager
     def place(self) -> Iterator[None]:
@@ -63,6 +80,7 @@ class Peers:
     def admit(self, peer: Peer) -> None:
         task = asyncio.get_running_loop().create_task(self._run(peer), name=f"peer {peer.id}")
         self._sessions[peer] = task
+        self.settle_names()
         self._metrics.peers.labels(peer.role).inc()
         log.info("peer joined", peer=peer.id, role=peer.role, name=peer.name)
 
@@ -83,11 +101,11 @@ class Peers:
             peer.send_text(channel, text)
 
     def participants(self) -> Participants:
-        """Operators first. In a crowd only operators come with measured values: the list changes less often."""
-        everyone = sorted((peer.participant() for peer in self._sessions), key=lambda each: each.role != "operator")
+        """Those who may drive first. In a crowd only they come with measured values: the list changes less often."""
+        everyone = sorted((peer.participant() for peer in self._sessions), key=lambda each: each.role == "observer")
         return Participants(
             participants=[
-                each if len(everyone) <= FEW or each.role == "operator" else _without_values(each) for each in everyone
+                each if len(everyone) <= FEW or each.role != "observer" else _without_values(each) for each in everyone
             ]
         )
 

@@ -32,6 +32,8 @@ class Settings(BaseSettings):
 
     observer_feedback_hz: Annotated[float, Field(gt=0, le=100)] = 12.5
     seat_timeout: Annotated[float, Field(gt=0)] = 3.0  # of silence, then the seat is free and the robot rests
+    seat_idle_seconds: Annotated[float, Field(gt=0)] = 300.0  # without an intention to move, then the seat is free
+    seat_claim_seconds: Annotated[float, Field(gt=0)] = 60.0  # until a claim on the seat counts as declined
     peer_silence: Annotated[float, Field(gt=0)] = 20.0  # a peer with data channels that says nothing is closed
     peer_connect_timeout: Annotated[float, Field(gt=0)] = 15.0  # from the answer to the connection
     max_peers: Annotated[int, Field(ge=1)] = 200

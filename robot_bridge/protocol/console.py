@@ -181,7 +181,7 @@ class Seat(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="sea
     name: str = ""
     why: str = ""  # "released", "heartbeat lost", "disconnected", "granted", "taken", "idle" …
     claims: list[SeatClaim] = []
-    idle_seconds_left: float | None = None  # until the idle holder loses the seat; sent when the countdown begins or ends
+    idle_seconds_left: float | None = None  # until the idle holder loses it; sent when the countdown begins or ends
 
 
 class Participant(msgspec.Struct, frozen=True, kw_only=True):
@@ -222,6 +222,7 @@ class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
     name: str
     role: Role
     text: str
+    epoch: str  # of the event; "" before the robot was reached
     event: EventReference
     time: float  # s since 1970, the console's clock: for people to read, never for a decision
 

@@ -56,6 +56,9 @@ RefusalReason = Literal[
     "malformed",  # not a message of the protocol
     "no_seat",  # the sender does not hold the control seat
     "seat_taken",  # somebody else holds the control seat
+    "declined",  # the seat's holder said no, or nothing in time
+    "not_neutral",  # a new holder's first command has to be neutral
+    "too_often",  # more notes than anyone can read
     "not_allowed",  # the sender's role does not permit it
     "link_down",  # the console has no robot link
 ]
@@ -100,6 +103,7 @@ class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     at_rest: bool = True
     stop: StopState = StopState()
     faults: list[str] = []
+    limits: list[str] = []  # names of the position limits and geofences that slowed the robot since the last feedback
 
 
 class Refusal(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="refusal"):

@@ -30,9 +30,11 @@ async def _id(peer: TestPeer) -> str:
 
 
 async def _take_seat(peer: TestPeer) -> None:
+    """And send the neutral command that has to come first."""
     mine = await _id(peer)
     peer.send("session", SeatRequest())
     await peer.until(lambda each: isinstance(each, Seat) and each.holder == mine)
+    await _drive(peer, 0.0)
 
 
 async def _drive(peer: TestPeer, value: float, count: int = 1) -> Feedback:
@@ -67,10 +69,9 @@ async def test_a_newcomer_is_told_all_there_is_to_know() -> None:
 async def test_an_operator_takes_the_seat_and_drives() -> None:
     async with running_rig() as rig, rig.peer("operator") as peer:
         await _take_seat(peer)
-        before = (await peer.feedback()).event
-        await _drive(peer, 0.0)
+        before = peer.newest_feedback().event
         last = await _drive(peer, 0.2, count=20)
-        assert last.event == before + 21
+        assert last.event == before + 20
         assert not last.at_rest
         assert rig.count("lockstep_commands_total", outcome="forward") == 21
         assert rig.count("lockstep_robot_turnaround_seconds_count") == 21
@@ -79,7 +80,7 @@ async def test_an_operator_takes_the_seat_and_drives() -> None:
 async def test_what_the_bridge_refuses_reaches_the_sender_and_the_way_is_free_again() -> None:
     async with running_rig() as rig, rig.peer("operator") as peer, rig.peer("observer") as other:
         await _take_seat(peer)
-        now = await peer.feedback()
+        now = peer.newest_feedback()
         following = event_after(now.event)
         unknown = Command(event=following, issue=now.issue + 1000, values=[0.0] * len(now.axes))
         peer.send("control", unknown)
@@ -113,7 +114,7 @@ async def test_letting_go_brings_the_robot_to_rest() -> None:
 async def test_a_second_operator_gets_the_seat_only_when_it_is_given_back() -> None:
     async with running_rig() as rig, rig.peer("operator") as first, rig.peer("operator") as second:
         await _take_seat(first)
-        second.send("session", SeatRequest())
+        second.send("session", SeatRequest(only_if_free=True))
         await _refused(second, "seat_taken")
         first.send("session", SeatRelease())
         await second.until(lambda each: isinstance(each, Seat) and each.why == "released")
@@ -130,7 +131,7 @@ async def test_an_observer_cannot_command_nor_rest_nor_take_the_seat_nor_reset()
         peer.send("session", SeatRequest())
         await _refused(peer, "not_allowed")
         peer.send("stop", Reset())
-        await _refused(peer, "not_allowed", "only an operator")
+        await _refused(peer, "not_allowed", "observers do not reset")
         assert (await rig.session())["seat"]["holder"] == ""
         assert (await rig.session())["event"] == now.event
         assert rig.count("lockstep_refusals_total", reason="no_seat") == 2

@@ -11,7 +11,7 @@ from robot_bridge.protocol.messages import Command, Feedback, Refusal, Reset, Re
 from robot_bridge.protocol.serial import MAX_EVENT, event_after
 from server.command_desk import STOP_REPEAT, Absorbed, Answer, CommandDesk, Forward, Outcome, Refuse
 from server.event_clock import EventClock
-from server.seat import ControlSeat
+from server.seat import ControlSeat, SeatTimes
 
 ROBOT = RobotDescription(
     name="r",
@@ -32,11 +32,12 @@ class Bench:
     """A desk whose seat "me" holds, with the link up and feedback 7 at hand."""
 
     def __init__(self, *, held: bool = True, up: bool = True, stopped: bool = False) -> None:
-        self.clock, self.seat = EventClock(), ControlSeat(3.0)
+        self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
         self.desk = CommandDesk(self.clock, self.seat)
         self.clock.begin("e")
         if held:
-            self.seat.request("me", "me", "operator", 0.0)
+            self.seat.request("me", "operator", 0.0)
+            self.seat.neutral("me")
         if up:
             self.desk.link_up(ROBOT)
             self.hear(_feedback(7, stopped=stopped))
@@ -119,7 +120,7 @@ def test_a_refusal_of_something_else_goes_to_the_holder() -> None:
     bench.desk.command("me", _command(8))
     assert bench.desk.refused(Refusal(event=5, reason="late", current=7)) == "me"
     assert bench.desk.in_flight is not None
-    bench.seat.release("me")
+    bench.seat.release("me", 0.0)
     assert bench.desk.refused(Refusal(event=5, reason="late", current=7)) == ""
 
 
@@ -161,7 +162,7 @@ def test_others_cannot_rest_the_robot() -> None:
 def test_when_the_holder_is_gone_the_next_event_is_void_too() -> None:
     bench = Bench()
     bench.desk.command("me", _command(8))
-    bench.seat.gone("me")
+    bench.seat.gone("me", 0.0)
     assert bench.desk.abandon() == Forward(Rest(event=8))
 
 
@@ -237,7 +238,7 @@ class DeskMachine(RuleBasedStateMachine):
 
     @initialize(event=st.sampled_from([1, 2, MAX_EVENT - 2, MAX_EVENT]))
     def start(self, event: int) -> None:
-        self.clock, self.seat = EventClock(), ControlSeat(3.0)
+        self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
         self.desk = CommandDesk(self.clock, self.seat)
         self.up = self.stopped = self.stop_sent = False
         self.event, self.issue = event, 1
@@ -257,11 +258,11 @@ class DeskMachine(RuleBasedStateMachine):
 
     @rule(peer=peers, operator=st.booleans())
     def request(self, peer: str, operator: bool) -> None:
-        self.seat.request(peer, peer, "operator" if operator else "observer", 0.0)
+        self.seat.request(peer, "operator" if operator else "observer", 0.0)
 
     @rule(peer=peers)
     def leave(self, peer: str) -> None:
-        if self.seat.gone(peer).rest:
+        if self.seat.gone(peer, 0.0).rest:
             self.desk.abandon()
 
     @rule(peer=peers, offset=st.integers(-1, 2), values=st.lists(st.floats(), min_size=1, max_size=3))
@@ -271,7 +272,7 @@ class DeskMachine(RuleBasedStateMachine):
         outcome = self.desk.command(peer, Command(event=named, issue=self.issue, values=values))
         if isinstance(outcome, Forward):
             assert isinstance(outcome.message, Command)
-            assert self.seat.seat.holder == peer
+            assert self.seat.holder == peer
             assert self.up
             assert not known_stop
             assert not self.on_the_way
@@ -283,7 +284,7 @@ class DeskMachine(RuleBasedStateMachine):
     def rest(self, peer: str) -> None:
         outcome = self.desk.rest(peer, Rest(event=self.event))
         if isinstance(outcome, Forward):
-            assert self.seat.seat.holder == peer
+            assert self.seat.holder == peer
 
     @rule()
     def stop(self) -> None:

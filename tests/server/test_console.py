@@ -7,6 +7,7 @@ import pytest
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Feedback, LinkMessage, Media, Refusal, Rest, Stop
+from server.audit_tail import AuditTail
 from server.console import Console
 from server.metrics import Metrics
 from server.robot_connection import RobotConnection, RobotHost
@@ -36,18 +37,18 @@ def _feedback(event: int) -> Feedback:
 async def test_a_background_task_that_fails_is_counted_and_runs_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.console.RESTART_AFTER", 0.0)
     metrics = Metrics()
-    console = Console(Settings(robot="tcp://127.0.0.1:1", seat_timeout=0.01), metrics, FakePlane(), None)
+    console = Console(Settings(robot="tcp://127.0.0.1:1", seat_timeout=0.01), metrics, FakePlane(), None, AuditTail())
     failed: list[float] = []
     again = asyncio.Event()
 
-    def expire(now: float) -> SeatOutcome:
+    def expire(now: float) -> list[SeatOutcome]:
         if len(failed) < 2:
             failed.append(now)
             raise RuntimeError("a fault of ours")
         again.set()
-        return SeatOutcome()
+        return []
 
-    monkeypatch.setattr(console.seat, "expire", expire)
+    monkeypatch.setattr(console.seat.rules, "expire", expire)
     running = asyncio.create_task(console.run())
     async with asyncio.timeout(PATIENCE):
         await again.wait()

@@ -12,6 +12,12 @@ export interface Axis {
   readonly rest: number;
 }
 
+/** An axis that moves a joint: the joint's velocity is `gain` x (the axis' value - its rest value). None: the gain changes with the posture, and the robot adapter says what the axes do to the joint now. */
+export interface AxisGain {
+  readonly axis: string;
+  readonly gain: number | null;
+}
+
 /** What moves an axis. A positive input drives the axis up to `scale * maximum`, after `invert`. */
 export interface Binding {
   readonly axis: string;
@@ -79,6 +85,15 @@ export interface Feedback {
   readonly at_rest: boolean;
   readonly stop: StopState;
   readonly faults: readonly (string)[];
+  readonly limits: readonly (string)[];
+}
+
+/** A zone on the floor that the whole base stays inside of, or outside of. */
+export interface Geofence {
+  readonly name: string;
+  readonly label: string;
+  readonly kind: "keep_in" | "keep_out";
+  readonly polygon: readonly (readonly [number, number])[];
 }
 
 /** A shape for the 3D view. `size`: box: half extents; sphere: (radius, 0, 0); cylinder and capsule: (radius, half length, 0). */
@@ -141,9 +156,34 @@ export interface Ping {
   readonly id: number;
 }
 
+/** A mobile base on a plane: where its pose is measured, and which axes move it. The geofences need it. */
+export interface PlanarBase {
+  readonly x: string;
+  readonly y: string;
+  readonly yaw: string;
+  readonly forward: string;
+  readonly left: string;
+  readonly turn: string;
+  readonly radius: number;
+  readonly margin: number;
+  readonly latency: number;
+}
+
 export interface Pong {
   readonly type: "pong";
   readonly id: number;
+}
+
+/** Keeps a measured joint between `minimum` and `maximum` by slowing the axes that move it; None: no bound. The bridge enforces it (docs/robot-link.md, "Limits"). Motion away from a bound is always free. */
+export interface PositionLimit {
+  readonly name: string;
+  readonly label: string;
+  readonly joint: string;
+  readonly minimum: number | null;
+  readonly maximum: number | null;
+  readonly axes: readonly (AxisGain)[];
+  readonly margin: number;
+  readonly latency: number;
 }
 
 /** What the quality controller decided for this peer's pictures, and why; sent when it changes. */
@@ -168,7 +208,7 @@ export interface RangeRing {
 export interface Refusal {
   readonly type: "refusal";
   readonly event: number;
-  readonly reason: "late" | "link_down" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "out_of_order" | "rested" | "seat_taken" | "stopped" | "wrong_size";
+  readonly reason: "declined" | "late" | "link_down" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "not_neutral" | "out_of_order" | "rested" | "seat_taken" | "stopped" | "too_often" | "wrong_size";
   readonly current: number;
   readonly detail: string;
 }
@@ -212,6 +252,9 @@ export interface RobotDescription {
   readonly wrench: WrenchSensor | null;
   readonly ranges: RangeRing | null;
   readonly bodies: readonly (Body)[];
+  readonly position_limits: readonly (PositionLimit)[];
+  readonly planar_base: PlanarBase | null;
+  readonly geofences: readonly (Geofence)[];
   readonly hold: number;
   readonly max_event_age: number;
   readonly max_event_rate: number;
@@ -281,6 +324,7 @@ export interface SharedNote {
   readonly name: string;
   readonly role: "observer" | "operator" | "supervisor";
   readonly text: string;
+  readonly epoch: string;
   readonly event: number;
   readonly time: number;
 }

@@ -1,0 +1,81 @@
+"""The audit trail: turns what happens into records with the event reference that holds, and hands them to the log."""
+
+import asyncio
+import time
+from typing import Protocol
+
+from robot_bridge.protocol.console import Seat
+from server.audit import Actor, AuditKind, AuditRecord, RefusalMerger
+from server.event_clock import EventClock
+
+__all__ = ["AuditLog", "AuditTrail"]
+
+NOBODY = Actor()
+MERGE_SECONDS = 1.0  # refusals of one kind become one record
+
+
+class AuditLog(Protocol):
+    """Keeps records; returns at once."""
+
+    def append(self, record: AuditRecord) -> None: ...
+
+
+class AuditTrail:
+    """Run `run` as a task. All else is called on the loop and returns at once."""
+
+    def __init__(self, clock: EventClock, log: AuditLog, first: int = 1) -> None:
+        self._clock = clock
+        self._log = log
+        self._next = first
+        self._refusals = RefusalMerger()
+        self._holder = Actor()
+        self._claims: list[str] = []
+
+    def record(self, kind: AuditKind, actor: Actor = NOBODY, what: str = "", detail: str = "", count: int = 1) -> None:
+        """Write down `kind`, now."""
+        feedback = self._clock.feedback
+        self._log.append(
+            AuditRecord(
+                n=self._next,
+                time=round(time.time(), 3),
+                kind=kind,
+                epoch=self._clock.epoch,
+                event=0 if feedback is None else feedback.event,
+                who=actor.name,
+                role=actor.role,
+                peer=actor.peer,
+                link=actor.link,
+                what=what,
+                detail=detail,
+                count=count,
+            )
+        )
+        self._next += 1
+
+    def seat(self, seat: Seat, holder: Actor, by: Actor) -> None:
+        """The seat is another one now: `holder` has it, or nobody; or other peers claim it; because of `by`."""
+        claims = [claim.peer for claim in seat.claims]
+        if holder.peer != self._holder.peer:
+            detail = f"was {self._holder.name} ({self._holder.peer})" if self._holder.peer else ""
+            what = seat.why if holder.peer else f"{seat.why}, free"
+            self.record("seat", holder if holder.peer else self._holder, what, detail)
+            self._holder = holder
+        if claims != self._claims:
+            self.record("claim", by, detail=", ".join(f"{each.name} ({each.peer})" for each in seat.claims) or "none")
+            self._claims = claims
+
+    def refused(self, actor: Actor, reason: str) -> None:
+        self._refusals.add(actor, reason)
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        try:
+            while True:
+                await asyncio.sleep(MERGE_SECONDS)
+                self._write_refusals()
+        finally:
+            self._write_refusals()
+
+    def _write_refusals(self) -> None:
+        for actor, reason, count in self._refusals.take():
+            self.record("refusal", actor, reason, count=count)

@@ -1,0 +1,76 @@
+"""Notes to everyone: cleaned, numbered, limited in rate, the last ones kept for newcomers. No I/O, no clock."""
+
+from collections import deque
+from collections.abc import Iterator
+
+from robot_bridge.protocol.console import Role, SharedNote
+from robot_bridge.protocol.messages import RefusalReason
+from server.names import printable
+
+__all__ = ["NoteBoard"]
+
+KEPT = 100
+BURST = 5.0  # notes of one peer at once
+PEER_RATE = 0.5  # notes a second of one peer
+BOARD_BURST = 20.0  # of all peers together: every note goes to everyone
+BOARD_RATE = 4.0
+
+
+class _Bucket:
+    """Token bucket, full at first."""
+
+    def __init__(self, rate: float, burst: float, now: float) -> None:
+        self._rate, self._burst = rate, burst
+        self._level, self._at = burst, now
+
+    def level(self, now: float) -> float:
+        self._level = min(self._burst, self._level + (now - self._at) * self._rate)
+        self._at = now
+        return self._level
+
+    def spend(self) -> None:
+        self._level -= 1
+
+
+class NoteBoard:
+    """`now` is monotonic seconds, `clock` seconds since 1970; both are handed in."""
+
+    def __init__(self, now: float) -> None:
+        self._kept: deque[SharedNote] = deque(maxlen=KEPT)
+        self._next_id = 1
+        self._all = _Bucket(BOARD_RATE, BOARD_BURST, now)
+        self._peers: dict[str, _Bucket] = {}
+
+    def __iter__(self) -> Iterator[SharedNote]:
+        """The last ones, oldest first."""
+        return iter(list(self._kept))
+
+    def write(
+        self, peer: str, name: str, role: Role, text: str, epoch: str, event: int, now: float, clock: float
+    ) -> SharedNote | RefusalReason:
+        """Keep a note; or why not: this peer or all together write too often, or nothing in it can be printed."""
+        text = printable(text)
+        if not text:
+            return "malformed"
+        mine = self._peers.setdefault(peer, _Bucket(PEER_RATE, BURST, now))
+        if mine.level(now) < 1 or self._all.level(now) < 1:
+            return "too_often"
+        mine.spend()
+        self._all.spend()
+        note = SharedNote(
+            id=self._next_id,
+            peer=peer,
+            name=name,
+            role=role,
+            text=text,
+            epoch=epoch,
+            event=event,
+            time=round(clock, 3),
+        )
+        self._next_id += 1
+        self._kept.append(note)
+        return note
+
+    def forget(self, peer: str) -> None:
+        """`peer` is gone; its notes stay."""
+        self._peers.pop(peer, None)

@@ -1,0 +1,119 @@
+"""Keeps the control seat: asks its rules, and acts on what follows. The rest leaves before anyone is told."""
+
+import asyncio
+import time
+from typing import Protocol
+
+from robot_bridge.protocol.console import (
+    Seat,
+    SeatClaim,
+    SeatDecline,
+    SeatGrant,
+    SeatRelease,
+    SeatRequest,
+    SeatTake,
+)
+from server.audit import Actor
+from server.audit_trail import AuditTrail
+from server.peer import Peer
+from server.peers import Peers
+from server.seat import ControlSeat, SeatOutcome, SeatRefusal, SeatTimes, Standing
+
+__all__ = ["SeatHost", "SeatKeeper", "SeatMessage"]
+
+CHECKS = 12  # within one heartbeat timeout
+
+SeatMessage = SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease
+
+
+class SeatHost(Protocol):
+    """What the keeper needs of the console."""
+
+    def rest_robot(self, why: str) -> None: ...
+    def refuse(self, peer: Peer, refusal: SeatRefusal) -> None: ...
+
+
+class SeatKeeper:
+    """Run `watch` as a task. All else is called on the loop and returns at once."""
+
+    def __init__(self, times: SeatTimes, peers: Peers, host: SeatHost, audit: AuditTrail) -> None:
+        self.rules = ControlSeat(times)
+        self._times = times
+        self._peers = peers
+        self._host = host
+        self._audit = audit
+
+    def message(self) -> Seat:
+        """What everyone is told."""
+        now = time.monotonic()
+        return Seat(
+            holder=self.rules.holder,
+            name=self._name(self.rules.holder),
+            why=self.rules.why,
+            claims=[
+                SeatClaim(peer=peer, name=self._name(peer), seconds_left=round(left, 1))
+                for peer, left in self.rules.claims(now).items()
+            ],
+            idle_seconds_left=_rounded(self.rules.idle_seconds_left(now)),
+        )
+
+    def handle(self, peer: Peer, message: SeatMessage) -> None:
+        """What `peer` asks for."""
+        now = time.monotonic()
+        match message:
+            case SeatRequest(only_if_free=only_if_free):
+                self._act(self.rules.request(peer.id, peer.role, now, only_if_free=only_if_free), peer)
+            case SeatTake():
+                self._act(self.rules.take(peer.id, peer.role, now), peer)
+            case SeatGrant(peer=claimant):
+                self._act(self.rules.answer(peer.id, claimant, now, grant=True), peer)
+            case SeatDecline(peer=claimant):
+                self._act(self.rules.answer(peer.id, claimant, now, grant=False), peer)
+            case SeatRelease():
+                self._act(self.rules.release(peer.id, now), peer)
+
+    def heard(self, peer: Peer) -> None:
+        self.rules.heard(peer.id, time.monotonic())
+
+    def moved(self, peer: Peer) -> None:
+        """A moving command of `peer` passed."""
+        self._act(self.rules.moved(peer.id, time.monotonic()), peer)
+
+    def gone(self, peer: Peer) -> None:
+        self._act(self.rules.gone(peer.id, time.monotonic()), peer)
+
+    def concerns(self, peer: Peer) -> bool:
+        """Whether the seat's message names `peer`."""
+        return self.rules.standing(peer.id) in (Standing.HOLDER, Standing.CLAIMANT)
+
+    async def watch(self) -> None:
+        """Until cancelled."""
+        while True:
+            await asyncio.sleep(min(self._times.heartbeat / CHECKS, 1.0))
+            for outcome in self.rules.expire(time.monotonic()):
+                self._act(outcome, None)
+
+    def _act(self, outcome: SeatOutcome, actor: Peer | None) -> None:
+        if outcome.rest:
+            self._host.rest_robot(self.rules.why)
+        if outcome.changed:
+            seat = self.message()
+            holder = self._peers.by_id(seat.holder)
+            self._audit.seat(seat, _actor(holder), _actor(actor))
+            self._peers.tell("session", seat)
+        if outcome.refusal is not None:
+            refused = self._peers.by_id(outcome.refusal.peer)
+            if refused is not None:
+                self._host.refuse(refused, outcome.refusal)
+
+    def _name(self, peer_id: str) -> str:
+        peer = self._peers.by_id(peer_id) if peer_id else None
+        return "" if peer is None else peer.name
+
+
+def _rounded(seconds: float | None) -> float | None:
+    return None if seconds is None else round(seconds, 1)
+
+
+def _actor(peer: Peer | None) -> Actor:
+    return Actor() if peer is None else peer.actor
