@@ -2,22 +2,25 @@
 
 Every value stays inside an envelope around its rest value that closes at the axis' `brake` rate and has closed `hold`
 seconds after the last execution. So a command never outlives `hold`, whatever else happens, and no ramp is ever
-steeper than `brake` unless ticks were missed.
+steeper than `brake` unless ticks were missed. A limiter (position limits, geofences) has the last word.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from robot_bridge.protocol.description import Axis
 
-__all__ = ["AxisShaper"]
+__all__ = ["AxisShaper", "Limiter"]
+
+Limiter = Callable[[list[float], list[float]], list[float]]  # values, the same braking -> values nearer to rest
 
 
 class AxisShaper:
     """Call `drive` at execution, `rest` to come to rest early, and `step` once a tick."""
 
-    def __init__(self, axes: Sequence[Axis], *, hold: float) -> None:
+    def __init__(self, axes: Sequence[Axis], *, hold: float, limiter: Limiter | None = None) -> None:
         self._axes = tuple(axes)
         self._hold = hold
+        self._limiter = limiter
         self._rest_values = [axis.rest for axis in axes]
         self._values = list(self._rest_values)  # applied last, [0.4, 0.0, 0.0]
         self._targets: list[float] | None = None  # None: coming to rest or there
@@ -49,8 +52,8 @@ class AxisShaper:
         left = self._deadline - now
         if left <= 0:
             self._targets = None
-        for index, axis in enumerate(self._axes):
-            self._values[index] = self._step_axis(index, axis, left, dt)
+        values = [self._step_axis(index, axis, left, dt) for index, axis in enumerate(self._axes)]
+        self._values = values if self._limiter is None else self._limiter(values, self._braked(dt))
         return list(self._values)
 
     def _step_axis(self, index: int, axis: Axis, left: float, dt: float) -> float:
@@ -59,3 +62,10 @@ class AxisShaper:
         value = target if abs(change) <= rate * dt else self._values[index] + (rate * dt if change > 0 else -rate * dt)
         reach = axis.brake * max(left, 0.0)
         return min(max(value, axis.rest - reach), axis.rest + reach)
+
+    def _braked(self, dt: float) -> list[float]:
+        """One step of braking from what was applied last."""
+        return [
+            max(axis.rest, value - axis.brake * dt) if value > axis.rest else min(axis.rest, value + axis.brake * dt)
+            for value, axis in zip(self._values, self._axes, strict=True)
+        ]

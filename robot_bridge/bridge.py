@@ -19,6 +19,7 @@ from robot_bridge.event_log import EventKind, EventLog
 from robot_bridge.link_server import LinkPeer, LinkServer
 from robot_bridge.link_session import BadInput
 from robot_bridge.metronome import Metronome
+from robot_bridge.motion_limits import MotionLimits
 from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop
 from robot_bridge.robots.base import MediaSource, Robot, Stamp
 from robot_bridge.settings import BridgeSettings
@@ -48,9 +49,12 @@ class Bridge:
         self._core = EventCore(
             self.description.axes, max_event_age=self.description.max_event_age, first_event=settings.first_event
         )
-        self._shaper = AxisShaper(self.description.axes, hold=self.description.hold)
+        self._limits = MotionLimits(self.description, robot, robot.tick_seconds)
+        self._shaper = AxisShaper(self.description.axes, hold=self.description.hold, limiter=self._limits)
         self._links = LinkServer(self, self.description, self.epoch, self.counters, max_links=settings.max_links)
         self._log: EventLog | None = None
+        self._acting: frozenset[str] = frozenset()  # limits that slowed the robot in the last tick
+        self._acted: set[str] = set()  # and since the last feedback
         self._source_faults: list[str] = []  # "camera overview: ..."
         self._running: asyncio.Task[None] | None = None
         self._at_rest = asyncio.Event()  # nothing is driven
@@ -227,6 +231,8 @@ class Bridge:
             raise self._robot_error
         self._robot.apply(self._shaper.step(now, self._robot.tick_seconds))
         self._robot.tick()
+        if self._limits.acting != self._acting:
+            self._note_limits(self._limits.acting)
         if self._shaper.at_rest:
             self._at_rest.set()
         if self._core.issue_due(now):
@@ -234,12 +240,22 @@ class Bridge:
 
     def _issue(self, now: float) -> None:
         measured = self._robot.measure()
-        if self._source_faults:
-            measured = measured._replace(faults=[*measured.faults, *self._source_faults])
-        feedback = self._core.issue(measured._replace(at_rest=measured.at_rest and self._shaper.at_rest), now)
+        if self._source_faults or self._limits.blind:
+            blind = [f"no motion: the position is unknown ({name})" for name in sorted(self._limits.blind)]
+            measured = measured._replace(faults=[*measured.faults, *self._source_faults, *blind])
+        measured = measured._replace(at_rest=measured.at_rest and self._shaper.at_rest)
+        feedback = self._core.issue(measured, now, sorted(self._acted | self._acting))
+        self._acted.clear()
         self.counters.issued += 1
         self._record("feedback", feedback.event, issue=feedback.issue, at_rest=feedback.at_rest)
         self._links.publish_feedback(feedback)
+
+    def _note_limits(self, acting: frozenset[str]) -> None:
+        """Counted once for each spell, recorded at its beginning and its end."""
+        self.counters.limits.update(acting - self._acting)
+        self._acted |= acting | self._acting
+        self._acting = acting
+        self._record("limit", self._core.current, acting=sorted(acting))
 
     # media
 
@@ -271,19 +287,20 @@ class Bridge:
         """One log line with the counters."""
         counters = self.counters
         _logger.info(
-            "event %d, executed %d, issued %d, media %d, skipped ticks %d, refusals %s, bad input %s, drops %s, "
-            "endings %s",
+            "event %d, executed %d, issued %d, media %d, skipped ticks %d, limits %s, refusals %s, bad input %s, "
+            "drops %s, endings %s",
             self._core.current,
             counters.executed,
             counters.issued,
             counters.media,
             counters.skipped_ticks,
+            dict(counters.limits),
             dict(counters.refusals),
             dict(counters.bad_input),
             dict(self.drops),
             dict(counters.endings),
         )
 
-    def _record(self, kind: EventKind, event: int, **fields: str | float | bool | list[float]) -> None:
+    def _record(self, kind: EventKind, event: int, **fields: str | float | bool | list[float] | list[str]) -> None:
         if self._log is not None:
             self._log.record(kind, time.monotonic(), event, **fields)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 
+from robot_bridge.check_limits import check_limits
 from robot_bridge.errors import DescriptionError
 from robot_bridge.protocol.description import Axis, RobotDescription
 
@@ -30,6 +31,7 @@ def check_description(description: RobotDescription) -> None:
         "stream", [camera.name for camera in description.cameras] + [source.name for source in description.microphones]
     )
     _check_references(description)
+    check_limits(description)
 
 
 def _check_axis(axis: Axis, hold: float) -> None:

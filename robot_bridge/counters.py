@@ -14,6 +14,7 @@ class BridgeCounters:
     issued: int = 0  # feedback, refreshes included
     media: int = 0  # pictures and segments captured
     skipped_ticks: int = 0  # the loop was blocked for longer than could be caught up
+    limits: Counter[str] = field(default_factory=Counter)  # spells in which one slowed the robot, {"charger": 2}
     refusals: Counter[str] = field(default_factory=Counter)  # by reason, {"late": 3}
     bad_input: Counter[str] = field(default_factory=Counter)  # by name, {"malformed": 1}
     drops: Counter[str] = field(default_factory=Counter)  # of links that are gone, by kind or stream, {"overview": 9}

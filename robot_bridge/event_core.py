@@ -166,7 +166,7 @@ class EventCore:
             return True
         return now - self._feedback.time >= self._refresh_interval
 
-    def issue(self, measured: Measurement, now: float) -> Feedback:
+    def issue(self, measured: Measurement, now: float, limits: Sequence[str] = ()) -> Feedback:
         """The feedback of the pending event, which thereby becomes current, or of the current event again."""
         if self._pending is not None:
             self._current, self._pending = self._pending, None
@@ -186,6 +186,7 @@ class EventCore:
             at_rest=measured.at_rest,
             stop=self._stop,
             faults=measured.faults,
+            limits=list(limits),
         )
         return self._feedback
 

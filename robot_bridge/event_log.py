@@ -15,8 +15,8 @@ import msgspec
 
 __all__ = ["EventKind", "EventLog"]
 
-EventKind = Literal["start", "executed", "feedback", "refused", "media", "stop", "reset", "rest"]
-Field = str | int | float | bool | list[float]
+EventKind = Literal["start", "executed", "feedback", "refused", "media", "stop", "reset", "rest", "limit"]
+Field = str | int | float | bool | list[float] | list[str]
 
 MAX_WAITING = 10_000  # lines
 

@@ -9,21 +9,26 @@ import msgspec
 
 __all__ = [
     "Axis",
+    "AxisGain",
     "Binding",
     "Body",
     "BodyJoint",
     "Camera",
     "ControlLayer",
+    "Geofence",
     "Geom",
     "Joint",
     "Microphone",
     "PadInput",
+    "PlanarBase",
+    "PositionLimit",
     "RangeRing",
     "RobotDescription",
     "TouchPad",
     "WrenchSensor",
 ]
 
+Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # w, x, y, z
 Rgba = tuple[float, float, float, float]  # 0 to 1 each
@@ -52,6 +57,55 @@ class Joint(msgspec.Struct, frozen=True, kw_only=True):
     unit: Literal["rad", "m"]
     minimum: float | None = None
     maximum: float | None = None
+
+
+class AxisGain(msgspec.Struct, frozen=True, kw_only=True):
+    """An axis that moves a joint: the joint's velocity is `gain` x (the axis' value - its rest value).
+
+    None: the gain changes with the posture, and the robot adapter says what the axes do to the joint now.
+    """
+
+    axis: str
+    gain: float | None = 1.0
+
+
+class PositionLimit(msgspec.Struct, frozen=True, kw_only=True):
+    """Keeps a measured joint between `minimum` and `maximum` by slowing the axes that move it; None: no bound.
+
+    The bridge enforces it (docs/robot-link.md, "Limits"). Motion away from a bound is always free.
+    """
+
+    name: str  # "lift.range", what `Feedback.limits` says while it acts
+    label: str  # "Lift range"
+    joint: str
+    minimum: float | None = None
+    maximum: float | None = None
+    axes: tuple[AxisGain, ...]
+    margin: float = 0.0  # rad or m kept besides, for what the robot's own dynamics add
+    latency: float = 0.0  # s that the measured position may be late, besides one tick
+
+
+class PlanarBase(msgspec.Struct, frozen=True, kw_only=True):
+    """A mobile base on a plane: where its pose is measured, and which axes move it. The geofences need it."""
+
+    x: str  # joints: the pose in the frame of the geofences, m and rad
+    y: str
+    yaw: str
+    forward: str  # axes: twist in the base's own frame, m/s and rad/s
+    left: str = ""  # "" for a base that cannot move sideways
+    turn: str = ""
+    radius: float = 0.0  # m, of the circle around the pose's origin that holds the whole robot
+    margin: float = 0.0  # m kept besides
+    latency: float = 0.0  # s that the measured pose may be late, besides one tick
+
+
+class Geofence(msgspec.Struct, frozen=True, kw_only=True):
+    """A zone on the floor that the whole base stays inside of, or outside of."""
+
+    name: str  # "charger", what `Feedback.limits` says while it acts
+    label: str  # "Charging area"
+    kind: Literal["keep_in", "keep_out"]
+    polygon: tuple[Vector2, ...]  # m, corners in order, either way round; may be concave
 
 
 class WrenchSensor(msgspec.Struct, frozen=True, kw_only=True):
@@ -158,6 +212,9 @@ class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     wrench: WrenchSensor | None = None
     ranges: RangeRing | None = None
     bodies: tuple[Body, ...] = ()
+    position_limits: tuple[PositionLimit, ...] = ()
+    planar_base: PlanarBase | None = None
+    geofences: tuple[Geofence, ...] = ()
     hold: float = 0.3  # s a command is held before the robot comes to rest by itself
     max_event_age: float = 2.0  # s after which a feedback may no longer be answered
     max_event_rate: float = 25.0  # Hz, the most events per second that the robot wants

@@ -65,6 +65,20 @@ class Robot(ABC):
     def measure(self) -> Measurement:
         """The state now."""
 
+    def positions(self) -> Sequence[float]:
+        """Position of each joint now, for limits and geofences; NaN where it is unknown or too old to be trusted.
+
+        Called up to once a tick while the robot moves, so it should cost little.
+        """
+        return self.measure().joints
+
+    def joint_rates(self, values: Sequence[float]) -> Sequence[float] | None:
+        """Velocity of each joint that these axis values cause in the posture of now; None when it is not known.
+
+        Needed only for position limits with a gain of None.
+        """
+        return None
+
     def stop(self) -> None:
         """The stop was latched: also engage brakes or cut power where the robot can."""
 

@@ -24,7 +24,7 @@ from robot_bridge.protocol.messages import (
 )
 from robot_bridge.protocol.serial import FIRST_EVENT, event_after
 from robot_bridge.robots.base import MediaSource
-from robot_bridge.robots.planar.robot import PlanarRobot
+from robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
 from robot_bridge.settings import BridgeSettings
 
 __all__ = [
@@ -49,8 +49,8 @@ NEUTRAL = [0.0, 0.0, 0.0]
 class RecordingRobot(PlanarRobot):
     """Remembers what was applied when, and what was called."""
 
-    def __init__(self, *, media: bool = False) -> None:
-        super().__init__()
+    def __init__(self, *, media: bool = False, state: PlanarState | None = None) -> None:
+        super().__init__(state)
         self.applied: list[tuple[float, list[float]]] = []
         self.calls: list[str] = []
         self._media = media

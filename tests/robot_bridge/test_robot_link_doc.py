@@ -91,7 +91,7 @@ def test_every_field_of_the_description_is_described(kind: object) -> None:
 
 
 def test_the_refusal_reasons_are_all_described() -> None:
-    console_only = {"no_seat", "seat_taken", "link_down"}
+    console_only = {"no_seat", "seat_taken", "declined", "not_neutral", "too_often", "link_down"}
     assert first_column(section("Refusals")) == set(get_args(RefusalReason)) - console_only
     assert all(f"`{reason}`" in section("Refusals") for reason in console_only)
 

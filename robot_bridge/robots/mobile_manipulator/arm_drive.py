@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from robot_bridge.robots.mobile_manipulator.resolved_rates import ResolvedRates
+from robot_bridge.robots.mobile_manipulator.resolved_rates import Resolution, ResolvedRates
 from robot_bridge.robots.mobile_manipulator.simulation import ARM, JOINTS, Simulation
 
 __all__ = ["ArmDrive"]
@@ -32,12 +32,21 @@ class ArmDrive:
         self._rates = ResolvedRates(lower, upper, FASTEST)
         self._lag = -model.actuator_biasprm[ARM, 2] / model.actuator_gainprm[ARM, 0]  # s, kv / kp of each servo
         self._posture = simulation.joints[ARM].copy()
+        self._foreseen: tuple[bytes, Resolution] | None = None  # a twist of this tick, and what it resolves to
         self.faults: list[str] = []
 
     def release(self) -> None:
         """Hold the posture that the arm has now."""
         self._posture = self._simulation.joints[ARM].copy()
         self.faults = []
+
+    def rates(self, twist: Array) -> Array:
+        """Velocities of the joints, rad/s, that `twist` would cause in the posture of now."""
+        if not twist.any():
+            return np.zeros(len(twist))
+        resolution = self._rates.resolve(self._simulation.tool_jacobian(), twist, self._simulation.joints[ARM])
+        self._foreseen = (twist.tobytes(), resolution)
+        return resolution.velocities
 
     def drive(self, twist: Array, seconds: float) -> None:
         """Use `twist` (base frame, m/s and rad/s) for the coming `seconds`."""
@@ -47,11 +56,15 @@ class ArmDrive:
         posture = self._posture + velocities * seconds
         posture = np.clip(posture, joints - LEAD, joints + LEAD)
         self._posture = np.clip(posture, self._lower, self._upper)
+        self._foreseen = None
         # A servo follows a moving target with the lag kv/kp; aiming ahead by it makes the arm stop where it is told.
         self._simulation.data.ctrl[ARM] = self._posture + velocities * self._lag
 
     def _resolve(self, twist: Array, joints: Array) -> Array:
-        resolution = self._rates.resolve(self._simulation.tool_jacobian(), twist, joints)
+        if self._foreseen is not None and self._foreseen[0] == twist.tobytes():
+            resolution = self._foreseen[1]
+        else:
+            resolution = self._rates.resolve(self._simulation.tool_jacobian(), twist, joints)
         self.faults = [f"arm joint limit: {self._names[index]}" for index in resolution.limited]
         if resolution.lost:
             self.faults.append("arm cannot reach farther this way")

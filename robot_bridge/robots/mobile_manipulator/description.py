@@ -5,6 +5,7 @@ from typing import Any, Final
 from robot_bridge.protocol.description import Camera, Microphone, RobotDescription, WrenchSensor
 from robot_bridge.robots.mobile_manipulator.controls import AXES, LAYERS
 from robot_bridge.robots.mobile_manipulator.kinematics import describe_bodies, describe_joints
+from robot_bridge.robots.mobile_manipulator.limits import BASE_ON_FLOOR, GEOFENCES, arm_limits
 from robot_bridge.robots.mobile_manipulator.range_ring import RING
 from robot_bridge.robots.mobile_manipulator.simulation import MOUNT
 
@@ -23,17 +24,21 @@ WRENCH: Final = WrenchSensor(
 
 def describe(model: Any) -> RobotDescription:
     """The description that belongs to the compiled model."""
+    joints = describe_joints(model)
     return RobotDescription(
         name="mobile-manipulator",
         label="Mobile manipulator (MuJoCo)",
         axes=AXES,
-        joints=describe_joints(model),
+        joints=joints,
         layers=LAYERS,
         cameras=CAMERAS,
         microphones=(MICROPHONE,),
         wrench=WRENCH,
         ranges=RING,
         bodies=describe_bodies(model),
+        position_limits=arm_limits(joints),
+        planar_base=BASE_ON_FLOOR,
+        geofences=GEOFENCES,
         hold=0.3,
         max_event_age=2.0,
         max_event_rate=25.0,

@@ -76,6 +76,14 @@ class MobileManipulator(Robot):
             faults=self._faults(),
         )
 
+    def positions(self) -> Sequence[float]:
+        joints: list[float] = self.simulation.joints.tolist()
+        return joints
+
+    def joint_rates(self, values: Sequence[float]) -> Sequence[float]:
+        """The base's rates are left out: no limit by posture needs them."""
+        return [0.0, 0.0, 0.0, *self._arm.rates(np.array(values[BASE.stop :])).tolist()]
+
     def sources(self) -> Sequence[MediaSource]:
         return self._sources
 

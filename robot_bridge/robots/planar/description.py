@@ -9,14 +9,16 @@ from robot_bridge.protocol.description import (
     BodyJoint,
     Camera,
     ControlLayer,
+    Geofence,
     Geom,
     Joint,
     Microphone,
+    PlanarBase,
     RangeRing,
     RobotDescription,
     WrenchSensor,
 )
-from robot_bridge.robots.planar.room import HALF_LENGTH, HALF_WIDTH, PILLARS
+from robot_bridge.robots.planar.room import CHARGER, HALF_LENGTH, HALF_WIDTH, PILLARS
 
 __all__ = ["DESCRIPTION", "FRONT", "MICROPHONE", "OVERVIEW", "RADIUS", "RANGES"]
 
@@ -36,7 +38,12 @@ RANGES = RangeRing(
     range_max=5.0,
 )
 
+BEHIND_WALLS = 0.05  # m: a wall may be touched, not passed
+_LENGTH, _WIDTH = HALF_LENGTH + BEHIND_WALLS, HALF_WIDTH + BEHIND_WALLS
+_LEFT, _LOW, _RIGHT, _HIGH = CHARGER
+
 _WALL = (0.45, 0.5, 0.55, 1.0)
+_FORBIDDEN = (0.75, 0.25, 0.25, 1.0)
 
 DESCRIPTION = RobotDescription(
     name="planar",
@@ -101,6 +108,12 @@ DESCRIPTION = RobotDescription(
                 Geom(shape="box", size=(0.05, HALF_WIDTH, 0.25), position=(-HALF_LENGTH - 0.05, 0, 0.25), rgba=_WALL),
                 Geom(shape="box", size=(HALF_LENGTH, 0.05, 0.25), position=(0, HALF_WIDTH + 0.05, 0.25), rgba=_WALL),
                 Geom(shape="box", size=(HALF_LENGTH, 0.05, 0.25), position=(0, -HALF_WIDTH - 0.05, 0.25), rgba=_WALL),
+                Geom(
+                    shape="box",
+                    size=((_RIGHT - _LEFT) / 2, (_HIGH - _LOW) / 2, 0.002),
+                    position=((_RIGHT + _LEFT) / 2, (_HIGH + _LOW) / 2, 0.002),
+                    rgba=_FORBIDDEN,
+                ),
                 *(
                     Geom(shape="cylinder", size=(radius, 0.4, 0), position=(x, y, 0.4), rgba=(0.75, 0.5, 0.3, 1))
                     for x, y, radius in PILLARS.tolist()
@@ -119,6 +132,29 @@ DESCRIPTION = RobotDescription(
                 Geom(shape="cylinder", size=(RADIUS, 0.2, 0), position=(0, 0, 0.2), rgba=(0.25, 0.55, 0.85, 1)),
                 Geom(shape="box", size=(0.12, 0.03, 0.02), position=(0.15, 0, 0.42), rgba=(0.95, 0.95, 0.95, 1)),
             ),
+        ),
+    ),
+    planar_base=PlanarBase(
+        x="base.x",
+        y="base.y",
+        yaw="base.yaw",
+        forward="base.vx",
+        left="base.vy",
+        turn="base.wz",
+        radius=RADIUS,
+    ),
+    geofences=(
+        Geofence(
+            name="room",
+            label="Room",
+            kind="keep_in",
+            polygon=((-_LENGTH, -_WIDTH), (_LENGTH, -_WIDTH), (_LENGTH, _WIDTH), (-_LENGTH, _WIDTH)),
+        ),
+        Geofence(
+            name="charger",
+            label="Charging corner",
+            kind="keep_out",
+            polygon=((_LEFT, _LOW), (_RIGHT, _LOW), (_RIGHT, _HIGH), (_LEFT, _HIGH)),
         ),
     ),
 )

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from robot_bridge.robots.planar.description import RADIUS
 from robot_bridge.robots.planar.event_strip import draw_event_strip, strip_height
-from robot_bridge.robots.planar.room import HALF_LENGTH, HALF_WIDTH, PILLARS, ray_hits
+from robot_bridge.robots.planar.room import CHARGER, HALF_LENGTH, HALF_WIDTH, PILLARS, ray_hits
 
 if TYPE_CHECKING:
     from robot_bridge.robots.planar.robot import PlanarState
@@ -21,6 +21,7 @@ Colour = tuple[int, int, int]  # y, u, v
 FLOOR: Colour = (52, 132, 124)
 GRID: Colour = (66, 132, 124)
 WALL: Colour = (150, 132, 124)
+FORBIDDEN: Colour = (78, 116, 168)  # a zone that the robot is not to enter
 PILLAR: Colour = (140, 104, 158)
 BODY: Colour = (130, 168, 92)
 NOSE: Colour = (225, 128, 128)
@@ -102,6 +103,10 @@ class OverviewDrawing:
         left, top = map(round, self._pixel(-HALF_LENGTH, HALF_WIDTH))
         right, bottom = map(round, self._pixel(HALF_LENGTH, -HALF_WIDTH))
         picture.box(left, top, right, bottom, FLOOR)
+        zone_left, zone_low, zone_right, zone_high = CHARGER
+        zone_x, zone_y = map(round, self._pixel(zone_left, zone_high))
+        zone_end, zone_bottom = map(round, self._pixel(zone_right, zone_low))
+        picture.box(zone_x, zone_y, min(zone_end, right), min(zone_bottom, bottom), FORBIDDEN)
         for metre in range(-int(HALF_LENGTH) + 1, int(HALF_LENGTH)):
             column = round(self._pixel(metre, 0)[0])
             picture.box(column, top, column + 1, bottom, GRID)

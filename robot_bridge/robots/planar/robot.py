@@ -93,5 +93,8 @@ class PlanarRobot(Robot):
             faults=[],
         )
 
+    def positions(self) -> Sequence[float]:
+        return self._state[:3]
+
     def sources(self) -> Sequence[MediaSource]:
         return self._sources

@@ -5,11 +5,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["HALF_LENGTH", "HALF_WIDTH", "PILLARS", "Contact", "contacts", "ray_hits"]
+__all__ = ["CHARGER", "HALF_LENGTH", "HALF_WIDTH", "PILLARS", "Contact", "contacts", "ray_hits"]
 
 HALF_LENGTH = 4.0  # m, walls at x = ±
 HALF_WIDTH = 3.0  # m, walls at y = ±
 PILLARS = np.array([[2.0, 1.2, 0.35], [-1.8, -1.0, 0.5], [-1.5, 1.8, 0.25]])  # x, y, radius (m)
+CHARGER = (2.8, -3.1, 4.1, -2.0)  # m, left, low, right, high: where the robot is not to go; reaches into the walls
 
 FloatArray = npt.NDArray[np.float64]
 
