@@ -13,6 +13,7 @@ export function feedbackOf(event: number, rest: Partial<Feedback> = {}): Feedbac
     at_rest: true,
     stop: { stopped: false, by: "", reason: "" },
     faults: [],
+    limits: [],
     ...rest,
   };
 }
@@ -37,6 +38,9 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     wrench: null,
     ranges: null,
     bodies: [],
+    position_limits: [],
+    planar_base: null,
+    geofences: [],
     hold: 0.3,
     max_event_age: 2,
     max_event_rate: 25,
