@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 
 import uvicorn
-from fastapi import FastAPI
+from starlette.applications import Starlette
 
 __all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
 
@@ -69,7 +69,7 @@ class _Server(uvicorn.Server):
 
 
 @asynccontextmanager
-async def running(app: FastAPI, listener: socket.socket) -> AsyncIterator[None]:
+async def running(app: Starlette, listener: socket.socket) -> AsyncIterator[None]:
     """While entered, `app` answers on `listener`; on leaving it shuts down gracefully."""
     config = uvicorn.Config(
         app,
