@@ -1,26 +1,34 @@
+import { ChartsDrawer } from "./charts/charts_drawer";
 import { ConsoleApp } from "./console_app";
 import { holdsSeat, isOperator } from "./core/console_state";
+import type { PageAction } from "./core/page_keys";
 import { countUnread, createUnread, markRead } from "./core/unread";
 import { FIELDS } from "./input/keyboard";
 import { TouchSticks } from "./input/touch_sticks";
+import { watchPageKeys } from "./page_keys";
 import type { ConsoleApi } from "./rtc/console_api";
+import { SessionApi } from "./rtc/session_api";
 import { createAnnouncer } from "./ui/announcer";
 import { createArmPanel } from "./ui/arm_panel";
+import { createAuditSheet } from "./ui/audit_sheet";
 import { createAxisPanel } from "./ui/axis_panel";
 import { createBanner } from "./ui/banner";
 import { createDelayPanel } from "./ui/delay_panel";
 import { h, setData, type Panel } from "./ui/dom";
 import { createEventPanel } from "./ui/event_panel";
 import { createForceGauge } from "./ui/force_gauge";
+import { createInviteSheet } from "./ui/invite_sheet";
+import { createKeysSheet } from "./ui/keys_sheet";
 import { createLogPanel } from "./ui/log_panel";
 import { createNotesPanel } from "./ui/notes_panel";
 import { createOverlay, overlayWords } from "./ui/overlay";
+import { createPageTools } from "./ui/page_tools";
 import { createPeoplePanel } from "./ui/people_panel";
 import { createRangeRadar } from "./ui/range_radar";
 import { SceneView } from "./ui/scene_view";
 import { createSeatBar } from "./ui/seat_bar";
 import { createSettingsPanel } from "./ui/settings_panel";
-import { Sheets } from "./ui/sheet";
+import { Sheets, type SheetContent } from "./ui/sheet";
 import { createStatusBar } from "./ui/status_bar";
 import { createStopPanel } from "./ui/stop_panel";
 import { createStreamTable } from "./ui/stream_table";
@@ -40,6 +48,8 @@ export class Page {
   private readonly root = h("div", "console");
   private readonly sheets = new Sheets(() => this.root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
   private readonly unread = createUnread();
+  private readonly charts: ChartsDrawer;
+  private readonly keys: SheetContent;
   private readonly panels: Panel[];
   private drawnMs = 0;
 
@@ -54,7 +64,11 @@ export class Page {
       armedChanged: () => this.draw(performance.now()),
       feedbackTaken: (now) => this.board.update(this.app, now),
     });
-    this.panels = this.build(left, right);
+    this.keys = createKeysSheet(this.app);
+    this.charts = new ChartsDrawer(this.app.charts, (open) =>
+      this.root.classList.toggle("shows-charts", open),
+    );
+    this.panels = this.build(left, right, new SessionApi(api));
     watchTouch();
   }
 
@@ -69,9 +83,13 @@ export class Page {
     this.draw(performance.now());
   }
 
-  private build(left: HTMLElement, right: HTMLElement): Panel[] {
+  private build(left: HTMLElement, right: HTMLElement, sessionApi: SessionApi): Panel[] {
     const { app, board } = this;
-    const bar = createStatusBar(app, () => this.root.classList.toggle("shows-details"));
+    const bar = createStatusBar(
+      app,
+      () => this.root.classList.toggle("shows-details"),
+      () => this.countNews(),
+    );
     const banner = createBanner(app);
     const event = createEventPanel(app);
     const force = createForceGauge(app, false);
@@ -79,13 +97,16 @@ export class Page {
     const radar = createRangeRadar(app);
     const overlay = createOverlay(app);
     const seat = createSeatBar(app);
+    const tools = createPageTools({ charts: () => this.act("charts"), keys: () => this.act("keys") });
+    bar.element.append(tools.bar);
     const status = [
+      { element: tools.details, update: () => undefined },
       createStreamTable(app),
       createDelayPanel(app, () => board.mainStream()),
       createSettingsPanel(app),
       createLogPanel(app),
     ];
-    const tabs = new Tabs("Session", this.createTabs(status));
+    const tabs = new Tabs("Session", this.createTabs(status, sessionApi));
     const arm = createArmPanel(app);
     const axes = createAxisPanel(app);
     const stop = createStopPanel(app);
@@ -98,18 +119,48 @@ export class Page {
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
     this.root.append(
       ...[bar.element, seat.element, banner.element, board.element, rail],
-      ...[this.sheets.element, deck, announcer.element],
+      ...[this.charts.element, this.sheets.element, deck, announcer.element],
     );
     addEventListener("keydown", (event) => {
       if (event.code === "Escape") this.sheets.close();
     });
-    return [bar, seat, banner, event, force, contact, radar, overlay, tabs, arm, axes, stop, announcer];
+    watchPageKeys(app, (action) => this.act(action));
+    const { charts } = this;
+    return [
+      bar,
+      seat,
+      banner,
+      event,
+      force,
+      contact,
+      radar,
+      overlay,
+      tabs,
+      charts,
+      arm,
+      axes,
+      stop,
+      announcer,
+    ];
   }
 
-  private createTabs(status: readonly Panel[]): Tab[] {
-    const { app, unread } = this;
-    const me = (): string | null => app.state.welcome?.peer ?? null;
-    const news = (): number => countUnread(unread, app.state.notes, me());
+  private act(action: PageAction): void {
+    if (action === "keys") this.sheets.open(this.keys);
+    else if (this.sheets.isOpen) return;
+    else if (action === "charts") this.charts.toggle();
+    else if (action === "freeze") this.charts.freeze();
+    else void this.charts.save();
+  }
+
+  private createTabs(status: readonly Panel[], sessionApi: SessionApi): Tab[] {
+    const { app, unread, sheets } = this;
+    const inviting = createInviteSheet(app, sessionApi);
+    const auditing = createAuditSheet(sessionApi);
+    const people = createPeoplePanel(app, {
+      invite: () => sheets.open(inviting),
+      audit: () => sheets.open(auditing),
+    });
+    const news = (): number => this.countNews();
     const notes = createNotesPanel(app);
     const reading: Panel = {
       element: notes.element,
@@ -121,7 +172,7 @@ export class Page {
     const count = (): string => (app.state.participants.length > 0 ? `${app.state.participants.length}` : "");
     return [
       { name: "Status", panels: status, badge: () => "", calls: () => false },
-      { name: "People", panels: [createPeoplePanel(app)], badge: count, calls: () => false },
+      { name: "People", panels: [people], badge: count, calls: () => false },
       {
         name: "Notes",
         panels: [reading],
@@ -131,11 +182,16 @@ export class Page {
     ];
   }
 
+  private countNews(): number {
+    const { notes, welcome } = this.app.state;
+    return countUnread(this.unread, notes, welcome?.peer ?? null);
+  }
+
   /** Whether keys write, or something stands over the pictures. */
   private isOccupied(): boolean {
     const writes = document.activeElement?.matches(FIELDS) ?? false;
-    const covered = this.root.classList.contains("shows-details") && SMALL_SCREEN.matches;
-    return writes || covered || this.sheets.isOpen;
+    const covers = this.root.classList.contains("shows-details") || this.charts.isOpen;
+    return writes || (covers && SMALL_SCREEN.matches) || this.sheets.isOpen;
   }
 
   /** Who drives gets the controls; a supervisor while holding the seat. */
@@ -148,6 +204,7 @@ export class Page {
     const { app, root } = this;
     setData(root, "armed", app.arming.state);
     setData(root, "role", app.state.welcome === null ? "" : this.drives() ? "operator" : "observer");
+    setData(root, "link", app.link.kind);
     setData(root, "stopped", String(app.state.stop.stopped));
     setData(root, "gate", app.state.settings.gate === "event" ? "on" : "off");
     root.classList.toggle("has-overlay", overlayWords(app, now) !== null);

@@ -46,22 +46,20 @@ export function summarise(people: readonly Participant[]): CrowdSummary {
 export function crowdWords({ count, largestGap, onLowQuality }: CrowdSummary): string {
   const words = [`${count} ${count === 1 ? "observer" : "observers"}`];
   if (largestGap > 0) words.push(`gap up to ${largestGap}`);
-  if (onLowQuality > 0) words.push(`${onLowQuality} on low quality`);
+  if (onLowQuality > 0) words.push(`${onLowQuality} on the low tier`);
   return words.join(" · ");
 }
 
 /** The figures of one person: only those that are known. */
 export function personWords(person: Participant): string {
-  const words: string[] = [person.carrier === "none" ? "no stamps" : person.carrier];
-  if (person.carrier !== "none") words.push(`gap ${person.gap}`);
+  const words: string[] = person.carrier === "none" ? [] : [`gap ${person.gap}`];
   if (person.picture_delay_ms !== null) words.push(`${person.picture_delay_ms.toFixed(0)} ms`);
-  else if (person.round_trip_ms !== null) words.push(`${person.round_trip_ms.toFixed(0)} ms round trip`);
-  if (person.tier !== null) words.push(TIER_WORDS[person.tier]);
+  else if (person.round_trip_ms !== null) words.push(`${person.round_trip_ms.toFixed(0)} ms to and fro`);
   if (person.loss !== null) words.push(`${(person.loss * 100).toFixed(person.loss < 0.0995 ? 1 : 0)} % lost`);
+  if (person.tier !== null) words.push(`${person.tier} tier`);
+  words.push(person.carrier === "none" ? "no stamps" : person.carrier);
   return words.join(" · ");
 }
-
-const TIER_WORDS = { operator: "operator quality", high: "high quality", low: "low quality" } as const;
 
 function byName(one: Participant, other: Participant): number {
   return one.name.localeCompare(other.name, "en") || one.peer.localeCompare(other.peer, "en");

@@ -14,7 +14,7 @@ export interface Claim {
 
 /** What the one button beside the seat does. `why` says why it cannot be pressed; null when it can. */
 export interface SeatAction {
-  readonly kind: "request" | "take" | "release";
+  readonly kind: "request" | "take" | "withdraw" | "release";
   readonly label: string;
   readonly why: string | null;
 }
@@ -43,14 +43,10 @@ export function idleSecondsAfter(seat: Seat | null, agedMs: number): number | nu
 export function seatAction(role: Role | null, standing: SeatStanding): SeatAction | null {
   if (role === "observer" || role === null) return null;
   if (standing === "mine") return { kind: "release", label: "Give control back", why: null };
-  const kind = role === "supervisor" ? "take" : "request";
-  const label = kind === "take" ? "Take control" : "Request control";
-  return { kind, label, why: whyNot(kind, standing) };
-}
-
-function whyNot(kind: "request" | "take", standing: SeatStanding): string | null {
-  if (standing === "unknown") return "Not connected";
-  return standing === "asked" && kind === "request" ? "You have asked" : null;
+  const why = standing === "unknown" ? "Not connected" : null;
+  if (role === "supervisor") return { kind: "take", label: "Take control", why };
+  if (standing === "asked") return { kind: "withdraw", label: "Withdraw request", why };
+  return { kind: "request", label: "Request control", why };
 }
 
 function left(seconds: number, agedMs: number): number {

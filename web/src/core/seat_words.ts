@@ -39,7 +39,7 @@ function holderWords(view: SeatView): SeatWords {
     return {
       tone: "asked",
       title: `${first.name} asks for control`,
-      text: `${first.secondsLeft} s to answer, then it is declined${others}`,
+      text: `${first.secondsLeft} s to answer${others}`,
     };
   }
   if (view.idleSeconds !== null) {
@@ -61,7 +61,7 @@ function freeWords(role: Role | null): string {
 /** What somebody reads who does not drive: their own request first, then others' and the holder's idleness. */
 function waitingWords(view: SeatView): string {
   const mine = view.claims.find((claim) => claim.peer === view.me);
-  if (mine !== undefined) return `You asked for control: ${mine.secondsLeft} s to answer`;
+  if (mine !== undefined) return `You have asked: ${mine.secondsLeft} s to answer`;
   if (view.idleSeconds !== null) return `${view.holder} is idle: control is free in ${view.idleSeconds} s`;
   const [first, ...more] = view.claims;
   if (first !== undefined) {

@@ -8,12 +8,15 @@ export type LinkState =
   | { readonly kind: "no_token" }
   | { readonly kind: "connecting" }
   | { readonly kind: "connected" }
+  | { readonly kind: "ended"; readonly why: LinkEnd } // for good: this link opens nothing any more
   | {
       readonly kind: "waiting";
       readonly why: LinkTrouble;
       readonly detail: string;
       readonly retryAtMs: number;
     };
+
+export type LinkEnd = "link_revoked" | "link_expired";
 
 export type LinkTrouble = "console_unreachable" | "robot_unreachable" | "token_refused" | "refused" | "lost";
 
@@ -43,6 +46,10 @@ export class Connection {
     while (!this.closed()) {
       const trouble = await this.live();
       if (this.closed()) return;
+      if (trouble.end !== undefined) {
+        this.events.state({ kind: "ended", why: trouble.end });
+        return;
+      }
       const waitMs = Math.max(nextWait(this.backoff, Math.random()), trouble.retryAfterMs ?? 0);
       const retryAtMs = performance.now() + waitMs;
       this.events.state({ kind: "waiting", why: trouble.why, detail: trouble.detail, retryAtMs });
@@ -74,7 +81,7 @@ export class Connection {
   }
 
   /** One connection from its first request to its end; says what ended it. */
-  private async live(): Promise<{ why: LinkTrouble; detail: string; retryAfterMs: number | null }> {
+  private async live(): Promise<Trouble> {
     this.events.state({ kind: "connecting" });
     const started = performance.now();
     const ending = Promise.withResolvers<string>();
@@ -116,13 +123,22 @@ export class Connection {
   }
 }
 
-function troubleOf(error: unknown): { why: LinkTrouble; detail: string; retryAfterMs: number | null } {
+interface Trouble {
+  readonly why: LinkTrouble;
+  readonly detail: string;
+  readonly retryAfterMs: number | null;
+  readonly end?: LinkEnd; // trying again is no use
+}
+
+function troubleOf(error: unknown): Trouble {
   if (!(error instanceof ConsoleError)) {
     return { why: "refused", detail: error instanceof Error ? error.message : "", retryAfterMs: null };
   }
   const { status, detail, retryAfterMs } = error;
   if (status === 0) return { why: "console_unreachable", detail: "", retryAfterMs };
   if (error.error === "robot_unreachable") return { why: "robot_unreachable", detail, retryAfterMs };
+  if (error.error === "link_revoked" || error.error === "link_expired")
+    return { why: "token_refused", detail, retryAfterMs, end: error.error };
   if (status === 401 || status === 403) return { why: "token_refused", detail, retryAfterMs: 5000 };
   return { why: "refused", detail: error.message, retryAfterMs };
 }

@@ -65,12 +65,8 @@ export class ConsoleApi {
     return path;
   }
 
-  private async json(
-    method: string,
-    path: string,
-    body: object | undefined,
-    signal: AbortSignal,
-  ): Promise<unknown> {
+  /** One request that is answered in JSON. */
+  async json(method: string, path: string, body: object | undefined, signal: AbortSignal): Promise<unknown> {
     const headers: Record<string, string> = body === undefined ? {} : { "Content-Type": "application/json" };
     const text = body === undefined ? undefined : JSON.stringify(body);
     const response = await this.fetch(method, path, headers, text, signal);

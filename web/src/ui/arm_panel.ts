@@ -23,6 +23,7 @@ export function createArmPanel(app: ConsoleApp): Panel {
       const { arming } = app;
       setHidden(element, !isOperator(app.state) && !holdsSeat(app.state));
       setData(element, "state", arming.state);
+      setData(element, "possible", String(armRefusal(arming, app.conditions(now)) === null));
       setText(state, STATE_WORDS[arming.state]);
       setText(toggle, arming.state === "disarmed" ? "Arm" : "Disarm");
       setText(words, armWords(app, now));

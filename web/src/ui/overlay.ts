@@ -1,6 +1,6 @@
 import { mayDrive, robotIsUp } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
-import type { LinkState, LinkTrouble } from "../rtc/connection";
+import type { LinkEnd, LinkState, LinkTrouble } from "../rtc/connection";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
 import { holdButton } from "./hold_button";
 
@@ -20,6 +20,17 @@ const TROUBLE: Readonly<Record<LinkTrouble, readonly [title: string, text: strin
   ],
   refused: ["The console refused the connection", ""],
   lost: ["Connection lost", "The robot comes to rest by itself."],
+};
+
+const ENDED: Readonly<Record<LinkEnd, readonly [title: string, text: string]>> = {
+  link_revoked: [
+    "This link was revoked",
+    "Whoever invited you has called it back, so this page is closed. Ask for a new link to come back.",
+  ],
+  link_expired: [
+    "This link has expired",
+    "It was good for a limited time, so this page is closed. Ask for a new link to come back.",
+  ],
 };
 
 /** Says over the large view what is wrong, and offers the way out. */
@@ -74,6 +85,10 @@ function linkWords(link: LinkState, now: number): OverlayWords {
       const seconds = Math.max(0, Math.ceil((link.retryAtMs - now) / 1000));
       const detail = link.detail === "" ? "" : ` ${sentence(link.detail)}`;
       return { tone: "bad", title, text: `${text}${detail} Trying again in ${seconds} s.`.trim() };
+    }
+    case "ended": {
+      const [title, text] = ENDED[link.why];
+      return { tone: "calm", title, text };
     }
     case "connected":
       return { tone: "calm", title: "Connected", text: "" };

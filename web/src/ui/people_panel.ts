@@ -1,4 +1,5 @@
 import { crowdWords, personWords, sortPeople, summarise, type People } from "../core/people";
+import { mayDrive } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
 import type { Participant } from "../wire";
 import { button, h, setHidden, setText, type Panel } from "./dom";
@@ -7,8 +8,14 @@ import { createRenameForm } from "./rename_form";
 /** So few observers are shown without being asked for. */
 const FEW = 6;
 
+/** What else can be done about people, in dialogues. */
+export interface PeopleTools {
+  invite(): void;
+  audit(): void;
+}
+
 /** Who is here, and how each of them does. */
-export function createPeoplePanel(app: ConsoleApp): Panel {
+export function createPeoplePanel(app: ConsoleApp, tools: PeopleTools): Panel {
   const leading = h("ul", "people");
   const crowd = h("span", "crowd-words");
   const watching = h("ul", "people");
@@ -19,6 +26,9 @@ export function createPeoplePanel(app: ConsoleApp): Panel {
   const crowdHead = h("div", "crowd", {}, crowd, toggle);
   const empty = h("p", "muted", {}, "Nobody is connected");
   const rename = createRenameForm(app);
+  const invite = button("field-button", "Invite…", () => tools.invite());
+  const audit = button("field-button quiet", "Audit trail…", () => tools.audit());
+  const toolRow = h("div", "people-tools", {}, invite, audit);
   let open = false;
   let shown = "";
   return {
@@ -26,6 +36,7 @@ export function createPeoplePanel(app: ConsoleApp): Panel {
       "section",
       "people-panel",
       { "aria-label": "People" },
+      toolRow,
       empty,
       leading,
       rename,
@@ -34,6 +45,8 @@ export function createPeoplePanel(app: ConsoleApp): Panel {
     ),
     update() {
       const { participants, seat, welcome } = app.state;
+      setHidden(toolRow, !mayDrive(app.state));
+      setHidden(audit, welcome?.role !== "supervisor");
       const key = JSON.stringify([
         participants,
         seat?.holder,

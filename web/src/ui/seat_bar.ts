@@ -71,6 +71,7 @@ function act(app: ConsoleApp): void {
   if (action === null || action.why !== null) return;
   if (action.kind === "request") app.session.requestSeat();
   else if (action.kind === "take") app.session.takeSeat();
+  else if (action.kind === "withdraw") app.session.release();
   else app.releaseSeat();
 }
 

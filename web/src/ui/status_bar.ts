@@ -10,7 +10,7 @@ interface Chip {
 }
 
 /** Name, links and sound: the top of the page. */
-export function createStatusBar(app: ConsoleApp, toggleDetails: () => void): Panel {
+export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news: () => number): Panel {
   const robotName = h("span", "bar-robot");
   const consoleChip = createChip("Console");
   const robotChip = createChip("Robot");
@@ -19,6 +19,8 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void): Pan
   const sound = button("chip-button sound", "", () => toggleSound(app));
   sound.append(level, soundText);
   const details = button("chip-button details-button", "Details", toggleDetails);
+  const badge = h("span", "tab-badge calls", {}, "");
+  details.append(badge);
   const element = h(
     "header",
     "bar",
@@ -34,6 +36,8 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void): Pan
       setText(robotName, app.state.robot?.description.label ?? "");
       consoleChip.show(...consoleWords(app));
       robotChip.show(...robotWords(app));
+      setHidden(badge, news() === 0);
+      setText(badge, `${news()}`);
       const audible = app.room.isAudible();
       setHidden(sound, app.room.sounds.size === 0);
       setPressed(sound, audible);
@@ -67,6 +71,7 @@ function createChip(label: string): Chip {
 function consoleWords(app: ConsoleApp): [Tone, string] {
   if (app.link.kind === "connected") return ["good", "connected"];
   if (app.link.kind === "no_token") return ["off", "no link"];
+  if (app.link.kind === "ended") return ["off", "closed"];
   return app.link.kind === "connecting" ? ["wait", "connecting"] : ["bad", "not connected"];
 }
 

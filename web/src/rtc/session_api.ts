@@ -1,0 +1,50 @@
+import { parseAudit, type AuditEntry } from "../core/audit";
+import {
+  parseInvitations,
+  parseNewInvitation,
+  type Invitation,
+  type NewInvitation,
+} from "../core/invitations";
+import type { Role } from "../core/seat_standing";
+import { ConsoleError, type ConsoleApi } from "./console_api";
+
+const LIMIT_MS = 8000;
+
+/** Invitations and the audit trail over HTTP. All of it raises ConsoleError. */
+export class SessionApi {
+  constructor(private readonly api: ConsoleApi) {}
+
+  async invitations(): Promise<Invitation[]> {
+    return parseInvitations(await this.ask("GET", "/api/invitations"));
+  }
+
+  async invite(role: Role, name: string, seconds: number): Promise<NewInvitation> {
+    const found = parseNewInvitation(await this.ask("POST", "/api/invitations", { role, name, seconds }));
+    if (found === null) throw new ConsoleError(200, "malformed", "the console's answer has no link", null);
+    return found;
+  }
+
+  async revoke(id: string): Promise<void> {
+    await this.ask("DELETE", `/api/invitations/${encodeURIComponent(id)}`);
+  }
+
+  /** Lines after number `after`; the newest ones for -1. */
+  async audit(after: number): Promise<AuditEntry[]> {
+    return parseAudit(await this.ask("GET", `/api/audit?after=${after}`));
+  }
+
+  private ask(method: string, path: string, body?: object): Promise<unknown> {
+    return this.api.json(method, path, body, AbortSignal.timeout(LIMIT_MS));
+  }
+}
+
+/** What somebody can do about an error of the two. */
+export function troubleWords(error: unknown): string {
+  if (!(error instanceof ConsoleError)) return "The page could not do this. Reload it and try again.";
+  if (error.status === 0) return "The console does not answer. It is tried again when you are.";
+  if (error.status === 401) return "Your own link is no longer valid. Ask for a new one.";
+  if (error.status === 403) return `Your link does not permit it: ${error.detail}.`;
+  if (error.status === 404) return "The console does not know it any more.";
+  if (error.status === 429) return "Too many at once. Wait a moment and try again.";
+  return `The console refused: ${error.detail || error.error}.`;
+}
