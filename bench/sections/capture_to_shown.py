@@ -6,11 +6,13 @@ the time of each drawing on the main camera's canvas; `bench/media_join.py` tell
 
 "Drawn" is when the page has drawn the picture on its canvas. "Shown" is when the browser then begins to compose a
 frame, the same moment at which requestVideoFrameCallback tells a bare page about a picture of its <video>. The
-baseline is that bare page on `bench/baseline_server.py`, in the same run, at the same bridge, with nobody driving.
+baselines are that bare page on `bench/baseline_server.py`, and pictures over WebSockets (`bench/rivals/`), one after
+the other in the same run, at the same bridge, with nobody driving.
 """
 
 import asyncio
 import sys
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple
@@ -35,10 +37,15 @@ SECTION = "capture_to_shown"
 SECONDS, QUICK_SECONDS = 12.0, 4.0
 SETTLE = 2.0  # s for the browser's buffers and the encoder to find their measure
 LOG_DELAY = 0.3  # s until the bridge's log is on disk
+LOG_ROUNDING = 1e-6  # s
 CAMERA = "overview"  # 640x480 at 30 pictures a second
 RIGHT_X = 2  # of the pad's axes
 MEDIAN_MS, P95_MS = 40.0, 60.0
-BARE = "plain aiortc: VideoStreamTrack encoded per peer, bare <video>, no playout-delay, nobody driving"
+AIORTC = "plain aiortc: VideoStreamTrack encoded per peer, bare <video>, no playout-delay, nobody driving"
+RIVALS = {
+    "mjpeg": "MJPEG over a WebSocket, as ROS web_video_server sends it (JPEG quality 80), nobody driving",
+    "foxglove": "the Foxglove SDK's WebSocket server, the same JPEGs as CompressedImage, nobody driving",
+}
 TAKE = "() => window.drawProbe.shown.splice(0)"
 
 
@@ -49,6 +56,7 @@ class Delays(NamedTuple):
     shown: list[float]
     share: float  # of the pictures captured in the spell
     uncertainty: float  # ms, of the clocks
+    megabits: float | None = None  # a second, of this camera's pictures; None: not measured
 
 
 async def run(context: Context) -> list[Result]:
@@ -57,7 +65,10 @@ async def run(context: Context) -> list[Result]:
         async with running_stack(robot) as stack:
             seconds = float(context.scale(int(SECONDS), int(QUICK_SECONDS)))
             idle, driving = await _lockstep(stack, seconds)
-            results += _compare(robot, idle, driving, await _bare(stack.bridge, seconds))
+            baselines = {AIORTC: await _bare(stack.bridge, seconds)}
+            for kind, name in RIVALS.items():
+                baselines[name] = await _rival(stack.bridge, kind, seconds)
+            results += _compare(robot, idle, driving, baselines)
     return results
 
 
@@ -67,9 +78,18 @@ async def _lockstep(stack: Stack, seconds: float) -> tuple[Delays, Delays]:
         await page.evaluate("(stream) => { window.drawProbe.stream = stream; }", CAMERA)
         console = ConsolePage(page)
         await console.until_live()
+        sent = await _sent(stack)
+        began = time.monotonic()
         idle = await _spell(page, stack.bridge, seconds)
+        megabits = (await _sent(stack) - sent) * 8 / (time.monotonic() - began) / 1e6
+        idle = idle._replace(megabits=megabits)
         async with _driving(console):
             return idle, await _spell(page, stack.bridge, seconds)
+
+
+async def _sent(stack: Stack) -> float:
+    """Bytes of the camera's pictures to the one peer there is."""
+    return sum((await stack.metrics()).values("lockstep_media_bytes_sent_total", "carrier", stream=CAMERA).values())
 
 
 @asynccontextmanager
@@ -93,6 +113,33 @@ async def _bare(bridge: Bridge, seconds: float) -> Delays:
     ):
         await page.wait_for_function("() => window.drawProbe?.shown.length > 3")
         return await _spell(page, bridge, seconds)
+
+
+async def _rival(bridge: Bridge, kind: str, seconds: float) -> Delays:
+    command = (sys.executable, "-m", "bench.rivals.picture_server", kind, bridge.address)
+    async with (
+        running_process(*command) as (_, ready),
+        running_chromium() as browser,
+        open_probed_page(browser, ready["console"]) as page,
+    ):
+        await page.wait_for_function("() => window.drawProbe?.shown.length > 3")
+        await asyncio.sleep(SETTLE)
+        clock = await read_page_clock(page)
+        await page.evaluate(TAKE)
+        bytes_before = await page.evaluate("window.drawProbe.bytes")
+        await asyncio.sleep(seconds)
+        shown = [entry for entry in await page.evaluate(TAKE) if entry["composed"] is not None]
+        received = await page.evaluate("window.drawProbe.bytes") - bytes_before
+    await asyncio.sleep(LOG_DELAY)
+    first, last = shown[0]["captured"], shown[-1]["captured"]
+    spell = [time for time in capture_times(bridge.event_log, CAMERA) if first - LOG_ROUNDING <= time <= last]
+    return Delays(
+        drawn=[(clock.monotonic(entry["at"]) - entry["captured"]) * 1000 for entry in shown],
+        shown=[(clock.monotonic(entry["composed"]) - entry["captured"]) * 1000 for entry in shown],
+        share=len(shown) / len(spell),
+        uncertainty=clock.uncertainty * 1000,
+        megabits=received * 8 / seconds / 1e6,
+    )
 
 
 async def _spell(page: Page, bridge: Bridge, seconds: float) -> Delays:
@@ -120,33 +167,39 @@ def _delays(shown: list[dict[str, Any]], captured: list[float], clock: PageClock
     )
 
 
-def _compare(robot: str, idle: Delays, driving: Delays, bare: Delays) -> list[Result]:
+def _compare(robot: str, idle: Delays, driving: Delays, baselines: dict[str, Delays]) -> list[Result]:
+    uncertainty = max(each.uncertainty for each in (idle, driving, *baselines.values()))
     conditions = (
         "640×480 at 30 Hz, VP8, operator's page 1280×800 in headless Chromium, all cameras and sound on; "
-        f"{robot}: clocks agree within {max(idle.uncertainty, driving.uncertainty, bare.uncertainty):.2f} ms"
+        f"{robot}: clocks agree within {uncertainty:.2f} ms"
     )
 
-    def row(
-        name: str, value: float, target: float | None = None, baseline: float | None = None, unit: str = "ms"
-    ) -> Result:
+    def row(name: str, value: float | None, baseline: float | None, against: str, **fields: Any) -> Result:
         return Result(
             section=SECTION,
             name=f"{robot}: {name}",
             value=value,
-            unit=unit,
-            target=target,
             baseline=baseline,
-            baseline_name="" if baseline is None else BARE,
+            baseline_name=against,
             samples=len(driving.drawn),
             conditions=conditions,
+            **{"unit": "ms", **fields},
         )
 
-    return [
-        row("driving, shown, median", median(driving.shown), MEDIAN_MS, median(bare.shown)),
-        row("driving, shown, p95", quantile(driving.shown, 0.95), P95_MS, quantile(bare.shown, 0.95)),
-        row("driving, drawn, median", median(driving.drawn)),
-        row("driving, drawn, p95", quantile(driving.drawn, 0.95)),
-        row("watching, shown, median", median(idle.shown), None, median(bare.shown)),
-        row("watching, shown, p95", quantile(idle.shown, 0.95), None, quantile(bare.shown, 0.95)),
-        row("driving, pictures shown", driving.share * 100, None, bare.share * 100, "%"),
+    bare = baselines[AIORTC]
+    rows = [
+        row("driving, shown, median", median(driving.shown), median(bare.shown), AIORTC, target=MEDIAN_MS),
+        row("driving, shown, p95", quantile(driving.shown, 0.95), quantile(bare.shown, 0.95), AIORTC, target=P95_MS),
+        row("driving, drawn, median", median(driving.drawn), median(bare.drawn), AIORTC),
+        row("driving, drawn, p95", quantile(driving.drawn, 0.95), quantile(bare.drawn, 0.95), AIORTC),
+        row("driving, pictures shown", driving.share * 100, bare.share * 100, AIORTC, unit="%"),
     ]
+    for name, rival in baselines.items():
+        who = name.partition(",")[0].partition(":")[0]
+        rows += [
+            row(f"watching, shown, median, to {who}", median(idle.shown), median(rival.shown), name),
+            row(f"watching, shown, p95, to {who}", quantile(idle.shown, 0.95), quantile(rival.shown, 0.95), name),
+        ]
+        if rival.megabits is not None:
+            rows.append(row(f"bit rate, to {who}", idle.megabits, rival.megabits, name, unit="Mbit/s"))
+    return rows

@@ -1,0 +1,99 @@
+"""Does the console's memory stay flat? Ten minutes with an operator who drives and observers that come and go.
+
+The baseline is plain aiortc (`bench/baseline_server.py`) with as many peers of the main camera, coming and going alike,
+at the same time at the same bridge. Growth compares the medians of the first and the last quarter after a warm-up
+of a quarter of the time (`bench/soak/memory.py`).
+"""
+
+import asyncio
+import sys
+import time
+from contextlib import AsyncExitStack
+
+from bench.context import Context
+from bench.driving import console_trips
+from bench.processes import Running, running_process
+from bench.results import Result
+from bench.soak.memory import growth
+from bench.stack import running_stack
+from client import Console
+
+__all__ = ["run"]
+
+SECTION = "memory"
+SECONDS, QUICK_SECONDS = 600, 20
+OBSERVERS, TURNOVER = 5, 5  # that stay; that come and go together
+STAY = 8.0  # s that a visitor stays
+CONNECT_SECONDS = 60.0
+EVENTS = 10_000_000  # more than fit into the time
+ROBOT = "planar"
+GROWTH_TARGET = 5.0  # %
+SAMPLE_SECONDS = 1.0
+MEGABYTE = 1e6
+
+
+async def run(context: Context) -> list[Result]:
+    seconds = float(context.scale(SECONDS, QUICK_SECONDS))
+    async with running_stack(ROBOT) as stack, AsyncExitStack() as others:
+        command = (sys.executable, "-m", "bench.baseline_server", stack.bridge.address)
+        rival, ready = await others.enter_async_context(running_process(*command))
+        await _audience(others, stack.observer, OBSERVERS)
+        await _audience(others, ready["console"], OBSERVERS, "plain")
+        console = await others.enter_async_context(Console(stack.operator, name="operator", decode=False))
+        await console.take_seat()
+        async with asyncio.TaskGroup() as tasks:
+            visits = tasks.create_task(_visits(stack.observer, ready["console"]))
+            driving = tasks.create_task(console_trips(console, EVENTS, seconds=seconds))
+            ours, theirs = await _samples([stack.console, rival], seconds, context)
+            visits.cancel()
+            trips = await driving
+    return _results(seconds, ours, theirs, len(trips))
+
+
+async def _audience(stack: AsyncExitStack, link: str, count: int, *how: str) -> None:
+    command = (sys.executable, "-m", "bench.audience", link, str(count), *how)
+    await stack.enter_async_context(running_process(*command, ready_seconds=CONNECT_SECONDS))
+
+
+async def _visits(link: str, plain_link: str) -> None:
+    """Until cancelled: a group joins both, stays a while and leaves."""
+    while True:
+        async with AsyncExitStack() as group:
+            await _audience(group, link, TURNOVER)
+            await _audience(group, plain_link, TURNOVER, "plain")
+            await asyncio.sleep(STAY)
+
+
+async def _samples(processes: list[Running], seconds: float, context: Context) -> list[list[float]]:
+    """Bytes of each process, once a second."""
+    found: list[list[float]] = [[] for _ in processes]
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        for samples, process in zip(found, processes, strict=True):
+            samples.append(float(process.resident_bytes()))
+        if len(found[0]) % 60 == 0:
+            context.say(f"{len(found[0]) // 60} min: " + ", ".join(f"{each[-1] / MEGABYTE:.0f} MB" for each in found))
+        await asyncio.sleep(SAMPLE_SECONDS)
+    return found
+
+
+def _results(seconds: float, ours: list[float], theirs: list[float], events: int) -> list[Result]:
+    conditions = (
+        f"{seconds / 60:.1f} minutes, {events} events driven, {OBSERVERS} observers that stay and {TURNOVER} that come "
+        f"and go every {STAY:.0f} s"
+    )
+    plain = "plain aiortc, as many peers of the main camera, encoded per peer"
+
+    def row(name: str, value: float | None, baseline: float | None, unit: str, target: float | None = None) -> Result:
+        known = {"section": SECTION, "samples": len(ours), "conditions": conditions, "baseline_name": plain}
+        return Result(name=name, value=value, baseline=baseline, unit=unit, target=target, **known)  # type: ignore[arg-type]
+
+    return [
+        row("growth after the warm-up", _percent(growth(ours)), _percent(growth(theirs)), "%", GROWTH_TARGET),
+        row("at the end", ours[-1] / MEGABYTE, theirs[-1] / MEGABYTE, "MB"),
+        row("largest", max(ours) / MEGABYTE, max(theirs) / MEGABYTE, "MB"),
+    ]
+
+
+def _percent(share: float | None) -> float | None:
+    return None if share is None else share * 100
