@@ -40,9 +40,9 @@ async def soak(minutes: float, seed: int, say: Callable[[str], None]) -> dict[st
     with TemporaryDirectory(prefix="lockstep-soak-") as folder:
         async with AsyncExitStack() as stack:
             world = await stack.enter_async_context(World(Path(folder)))
-            network = await stack.enter_async_context(
-                Network(load_profile("perfect"), console_url=world.console_url, seed=seed)
-            )
+            network = await stack.enter_async_context(Network(load_profile("perfect"), robot=world.robot, seed=seed))
+            await world.open_console(network.robot_address)
+            await network.open_console(world.console_url)
             return await _Soak(world, network, minutes, seed, say).run(stack)
 
 
@@ -106,11 +106,7 @@ class _Soak:
                 await self._world.restart_server(gently=self._done["restart_server"] % 2 == 0)
                 self._memory.clear()
             case "cut_network":
-                self._world.trouble_begins()
-                try:
-                    await self._network.outage(action.seconds)
-                finally:
-                    self._world.trouble_ends()
+                await self._cut(action.seconds, self._done["cut_network"])
             case "stop":
                 self._world.trouble_begins()
                 try:
@@ -122,6 +118,15 @@ class _Soak:
                 self._crowd.come()
             case "leave":
                 await self._crowd.go()
+
+    async def _cut(self, seconds: float, turn: int) -> None:
+        """In turn: packets are lost, or wait and arrive at the end; every fourth time on the robot link."""
+        self._world.trouble_begins()
+        try:
+            self._network.outage(seconds, hold=turn % 2 == 1, robot=turn % 4 == 3)
+            await asyncio.sleep(seconds)
+        finally:
+            self._world.trouble_ends()
 
     async def _until_live(self, *pages: WatchedPage) -> None:
         """Every page shows new pictures after all is calm; one that does not would need a reload: that is counted."""
@@ -173,4 +178,4 @@ class _Soak:
 
     def _through(self, link: str) -> str:
         """The link by way of the emulated network."""
-        return self._network.console_url + "/#" + link.partition("#")[2]
+        return self._network.link(link)

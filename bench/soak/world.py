@@ -1,4 +1,4 @@
-"""The bridge and the console of a soak, each a process that is killed and started again at the same address."""
+"""The bridge and the console of a soak: processes that die and are started again at the same address."""
 
 import asyncio
 import json
@@ -22,7 +22,7 @@ HTTP_SECONDS = 10.0
 
 
 class World:
-    """Enter it, and both run. `calm_since` says since when nothing is down or cut, on the monotonic clock."""
+    """Enter it, and the bridge runs; then `open_console` with the address at which the console finds it."""
 
     def __init__(self, folder: Path, robot: str = "planar") -> None:
         self.event_log = folder / "events.jsonl"
@@ -38,13 +38,22 @@ class World:
         self._bridge: Running | None = None
         self._server: Running | None = None
         self._bridge_port = self._server_port = 0
+        self._robot_address = ""
         self._troubles = 0
         self._calm_since = time.monotonic()
 
     async def __aenter__(self) -> Self:
         await self._start_bridge()
-        await self._start_server()
         return self
+
+    async def open_console(self, robot_address: str) -> None:
+        self._robot_address = robot_address
+        await self._start_server()
+
+    @property
+    def robot(self) -> tuple[str, int]:
+        """Where the bridge itself listens."""
+        return "127.0.0.1", self._bridge_port
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -142,7 +151,7 @@ class World:
 
     async def _start_server(self) -> None:
         command = (str(Path(sys.executable).with_name("lockstep")), "serve", "--json", "--quiet")
-        where = ("--robot", f"tcp://127.0.0.1:{self._bridge_port}", "--port", str(self._server_port))
+        where = ("--robot", self._robot_address, "--port", str(self._server_port))
         life = AsyncExitStack()
         self._server, ready = await life.enter_async_context(
             running_process(*command, *where, environment=self._environment)
