@@ -1,3 +1,4 @@
+import { ChartSampler } from "./chart_sampler";
 import { axisValues, restValues } from "./core/axis_mapping";
 import * as arming from "./core/arming";
 import * as driver from "./core/driver";
@@ -59,6 +60,7 @@ export class ConsoleApp {
   readonly controls: Controls;
   readonly events = createRateMeter();
   readonly audio = new AudioDesk();
+  readonly charts = new ChartSampler(this);
   link: LinkState = { kind: "connecting" };
   driver: driver.Driver | null = null;
   layer = 0;
@@ -120,11 +122,16 @@ export class ConsoleApp {
     return rateOf(this.stalls, now) >= 0.5;
   }
 
+  /** Whether the console is connected and speaks. */
+  hears(now: number): boolean {
+    return this.state.welcome !== null && now - this.heardMs < SILENT_MS;
+  }
+
   conditions(now = performance.now()): arming.ArmConditions {
     const { state } = this;
     return {
       operator: mayDrive(state),
-      connected: state.welcome !== null && now - this.heardMs < SILENT_MS,
+      connected: this.hears(now),
       robotUp: robotIsUp(state),
       holdsSeat: holdsSeat(state),
       stopped: state.stop.stopped || this.stopping.isPending,
@@ -325,6 +332,7 @@ export class ConsoleApp {
     this.drive(now);
     this.room.listen();
     this.stopping.step(this.state.stop.stopped, now);
+    this.charts.step(now);
     if (this.feeling.isDue(now)) this.feel(now);
     if (now >= this.beatMs) this.beat(now);
     else if (this.earlyPings > 0 && now >= this.earlyPingMs) this.earlyBeat(now);

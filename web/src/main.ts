@@ -6,6 +6,7 @@ import "./style/views.css";
 import "./style/session.css";
 import "./style/sheets.css";
 import "./style/small_screens.css";
+import "./style/charts.css";
 import { readFragment } from "./core/fragment";
 import { installHook } from "./lockstep_hook";
 import { Page } from "./page";

@@ -8,6 +8,7 @@ export interface Latency {
   readonly toFeedback: Samples; // ms
   readonly toPicture: Samples; // ms: until the first picture stamped with the event or a later one is shown
   pictureMs: number | null; // the newest of `toPicture`
+  pictureAtMs: number; // when that was measured
   readonly awaitingFeedback: Map<number, number>; // event -> when it was first sent
   readonly awaitingPicture: Map<number, number>;
 }
@@ -17,6 +18,7 @@ export function createLatency(): Latency {
     toFeedback: createSamples(500),
     toPicture: createSamples(500),
     pictureMs: null,
+    pictureAtMs: -Infinity,
     awaitingFeedback: new Map(),
     awaitingPicture: new Map(),
   };
@@ -50,6 +52,7 @@ export function noteFeedback(latency: Latency, event: number, now: number): numb
 export function notePicture(latency: Latency, stamp: number, now: number): void {
   for (const sent of dropUpTo(latency.awaitingPicture, stamp)) {
     latency.pictureMs = now - sent;
+    latency.pictureAtMs = now;
     addSample(latency.toPicture, latency.pictureMs);
   }
 }

@@ -13,4 +13,11 @@ export class NewestLog<T> {
   all(): readonly T[] {
     return [...this.entries];
   }
+
+  /** Newest first, while `wanted`. */
+  newest(wanted: (entry: T) => boolean): readonly T[] {
+    let first = this.entries.length;
+    while (first > 0 && wanted(this.entries[first - 1] as T)) first -= 1;
+    return this.entries.slice(first).reverse();
+  }
 }

@@ -1,0 +1,59 @@
+import { keyName } from "../core/page_keys";
+import type { ConsoleApp } from "../console_app";
+import type { ControlLayer } from "../wire";
+import { h } from "./dom";
+import type { SheetContent } from "./sheet";
+
+type Line = readonly [keys: readonly string[], about: string];
+
+const ALWAYS: readonly Line[] = [
+  [["Esc", "Backspace"], "STOP, for everyone; pad: B"],
+  [["Enter"], "Arm; pad: START"],
+  [["Space"], "Hold to move; pad: right bumper. Let go to bring the robot to rest"],
+  [["Shift"], "Slow while held; pad: left bumper"],
+  [["Tab"], "Next control layer, while armed; pad: Y"],
+  [["F8", "F9"], "Grant or decline the control seat to whoever asks first"],
+  [["C"], "Live charts, open and close"],
+  [["F"], "Freeze the charts"],
+  [["X"], "Save the charts that are shown as CSV and PNG"],
+  [["H"], "These keys"],
+];
+
+/** Everything that keys do, those of the connected robot among it. */
+export function createKeysSheet(app: ConsoleApp): SheetContent {
+  const element = h("div", "sheet-body keys");
+  return {
+    name: "keys-sheet",
+    title: "Keys",
+    element,
+    opened() {
+      const layers = app.state.robot?.description.layers ?? [];
+      const lists = layers.map((layer) => keyList(layer.label, robotLines(app, layer)));
+      element.replaceChildren(keyList("Everywhere", ALWAYS), ...lists);
+    },
+    closed: () => undefined,
+  };
+}
+
+function robotLines(app: ConsoleApp, layer: ControlLayer): Line[] {
+  const axes = app.state.robot?.description.axes ?? [];
+  return layer.bindings
+    .filter((binding) => binding.key_positive !== "" || binding.key_negative !== "")
+    .map((binding) => [
+      [binding.key_positive, binding.key_negative].filter((code) => code !== "").map(keyName),
+      axes.find((axis) => axis.name === binding.axis)?.label ?? binding.axis,
+    ]);
+}
+
+function keyList(title: string, lines: readonly Line[]): HTMLElement {
+  const rows = lines.map(([keys, about]) =>
+    h(
+      "div",
+      "keys-line",
+      {},
+      h("dt", "", {}, ...keys.map((key) => h("kbd", "", {}, key))),
+      h("dd", "", {}, about),
+    ),
+  );
+  return h("section", "keys-list", {}, h("h3", "list-head", {}, title), h("dl", "", {}, ...rows));
+}
