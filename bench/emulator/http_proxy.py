@@ -65,9 +65,9 @@ class ConsoleProxy:
         try:
             if request.method == "POST" and request.url.path == "/whep" and kind == SDP:
                 response = await self._new_session(request, body)
+            elif request.method == "PATCH" and kind == FRAGMENT:
+                response = await self._more_candidates(request, body)
             else:
-                if request.method == "PATCH" and kind == FRAGMENT:
-                    body = without_candidates(body.decode("utf-8", "replace")).encode()
                 response = await self._forward(request, body)
         except httpx.TransportError as error:
             response = PlainTextResponse(f"the console does not answer: {error or type(error).__name__}", 502)
@@ -94,6 +94,23 @@ class ConsoleProxy:
         finally:
             if not kept:
                 relay.close()
+        self._copy_headers(answer, response, {"content-length", "content-encoding"})
+        return response
+
+    async def _more_candidates(self, request: Request, body: bytes) -> Response:
+        """Trickle ICE, whose candidates are left out, or an ICE restart, which is led through the relay as well."""
+        relay = self._sessions.find(request.url.path)
+        fragment = body.decode("utf-8", "replace")
+        sent = without_candidates(fragment) if relay is None else relay.offer(fragment)
+        answer = await self._ask(request, sent.encode())
+        text = await answer.aread()
+        await answer.aclose()
+        if relay is not None and answer.status_code == 200:
+            try:
+                text = relay.answer(text.decode()).encode()
+            except BadDescription as error:
+                return PlainTextResponse(str(error), 502)
+        response = Response(text, answer.status_code)
         self._copy_headers(answer, response, {"content-length", "content-encoding"})
         return response
 

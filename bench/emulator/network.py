@@ -17,7 +17,7 @@ from bench.emulator.outages import Outages
 from bench.emulator.profile import Profile, load_profile
 from bench.emulator.sessions import Sessions
 from bench.emulator.tcp_relay import TcpRelay
-from bench.emulator.udp_relay import LOOPBACK
+from bench.emulator.udp_relay import LOOPBACK, UdpRelay
 from server.media.aiortc_private import own_addresses
 from server.serve import bind, running
 
@@ -63,14 +63,17 @@ class Network:
         self._client_outages = Outages(self.profile.client_outages)
         self._robot_outages = Outages(self.profile.robot_outages)
         self._signalling = signalling_paths(self.profile, str(seed), self._client_outages)
-        self._sessions: Sessions | None = None
+        self._proxied = False
         self._relay: TcpRelay | None = None
         self._stack = AsyncExitStack()
 
     async def __aenter__(self) -> Self:
+        hosts = self._hosts if self._hosts is not None else await asyncio.to_thread(_own_hosts)
         async with AsyncExitStack() as stack:
             self._deliveries = Deliveries()
             stack.callback(self._deliveries.close)
+            self._sessions = Sessions(self.profile, self._seed, self._client_outages, self._deliveries, hosts)
+            stack.callback(self._sessions.close)
             if self._robot is not None:
                 relay = TcpRelay(self._robot, self.profile, self._seed, self._robot_outages, self._deliveries)
                 self._relay = await stack.enter_async_context(relay)
@@ -91,11 +94,9 @@ class Network:
 
     async def open_console(self, url: str) -> str:
         """Put a proxy in front of the console at `url`, once, and return the proxy's URL."""
-        if self._sessions is not None:
+        if self._proxied:
             raise RuntimeError("this network has a console already")
-        hosts = self._hosts if self._hosts is not None else await asyncio.to_thread(_own_hosts)
-        self._sessions = Sessions(self.profile, self._seed, self._client_outages, self._deliveries, hosts)
-        self._stack.callback(self._sessions.close)
+        self._proxied = True
         parts = urlsplit(url)
         proxy = ConsoleProxy(f"{parts.scheme}://{parts.netloc}", self._sessions, self._signalling)
         self._stack.push_async_callback(proxy.close)
@@ -108,6 +109,12 @@ class Network:
     def link(self, link: str) -> str:
         """The console's link `http://host:port/#token=…`, through this network."""
         return urlsplit(link)._replace(scheme="http", netloc=urlsplit(self.console_url).netloc).geturl()
+
+    def open_relay(self) -> UdpRelay:
+        """A relay of its own between two peers whose descriptions the caller leads through it."""
+        relay = self._sessions.open()
+        self._sessions.keep(f"own {id(relay)}", relay)
+        return relay
 
     def begin(self) -> None:
         """The schedule of outages starts now."""
@@ -132,9 +139,8 @@ class Network:
 
     def statistics(self) -> NetworkStatistics:
         """What has happened to everybody's packets so far."""
-        clients = [] if self._sessions is None else self._sessions.all_paths
         robot = {} if self._relay is None else self._relay.statistics
-        return collect(clients, self._signalling, robot, time.monotonic())
+        return collect(self._sessions.all_paths, self._signalling, robot, time.monotonic())
 
 
 def _own_hosts() -> list[str]:

@@ -29,6 +29,7 @@ __all__ = [
     "Direction",
     "Profile",
     "TwoWay",
+    "even_profile",
     "load_profile",
     "parse_profile",
     "profile_names",
@@ -85,6 +86,12 @@ class Profile:
 
     def bottleneck(self, direction: Direction) -> BottleneckSettings | None:
         return self.bottleneck_to_operator if direction == "to_operator" else self.bottleneck_to_robot
+
+
+def even_profile(name: str, impairment: Impairment) -> Profile:
+    """The same each way on everything between a client and the console; the robot link stays perfect."""
+    path = TwoWay(impairment, impairment)
+    return Profile(name, media=path, control=path, signalling=path)
 
 
 def profile_names() -> list[str]:

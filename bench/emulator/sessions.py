@@ -46,6 +46,9 @@ class Sessions:
         self.end(resource)
         self._relays[resource] = relay
 
+    def find(self, resource: str) -> UdpRelay | None:
+        return self._relays.get(resource)
+
     def end(self, resource: str) -> None:
         relay = self._relays.pop(resource, None)
         if relay is not None:

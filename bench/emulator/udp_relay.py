@@ -13,6 +13,7 @@ from contextlib import suppress
 
 from bench.emulator.client_paths import ClientPaths
 from bench.emulator.deliveries import Deliveries
+from bench.emulator.errors import BadDescription
 from bench.emulator.packets import kind_of, stun_username
 from bench.emulator.profile import Direction
 from bench.emulator.sdp import Address, candidates_replaced, console_address, ice_names, without_candidates
@@ -23,21 +24,37 @@ LOOPBACK = "127.0.0.1"
 MAX_DATAGRAM = 65536
 BATCH = 64  # datagrams read in one turn of the loop
 BUFFER = 1 << 20  # bytes that a socket keeps: a keyframe is a burst
-MAX_FLOWS = 32
+MAX_FLOWS = 64
+MAX_RESTARTS = 20
+
+
+class _Door:
+    """Where the client finds one ICE session of the console, on one of our addresses."""
+
+    def __init__(self, host: str, console: Address, names: set[str]) -> None:
+        self.socket = _udp_socket(host)
+        self.console = console
+        self.names = names  # of the console's ICE session
+
+    @property
+    def address(self) -> Address:
+        return Address(*self.socket.getsockname()[:2])
 
 
 class _Flow:
     """One address of the client that proved to know both ICE names."""
 
-    def __init__(self, door: socket.socket, client: tuple[str, int], console: Address) -> None:
+    def __init__(self, door: _Door, client: tuple[str, int]) -> None:
         self.door = door  # where the client sends to, and hears from
         self.client = client
         self.upstream = _udp_socket()
-        self.upstream.connect(console)
+        self.upstream.connect(door.console)
 
 
 class UdpRelay:
     """Order: `offer`, `answer`, then packets pass until `close`. Use inside a running loop.
+
+    An ICE restart is one more `offer` and `answer`, with fragments: the console's new session gets sockets of its own.
 
     Args:
         paths: what happens to the packets
@@ -51,28 +68,15 @@ class UdpRelay:
         self._paths = paths
         self._deliveries = deliveries
         self._loop = asyncio.get_running_loop()
-        self._offered: set[str] = set()
-        self._answered: set[str] = set()
-        self._console: Address | None = None
-        self._flows: dict[tuple[socket.socket, tuple[str, int]], _Flow] = {}
+        self._hosts = hosts
+        self._offered: set[str] = set()  # the client's ICE names
+        self._doors: list[_Door] = []
+        self._flows: dict[tuple[_Door, tuple[str, int]], _Flow] = {}
         self._closed = False
-        self._doors: list[socket.socket] = []
-        try:
-            for host in hosts:
-                self._doors.append(_udp_socket(host))
-        except OSError:
-            self.close()
-            raise
-        for door in self._doors:
-            self._loop.add_reader(door, self._from_client, door)
-
-    @property
-    def addresses(self) -> list[Address]:
-        return [Address(*door.getsockname()[:2]) for door in self._doors]
 
     def offer(self, sdp: str) -> str:
         """The client's offer as the console gets it."""
-        self._offered = ice_names(sdp)
+        self._offered |= ice_names(sdp)
         return without_candidates(sdp)
 
     def answer(self, sdp: str) -> str:
@@ -81,23 +85,30 @@ class UdpRelay:
         Raises:
             BadDescription: it names no address of the console.
         """
-        self._answered = ice_names(sdp)
-        self._console = console_address(sdp)
-        return candidates_replaced(sdp, self.addresses)
+        console, names = console_address(sdp), ice_names(sdp)
+        if len(self._doors) >= MAX_RESTARTS * len(self._hosts):
+            raise BadDescription("too many ICE restarts")
+        opened: list[_Door] = []
+        for host in self._hosts:
+            door = _Door(host, console, names)
+            self._doors.append(door)
+            opened.append(door)
+            self._loop.add_reader(door.socket, self._from_client, door)
+        return candidates_replaced(sdp, [door.address for door in opened])
 
     def close(self) -> None:
         """Idempotent; what is under way does not arrive."""
         self._closed = True
-        for own in (*self._doors, *(flow.upstream for flow in self._flows.values())):
+        for own in (*(door.socket for door in self._doors), *(flow.upstream for flow in self._flows.values())):
             self._loop.remove_reader(own)
             own.close()
         self._doors.clear()
         self._flows.clear()
 
-    def _from_client(self, door: socket.socket) -> None:
+    def _from_client(self, door: _Door) -> None:
         for _ in range(BATCH):
             try:
-                data, address = door.recvfrom(MAX_DATAGRAM)
+                data, address = door.socket.recvfrom(MAX_DATAGRAM)
             except OSError:  # nothing more, or an ICMP error of an earlier packet
                 return
             flow = self._flows.get((door, address)) or self._admitted(door, address, data)
@@ -107,14 +118,12 @@ class UdpRelay:
             self.heard_at = time.monotonic()
             self._pass(data, "to_robot", flow)
 
-    def _admitted(self, door: socket.socket, address: tuple[str, int], data: bytes) -> _Flow | None:
+    def _admitted(self, door: _Door, address: tuple[str, int], data: bytes) -> _Flow | None:
         """A new flow, if this is an ICE check between the two of us (RFC 8445 7.2.2: "theirs:ours")."""
         theirs, _, ours = (stun_username(data) or "").partition(":")
-        if self._console is None or theirs not in self._answered or ours not in self._offered:
+        if theirs not in door.names or ours not in self._offered or len(self._flows) == MAX_FLOWS:
             return None
-        if len(self._flows) == MAX_FLOWS:
-            return None
-        flow = _Flow(door, address, self._console)
+        flow = _Flow(door, address)
         self._flows[door, address] = flow
         self._loop.add_reader(flow.upstream, self._from_console, flow)
         return flow
@@ -140,7 +149,7 @@ class UdpRelay:
             if direction == "to_robot":
                 flow.upstream.send(data)
             else:
-                flow.door.sendto(data, flow.client)
+                flow.door.socket.sendto(data, flow.client)
         except OSError:  # its buffer is full, or nobody is there any more
             self.unsent += 1
 
