@@ -56,7 +56,7 @@ export class Page {
   constructor(api: ConsoleApi, trailer: boolean, name: string | null) {
     const left = h("div", "stick left", { "aria-label": "Left stick" });
     const right = h("div", "stick right", { "aria-label": "Right stick" });
-    this.board = new ViewBoard(new SceneView(api));
+    this.board = new ViewBoard(new SceneView(api, (event) => this.app.controls.keyboard.foreign(event)));
     this.app = new ConsoleApp(api, trailer, name, new TouchSticks(left, right), {
       canvas: (info) => this.board.canvas(info),
       mainStream: () => this.board.mainStream(),

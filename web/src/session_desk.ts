@@ -1,5 +1,5 @@
 import { holdsSeat, type ConsoleState } from "./core/console_state";
-import { claimsAfter, idleSecondsAfter, type Claim } from "./core/seat_standing";
+import { claimsAfter, idleSecondsAfter, type Claim, type Role } from "./core/seat_standing";
 import type { ClientMessage, Welcome } from "./wire";
 
 const NAME_LIMIT = 60; // characters, as the console takes them
@@ -8,6 +8,7 @@ const NAME_KEY = "lockstep.name";
 
 /** What this page says to the other people: about the seat, its name, notes. */
 export class SessionDesk {
+  role: Role | null = null; // of the last connection: the link has one and keeps it
   seatMs = 0; // when the console last spoke of the seat: its countdowns began then
 
   constructor(
@@ -20,6 +21,7 @@ export class SessionDesk {
 
   /** An operator's page takes the seat if nobody has it, and disturbs nobody otherwise. */
   welcomed(welcome: Welcome): void {
+    this.role = welcome.role;
     if (this.name !== null) this.tell({ type: "rename", name: this.name });
     if (welcome.role === "operator") this.tell({ type: "seat_request", only_if_free: true });
   }

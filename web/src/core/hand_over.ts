@@ -12,41 +12,30 @@ export function handOver(before: Seat | null, after: Seat, me: string | null): H
   if (before === null || before.holder === after.holder) return null;
   const toMe = after.holder !== "" && after.holder === me;
   const fromMe = before.holder !== "" && before.holder === me;
-  return { words: changeWords(before, after, toMe, fromMe), toMe, fromMe };
+  const taker = toMe ? "you" : nameOf(after.name);
+  const giver = fromMe ? "you" : nameOf(before.name);
+  const words =
+    before.holder === "" ? `${taker} took the free control seat` : changeWords(giver, taker, fromMe, after);
+  return { words: words.charAt(0).toUpperCase() + words.slice(1), toMe, fromMe };
 }
 
-function changeWords(before: Seat, after: Seat, toMe: boolean, fromMe: boolean): string {
-  const taker = toMe ? "You" : nameOf(after.name);
-  const giver = before.holder === "" ? null : fromMe ? "You" : nameOf(before.name);
-  if (after.holder === "") return freeWords(giver ?? "Somebody", fromMe, after.why);
-  if (giver === null) return `${taker} took the free control seat`;
-  if (after.why === "granted") return `${giver} handed control to ${toMe ? "you" : taker}`;
-  if (after.why === "taken") return `${taker} took control from ${fromMe ? "you" : giver}`;
-  return `${taker} took control after ${fromMe ? "you" : giver}`;
+function changeWords(giver: string, taker: string, fromMe: boolean, after: Seat): string {
+  if (after.why === "granted") return `${giver} handed control to ${taker}`;
+  if (after.why === "taken") return `${taker} took control from ${giver}`;
+  const has = taker === "you" ? "you have" : `${taker} has`;
+  if (after.why === "released")
+    return `${giver} gave control back: ${after.holder === "" ? "the control seat is free" : `${has} it`}`;
+  const now = after.holder === "" ? "the control seat is free" : `${has} control`;
+  return `${giver} ${leaveWords(after.why, fromMe)}: ${now}`;
 }
 
-function freeWords(giver: string, wasMe: boolean, why: string): string {
-  const free = "the control seat is free";
-  switch (why) {
-    case "released":
-      return `${giver} gave control back: ${free}`;
-    case "disconnected":
-      return `${giver} left: ${free}`;
-    case "heartbeat lost":
-      return `${giver} fell silent: ${free}`;
-    case "idle":
-      return `${giver} ${wasMe ? "were" : "was"} idle: ${free}`;
-    case "revoked":
-      return `${wasMe ? "Your" : `${giver}'s`} link was revoked: ${free}`;
-    default:
-      return why === "" ? capital(free) : `${capital(free)} (${why})`;
-  }
+function leaveWords(why: string, wasMe: boolean): string {
+  if (why === "disconnected") return "left";
+  if (why === "heartbeat lost") return "fell silent";
+  if (why === "idle") return wasMe ? "were idle" : "was idle";
+  return wasMe ? "no longer drive" : "no longer drives";
 }
 
 function nameOf(name: string): string {
-  return name === "" ? "Somebody" : name;
-}
-
-function capital(text: string): string {
-  return text.charAt(0).toUpperCase() + text.slice(1);
+  return name === "" ? "somebody" : name;
 }

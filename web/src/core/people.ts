@@ -54,9 +54,9 @@ export function crowdWords({ count, largestGap, onLowQuality }: CrowdSummary): s
 export function personWords(person: Participant): string {
   const words: string[] = person.carrier === "none" ? [] : [`gap ${person.gap}`];
   if (person.picture_delay_ms !== null) words.push(`${person.picture_delay_ms.toFixed(0)} ms`);
-  else if (person.round_trip_ms !== null) words.push(`${person.round_trip_ms.toFixed(0)} ms to and fro`);
+  else if (person.round_trip_ms !== null) words.push(`${person.round_trip_ms.toFixed(0)} ms RTT`);
   if (person.loss !== null) words.push(`${(person.loss * 100).toFixed(person.loss < 0.0995 ? 1 : 0)} % lost`);
-  if (person.tier !== null) words.push(`${person.tier} tier`);
+  if (person.tier !== null) words.push(`${person.tier === "operator" ? "own" : person.tier} tier`);
   words.push(person.carrier === "none" ? "no stamps" : person.carrier);
   return words.join(" · ");
 }

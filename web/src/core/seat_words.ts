@@ -45,7 +45,7 @@ function holderWords(view: SeatView): SeatWords {
   if (view.idleSeconds !== null) {
     return {
       tone: "idle",
-      title: "You have not moved the robot for a while",
+      title: "No movement for a while",
       text: `Control is given back in ${view.idleSeconds} s`,
     };
   }

@@ -1,4 +1,5 @@
 import type { HeldInputs } from "../core/axis_mapping";
+import { createGrip, noteGrip } from "../core/grip";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
 import { Pad, type PadEvents } from "./pad";
 import type { TouchSticks } from "./touch_sticks";
@@ -10,13 +11,14 @@ export interface ControlSample {
   readonly deadman: boolean;
   readonly held: HeldInputs;
   readonly slowShare: number; // 1, or less with the slow button
-  readonly signature: string; // the same while nothing is changed
+  readonly signature: string; // the same while no hand shows
 }
 
 /** Gamepad, keyboard and touch as one set of controls. */
 export class Controls {
   readonly pad: Pad;
   readonly keyboard: Keyboard;
+  private readonly grip = createGrip();
 
   constructor(
     readonly sticks: TouchSticks,
@@ -36,7 +38,7 @@ export class Controls {
       deadman: keyboard.deadman || sticks.deadman || (pad?.deadman ?? false),
       held,
       slowShare: keyboard.slow || pad?.slow === true ? SLOW_SHARE : 1,
-      signature: JSON.stringify([held.pad, [...keyboard.keys], touch]),
+      signature: noteGrip(this.grip, held),
     };
   }
 

@@ -47,6 +47,11 @@ export class Keyboard {
     this.release();
   }
 
+  /** Keys of a frame inside the page: only STOP passes. */
+  foreign(event: KeyboardEvent): void {
+    if (STOP_KEYS.has(event.code) && !event.repeat) this.events.stop();
+  }
+
   private down(event: KeyboardEvent): void {
     const target = event.target instanceof Element ? event.target : null;
     const inField = target?.matches(FIELDS) ?? false;

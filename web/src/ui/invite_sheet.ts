@@ -34,7 +34,8 @@ export function createInviteSheet(app: ConsoleApp, api: SessionApi): SheetConten
     h("div", "form-field wide", {}, h("span", "form-label", {}, "Role"), roles, about),
     h("div", "form-field", {}, h("label", "form-label", { for: "invite-name" }, "Name"), name),
     h("div", "form-field", {}, h("label", "form-label", { for: "invite-expiry" }, "Good for"), expiry),
-    h("div", "form-foot", {}, make, trouble),
+    make,
+    trouble,
   );
   const result = createResult();
   const list = createInvitationList(api);
@@ -105,7 +106,7 @@ function createResult(): { element: HTMLElement; show(made: NewInvitation | null
         name === ""
           ? `${role === "observer" ? "an" : role === "operator" ? "an" : "a"} ${role}`
           : `${name} (${role})`;
-      setText(words, `Whoever opens this link is ${whom} until ${until}. It can be revoked below.`);
+      setText(words, `Whoever opens this link is ${whom} until ${until}. It can be revoked at any time.`);
       copy.show(made.link);
       code.append(qrCode(made.link));
     },

@@ -15,7 +15,11 @@ export class SceneView {
   private state: SceneState = "off";
   private openedMs = 0;
 
-  constructor(private readonly api: ConsoleApi) {
+  /** `onkey`: keys pressed while the frame has the focus, which the page itself never sees. */
+  constructor(
+    private readonly api: ConsoleApi,
+    private readonly onkey: (event: KeyboardEvent) => void,
+  ) {
     this.element.append(h("div", "scene-idle", {}, this.words, this.open));
     this.show("off", IDLE_WORDS);
   }
@@ -53,9 +57,17 @@ export class SceneView {
   private embed(path: string): void {
     if (this.state !== "loading") return;
     this.frame = h("iframe", "scene-frame", { src: path, title: "3D scene of the robot" });
+    this.watchKeys(this.frame);
     this.element.append(this.frame);
     this.openedMs = performance.now();
     this.show("on", "");
+  }
+
+  /** The frame comes from our own origin, so its window can be listened to. */
+  private watchKeys(frame: HTMLIFrameElement): void {
+    frame.addEventListener("load", () => {
+      frame.contentWindow?.addEventListener("keydown", (event) => this.onkey(event), { capture: true });
+    });
   }
 
   private show(state: SceneState, words: string): void {

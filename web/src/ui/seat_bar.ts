@@ -63,7 +63,7 @@ export function createSeatBar(app: ConsoleApp): Panel {
 
 function actionOf(app: ConsoleApp): SeatAction | null {
   const { welcome, seat } = app.state;
-  return seatAction(welcome?.role ?? null, seatStanding(seat, welcome?.peer ?? null));
+  return seatAction(app.session.role, seatStanding(seat, welcome?.peer ?? null));
 }
 
 function act(app: ConsoleApp): void {
