@@ -1,7 +1,7 @@
 """From sending a command to its feedback over a bad network: 5 % loss each way and 100 ms round trip.
 
-All UDP of the client, media included, passes a relay that delays and loses packets, exactly repeatably. The baseline
-runs beside it through a relay of its own with the same loss and delay: two plain aiortc peers, of which one echoes
+The client reaches its console through the network emulator, which delays and loses packets, exactly repeatably. The
+baseline runs beside it through an emulator with the same loss and delay: two plain aiortc peers, of which one echoes
 what the other sends, on a reliable ordered data channel, one message at a time. Its echo does no work, so that its
 time is the channel's alone.
 """
@@ -14,18 +14,18 @@ from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection
 
 from bench.context import Context
 from bench.driving import console_trips
+from bench.emulator import Constant, Impairment, Network, even_profile, independent
 from bench.loopback_peers import connect_through
 from bench.results import Result
 from bench.samples import quantile
 from bench.stack import running_stack
-from bench.udp_relay import Impairment, UdpRelay
 from client import Console
 
 __all__ = ["run"]
 
 SECTION = "lossy"
 ROUND_TRIP_MS = 100.0
-IMPAIRMENT = Impairment(delay=ROUND_TRIP_MS / 2000, loss=0.05)
+LOSSY = even_profile("lossy", Impairment(delay=Constant(ROUND_TRIP_MS / 2000), loss=independent(0.05)))
 EVENTS, QUICK_EVENTS = 500, 60
 SECONDS = 75.0  # at most
 P99_ROUND_TRIPS = 2.5
@@ -74,29 +74,30 @@ async def run(context: Context) -> list[Result]:
 async def _lockstep(count: int) -> _Ours:
     async with (
         running_stack("planar") as stack,
-        UdpRelay(IMPAIRMENT, seed=7) as relay,
-        Console(stack.operator, name="bench", decode=False, route=relay) as console,
+        Network(LOSSY, console_url=stack.url, seed=7) as network,
+        Console(network.link(stack.operator), name="bench", decode=False) as console,
     ):
         await console.take_seat()
         await console_trips(console, 10)  # the first round trips teach the repeat timer
         trips = await console_trips(console, count, seconds=SECONDS)
-        paths = relay.up, relay.down
+        paths = network.statistics().paths
+        counts = [each for kind in ("stun", "control", "media") for each in paths[kind].values()]
         return _Ours(
             [trip.seconds * 1000 for trip in trips],
-            sum(path.lost for path in paths),
-            sum(path.passed for path in paths),
+            sum(each.lost for each in counts),
+            sum(each.passed for each in counts),
         )
 
 
 async def _echoes(count: int) -> list[float]:
     """Round trips in ms."""
-    async with UdpRelay(IMPAIRMENT, seed=7) as relay:
+    async with Network(LOSSY, seed=7) as network:
         asking = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         answering = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         try:
             channel = asking.createDataChannel("reliable")
             answering.on("datachannel", _echo)
-            await connect_through(relay, asking, answering)
+            await connect_through(network.open_relay(), asking, answering)
             return await _ask(channel, count)
         finally:
             await asking.close()

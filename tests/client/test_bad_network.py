@@ -8,14 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from bench.udp_relay import Impairment, UdpRelay
+from bench.emulator import Constant, Impairment, Network, Uniform, even_profile, independent
 from client import CommandRefused, Console, ConsoleLost
 from tests.client.truth import collecting, drawn_event, executed_after, until_logged
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
-LOSSY = Impairment(delay=0.02, loss=0.08, jitter=0.005)
+LOSSY = even_profile("lossy", Impairment(Uniform(0.02, 0.025), independent(0.08)))
+SLOW = even_profile("slow", Impairment(Constant(0.02)))
 HOLD = 0.3  # s, of the planar robot
 MARGIN = 0.15  # s, for a loaded machine
 FREEZE = 3.6  # s; the seat dies after 3
@@ -23,15 +24,15 @@ FREEZE = 3.6  # s; the seat dies after 3
 
 async def test_with_losses_every_command_is_answered_and_nothing_outside_the_tolerance_is_shown(stack: Stack) -> None:
     async with (
-        UdpRelay(LOSSY, seed=5) as relay,
-        Console(stack.operator, route=relay, tolerance=2) as console,
+        Network(LOSSY, console_url=stack.console, seed=5) as network,
+        Console(network.link(stack.operator), tolerance=2) as console,
     ):
         await console.take_seat()
         async with collecting(console, sound=False) as found:
             events = [(await console.drive([0.0, 0.0, 0.3])).event for _ in range(60)]
         figures = console.stats()
         assert events == sorted(set(events))
-        assert relay.up.lost > 5
+        assert network.statistics().paths["control"]["to_robot"].lost > 5
         assert figures.echoes > 0
         for stream in figures.streams:
             assert stream.max_gap <= (2 if stream.kind == "video" else 6)
@@ -42,8 +43,8 @@ async def test_with_losses_every_command_is_answered_and_nothing_outside_the_tol
 
 
 async def test_a_freeze_brings_the_robot_to_rest_and_nothing_frozen_moves_it_later(stack: Stack) -> None:
-    async with UdpRelay(Impairment(delay=0.02)) as relay:
-        console = Console(stack.operator, route=relay, video=False, audio=False, silence_seconds=10)
+    async with Network(SLOW, console_url=stack.console) as network:
+        console = Console(network.link(stack.operator), video=False, audio=False, silence_seconds=10)
         async with console:
             await console.take_seat()
             for _ in range(10):
@@ -51,11 +52,9 @@ async def test_a_freeze_brings_the_robot_to_rest_and_nothing_frozen_moves_it_lat
             async with asyncio.TaskGroup() as group:
                 driving = group.create_task(_drive_until_refused(console))
                 await until_moving(console)
-                relay.freeze()
+                network.outage(FREEZE, hold=True)
                 frozen_at = time.monotonic()
-                await asyncio.sleep(FREEZE)
-                thawed_at = time.monotonic()
-                relay.thaw()
+                thawed_at = frozen_at + FREEZE
             assert driving.result() == "no_seat"
     last = [record for record in stack.events("executed") if record["time"] < frozen_at + MARGIN][-1]
     rest = await until_logged(stack, "feedback", lambda record: record["time"] > last["time"] and record["at_rest"])
