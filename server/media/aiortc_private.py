@@ -14,8 +14,9 @@ What is used and why:
 
 import asyncio
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 import aioice.ice
 import pylibsrtp
@@ -44,10 +45,12 @@ from aiortc.sdp import SessionDescription
 
 from server.media.frame import EncodedFrame
 from server.media.header_extensions import ExtensionWriter
+from server.media.pacer import Pacer
 from server.media.packet_stream import PacketStream, SenderStats, StreamParameters
 
 __all__ = [
     "MediaSender",
+    "ReceptionListener",
     "create_peer_connection",
     "guard_transports",
     "install_sender",
@@ -62,6 +65,8 @@ __all__ = [
 SOCKET_BACKLOG_BYTES = 64 * 1024  # a peer with more unsent bytes than this gets no more frames for now
 RECEIVE_QUEUE_DATAGRAMS = 1024
 DATAGRAM_MAX = 1500  # bytes, what pylibsrtp takes
+MOST_PATIENCE = 1.0  # s that a keyframe request waits for retransmissions
+MOST_EXPECTED = 100_000  # packets between two reports of a peer
 
 _gather_host_addresses = aioice.ice.get_host_addresses  # aioice's own, before `restrict_ice_hosts`
 
@@ -129,6 +134,16 @@ def install_sender(transceiver: RTCRtpTransceiver, sender: "MediaSender") -> Non
     setattr(transceiver, "_RTCRtpTransceiver__sender", sender)  # noqa: B010
 
 
+class ReceptionListener(Protocol):
+    """Hears what a peer says about what it receives."""
+
+    def reception(self, sender: "MediaSender", lost: int, expected: int, round_trip: float | None) -> None:
+        """Packets since its last report about this stream; the round trip in s if the report tells one."""
+
+    def bandwidth(self, bitrate_bps: int, ssrcs: frozenset[int]) -> None:
+        """Its estimate for these streams together (REMB)."""
+
+
 class MediaSender(RTCRtpSender):
     """Sends ready frames. Owns no task: whoever created it pushes frames and asks for reports."""
 
@@ -141,6 +156,9 @@ class MediaSender(RTCRtpSender):
         on_ready: Callable[[], None],
         on_keyframe_request: Callable[[], None],
         on_stopped: Callable[[], None],
+        listener: ReceptionListener | None = None,
+        pacer: Pacer | None = None,
+        on_paced: Callable[[], None] = lambda: None,
     ) -> None:
         super().__init__(transceiver.kind, transceiver.receiver.transport)
         self._stream_id = stream_id
@@ -148,6 +166,12 @@ class MediaSender(RTCRtpSender):
         self._on_ready = on_ready
         self._on_keyframe_request = on_keyframe_request
         self._on_stopped = on_stopped
+        self._listener = listener
+        self._pacer = pacer  # None: nothing is held back
+        self._on_paced = on_paced
+        self._repeats: deque[bytes] = deque()  # retransmissions that the pacer holds back; they go first
+        self._rest: deque[bytes] = deque()  # packets of the last frame that it holds back
+        self._patience: asyncio.TimerHandle | None = None  # of a keyframe request that waits for a retransmission
         self._packets: PacketStream | None = None  # None before the transport is connected
         self._stopped = False
 
@@ -182,6 +206,10 @@ class MediaSender(RTCRtpSender):
         if self._stopped:
             return
         self._stopped = True
+        self._repeats.clear()
+        self._rest.clear()
+        if self._patience is not None:
+            self._patience.cancel()
         if self._packets is not None:
             self.transport._unregister_rtp_sender(self)
             self._send_control(self._packets.goodbye(time.time()))
@@ -190,7 +218,8 @@ class MediaSender(RTCRtpSender):
     def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
         """Send a frame now: packets and bytes handed to the network, (0, 0) when the transport is gone.
 
-        None, and nothing is sent, while the socket holds so much that another frame would only queue.
+        None, and nothing is sent, while the socket holds so much that another frame would only queue. What the pacer
+        holds back of it is left for `flush`.
         """
         path = self._path()
         if path is None or self._packets is None:
@@ -198,9 +227,17 @@ class MediaSender(RTCRtpSender):
         transport, address = path
         if _backlog(transport) > SOCKET_BACKLOG_BYTES:
             return None
+        packets = self._packets.packets(frame, time.time())
+        if self._pacer is not None:
+            count = self._pacer.admit([len(packet) for packet in packets], time.monotonic())
+            if count < len(packets):
+                self._rest.extend(packets[count:])
+                packets = packets[:count]
+        return self._send_all(packets, transport, address)
+
+    def _send_all(self, packets: Sequence[bytes], transport: Any, address: tuple[str, int]) -> tuple[int, int]:
         sendto = transport.sendto
         protect = self.transport._tx_srtp.protect
-        packets = self._packets.packets(frame, time.time())
         octets = 0
         try:
             for packet in packets:
@@ -208,9 +245,29 @@ class MediaSender(RTCRtpSender):
                 octets += len(protected)
                 sendto(protected, address)
         except (pylibsrtp.Error, ValueError, OSError):
-            self._packets.stats.failed += 1
+            self.stats.failed += 1
             return 0, 0
         return len(packets), octets
+
+    @property
+    def paced(self) -> bool:
+        """Whether packets wait for the pacer."""
+        return bool(self._rest or self._repeats)
+
+    def flush(self) -> tuple[int, int]:
+        """Send what the pacer lets through of what waits: packets and bytes handed to the network."""
+        path = self._path()
+        if path is None or self._packets is None or self._pacer is None:
+            self._rest.clear()
+            self._repeats.clear()
+            return 0, 0
+        packets, octets, now = 0, 0, time.time()
+        for waiting in (self._repeats, self._rest):
+            count = self._pacer.admit([len(packet) for packet in waiting], time.monotonic())
+            leaving = [self._packets.stamp_send_time(waiting.popleft(), now) for _ in range(count)]
+            sent = self._send_all(leaving, *path)
+            packets, octets = packets + sent[0], octets + sent[1]
+        return packets, octets
 
     def report(self) -> None:
         """Send a sender report, if anything was sent yet."""
@@ -243,16 +300,36 @@ class MediaSender(RTCRtpSender):
             self._retransmit_all(packet.lost)
         elif isinstance(packet, RtcpPsfbPacket) and packet.fmt in (RTCP_PSFB_PLI, RTCP_PSFB_FIR):
             self._packets.stats.keyframe_requests += 1
-            self._on_keyframe_request()
+            self._keyframe_requested()
         elif isinstance(packet, RtcpPsfbPacket) and packet.fmt == RTCP_PSFB_APP:
             bitrate, ssrcs = unpack_remb_fci(packet.fci)
             if self._ssrc in ssrcs:
                 self._packets.stats.remb_bps = bitrate
+                if self._listener is not None:
+                    self._listener.bandwidth(bitrate, frozenset(ssrcs))
+
+    def _keyframe_requested(self) -> None:
+        """A peer that lacks packets asks for both, them and a keyframe: the keyframe waits while they may arrive."""
+        if self._patience is not None or self._packets is None:
+            return
+        wait = min(MOST_PATIENCE, self._packets.repair_time(time.time()))
+        if wait <= 0:
+            self._on_keyframe_request()
+            return
+
+        def serve() -> None:
+            self._patience = None
+            self._on_keyframe_request()
+
+        self._patience = asyncio.get_running_loop().call_later(wait, serve)
 
     def _take_reports(self, packet: RtcpRrPacket | RtcpSrPacket) -> None:
         for block in packet.reports:
             if block.ssrc == self._ssrc and self._packets is not None:
-                self._packets.reported(
+                stats = self._packets.stats
+                before = stats.highest_sequence, stats.packets_lost
+                round_trip = self._packets.reported(
+                    highest_sequence=block.highest_sequence,
                     fraction_lost=block.fraction_lost,
                     packets_lost=block.packets_lost,
                     jitter=block.jitter,
@@ -260,19 +337,26 @@ class MediaSender(RTCRtpSender):
                     delay=block.dlsr,
                     now=time.time(),
                 )
+                expected, lost = block.highest_sequence - before[0], block.packets_lost - before[1]
+                if not 0 < expected <= MOST_EXPECTED or before[0] == 0:
+                    expected = lost = 0  # the first report, one that was overtaken, or nonsense
+                if self._listener is not None:
+                    self._listener.reception(self, min(max(0, lost), expected), expected, round_trip)
 
     def _retransmit_all(self, lost: Sequence[int]) -> None:
         path = self._path()
         if path is None or self._packets is None:
             return
-        now = time.monotonic()
+        now = time.time()
         for sequence_number in lost:
             packet = self._packets.retransmission(sequence_number, now)
-            try:
-                if packet is not None:
-                    path[0].sendto(self.transport._tx_srtp.protect(packet), path[1])
-            except (pylibsrtp.Error, ValueError, OSError):
-                self._packets.stats.failed += 1
+            if packet is None:
+                continue
+            if self._pacer is None or (not self._repeats and self._pacer.admit([len(packet)], time.monotonic())):
+                self._send_all((packet,), *path)
+            else:
+                self._repeats.append(packet)  # bounded by the history's budget
+                self._on_paced()
 
 
 def _backlog(transport: Any) -> int:

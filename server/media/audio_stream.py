@@ -53,7 +53,7 @@ class AudioStream(Stream[SoundJob]):
         if not self._waiting:
             return None
         media, capture_time = self._waiting.popleft()
-        outputs = [(output, output.variants()) for output in self.outputs.values() if output.targets]
+        outputs = [(output, output.variants()) for output in self._outputs.values() if output.needed]
         return SoundJob(media, capture_time, outputs)
 
     def _work(self, job: SoundJob) -> list[Encoded]:

@@ -10,6 +10,9 @@ from server.media.frame import EncodedFrame
 __all__ = ["FanOut", "Target"]
 
 
+PACE_SECONDS = 0.004  # between two looks at the pacers
+
+
 class Target(Protocol):
     """One stream of one peer."""
 
@@ -19,6 +22,10 @@ class Target(Protocol):
 
     def put(self, frame: EncodedFrame) -> None:
         """Queue a frame; never blocks."""
+
+    @property
+    def paced(self) -> bool:
+        """Whether part of a frame waits for the pacer."""
 
     def send_next(self) -> bool:
         """Send one queued frame if there is one and the socket takes it; whether another can follow."""
@@ -33,6 +40,8 @@ class FanOut:
         self._waiting: dict[Target, None] = {}  # observers with frames, in the order they are served
         self._order: deque[Target] = deque()
         self._wake = asyncio.Event()
+        self._paced: dict[Target, None] = {}  # that wait for their pacers
+        self._pace = asyncio.Event()
 
     def publish(self, frame: EncodedFrame, targets: Iterable[Target]) -> None:
         """Hand a frame to its targets. Returns when the operator's is sent and the others are queued."""
@@ -40,20 +49,33 @@ class FanOut:
         for target in targets:
             if target.priority:
                 target.put(frame)
-                while target.send_next():
-                    pass
+                self._send_all(target)
             else:
                 observers.append(target)
         for target in observers:
             target.put(frame)
-            if target not in self._waiting:
-                self._waiting[target] = None
-                self._order.append(target)
-        if observers:
-            self._wake.set()
+            self._enqueue(target)
+
+    def pace(self, target: Target) -> None:
+        """Serve a target again when its pacer may let something through."""
+        self._paced[target] = None
+        self._pace.set()
+
+    def _send_all(self, target: Target) -> None:
+        while target.send_next():
+            pass
+        if target.paced:
+            self.pace(target)
+
+    def _enqueue(self, target: Target) -> None:
+        if target not in self._waiting:
+            self._waiting[target] = None
+            self._order.append(target)
+        self._wake.set()
 
     def forget(self, target: Target) -> None:
         """A target is gone."""
+        self._paced.pop(target, None)
         if target in self._waiting:
             del self._waiting[target]
             self._order.remove(target)
@@ -67,6 +89,21 @@ class FanOut:
                 self.serve()
                 await asyncio.sleep(0)  # everything that is ready goes first
 
+    async def run_paced(self) -> None:
+        """Come back to those whose pacers held packets back, until cancelled; the operator first, observers queue."""
+        while True:
+            await self._pace.wait()
+            self._pace.clear()
+            while self._paced:
+                await asyncio.sleep(PACE_SECONDS)
+                waiting, self._paced = self._paced, {}
+                for target in waiting:
+                    if target.priority:
+                        self._send_all(target)
+                for target in waiting:
+                    if not target.priority:
+                        self._enqueue(target)
+
     def serve(self) -> None:
         """Serve observers in turn, one frame each, for one slice."""
         deadline = self._clock() + self._slice
@@ -76,5 +113,7 @@ class FanOut:
                 self._order.append(target)
             else:
                 del self._waiting[target]
+                if target.paced:
+                    self.pace(target)
             if self._clock() >= deadline:
                 return

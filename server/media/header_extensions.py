@@ -13,7 +13,7 @@ from robot_bridge.protocol.carriers import (
     pack_playout_delay,
 )
 
-__all__ = ["ABS_SEND_TIME_URI", "MID_URI", "ExtensionWriter", "choose_carrier", "wanted_uris"]
+__all__ = ["ABS_SEND_TIME_URI", "MID_URI", "ExtensionWriter", "choose_carrier", "pack_send_time", "wanted_uris"]
 
 MID_URI = "urn:ietf:params:rtp-hdrext:sdes:mid"
 ABS_SEND_TIME_URI = "http://www.webrtc.org/experiments/rtp-hdrext/abs-send-time"
@@ -46,6 +46,11 @@ def wanted_uris(kind: str, carrier: Carrier) -> tuple[str, ...]:
     return tuple(uris)
 
 
+def pack_send_time(send_time: float) -> bytes:
+    """abs-send-time of `send_time` (s): 24-bit 6.18 fixed point."""
+    return (int(send_time * 0x40000) & 0xFFFFFF).to_bytes(3, "big")
+
+
 class ExtensionWriter:
     """Packs the extension block of a packet; every packet of a frame carries the same one.
 
@@ -57,6 +62,7 @@ class ExtensionWriter:
         self._native = ids.get(EVENT_REFERENCE_URI)
         self._capture_time = ids.get(CAPTURE_TIME_URI)
         self._abs_send_time = ids.get(ABS_SEND_TIME_URI)
+        self.send_time_offset: int | None = None  # of abs-send-time in a block; None before the first, and without
         self._fixed = b""
         if MID_URI in ids and 1 <= len(mid.encode()) <= 16:
             self._fixed += self._element(ids[MID_URI], mid.encode())
@@ -79,8 +85,8 @@ class ExtensionWriter:
         if self._capture_time is not None:
             elements += self._element(self._capture_time, pack_capture_time(stamp, capture_time))
         if self._abs_send_time is not None:
-            # 24-bit 6.18 fixed point seconds
-            elements += self._element(self._abs_send_time, (int(send_time * 0x40000) & 0xFFFFFF).to_bytes(3, "big"))
+            elements += self._element(self._abs_send_time, pack_send_time(send_time))
+            self.send_time_offset = 4 + len(elements) - 3
         if not elements:
             return b""
         words = (len(elements) + 3) // 4

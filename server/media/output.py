@@ -1,37 +1,85 @@
-"""One codec of one stream: who gets it, and when it needs a keyframe."""
+"""One tier of one codec of one stream: who gets it, how it is encoded, and when it needs a keyframe."""
 
+from robot_bridge.protocol.console import Tier
 from server.media.frame import EncodedFrame
 from server.media.keyframes import KeyframeScheduler
 from server.media.metrics import MediaMetrics
 from server.media.peer_stream import PeerStream
+from server.media.quality.cadence import Cadence
+from server.media.quality.plan import PicturePlan
 
-__all__ = ["Output"]
+__all__ = ["KEYFRAME_CAUSES", "Output"]
+
+KEYFRAME_CAUSES = ("join", "pli", "drop", "tier")
 
 
 class Output:
-    """Nothing is encoded for an output without targets."""
+    """Nothing is encoded for an output that nobody needs.
 
-    def __init__(self, stream: str, codec: str, keyframes: KeyframeScheduler, metrics: MediaMetrics) -> None:
+    A target that changes its tier goes on with the old output until the new one has a keyframe for it: it misses no
+    picture.
+    """
+
+    def __init__(
+        self,
+        stream: str,
+        codec: str,
+        tier: Tier,
+        plan: PicturePlan,
+        keyframes: KeyframeScheduler,
+        metrics: MediaMetrics,
+    ) -> None:
         self.codec = codec
+        self.tier = tier
+        self.plan = plan
         self.keyframes = keyframes
+        self.cadence = Cadence()
         self.targets: dict[PeerStream, None] = {}  # an ordered set
+        self.arriving: dict[PeerStream, Output] = {}  # and where each comes from
+        self.paused_until = 0.0  # no picture before; on the clock of `Stream.feed`
+        self.encoded_at = 0.0  # when the last picture was taken, on the same clock
         self._last_capture_time = 0.0
         self._encoded = metrics.encoded.labels(stream, codec)
         self._keyframes_served = metrics.keyframes.labels(stream, codec)
-        self._requests = {cause: metrics.keyframe_requests.labels(stream, cause) for cause in ("join", "pli", "drop")}
+        self._requests = {cause: metrics.keyframe_requests.labels(stream, cause) for cause in KEYFRAME_CAUSES}
         self.encode_seconds = metrics.encode_seconds.labels(stream, codec)
+
+    @property
+    def needed(self) -> bool:
+        return bool(self.targets or self.arriving)
+
+    @property
+    def held_up(self) -> bool:
+        """Whether the operator's last picture has not left yet: another would only wait behind it."""
+        return any(target.priority and target.paced for target in self.targets)
 
     def variants(self) -> frozenset[bool]:
         """Whether targets need the trailer: {False}, {True} or both."""
-        return frozenset(target.trailer for target in self.targets)
+        return frozenset(target.trailer for targets in (self.targets, self.arriving) for target in targets)
 
     def join(self, target: PeerStream) -> None:
         self.targets[target] = None
-        self.keyframes.join()
-        self._requests["join"].inc()
+        self._ask_for_join("join")
+
+    def expect(self, target: PeerStream, source: "Output") -> None:
+        """`target` comes over from `source` with the next keyframe."""
+        self.arriving[target] = source
+        self._ask_for_join("tier")
+
+    def arrive(self) -> None:
+        """A keyframe is about to be published: those who waited for it are targets from now on."""
+        for target, source in self.arriving.items():
+            source.targets.pop(target, None)
+            self.targets[target] = None
+        self.arriving.clear()
 
     def leave(self, target: PeerStream) -> None:
         self.targets.pop(target, None)
+        self.arriving.pop(target, None)
+
+    def _ask_for_join(self, cause: str) -> None:
+        self.keyframes.join()
+        self._requests[cause].inc()
 
     def request_keyframe(self, cause: str) -> None:
         """`cause`: "pli" when the peer asks, "drop" when it could not keep up."""

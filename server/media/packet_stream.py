@@ -5,13 +5,14 @@ import struct
 from dataclasses import dataclass
 
 from server.media.frame import EncodedFrame
-from server.media.header_extensions import ExtensionWriter
+from server.media.header_extensions import ExtensionWriter, pack_send_time
 from server.media.sent_history import SentFrame, SentHistory
 
-__all__ = ["HISTORY_PACKETS", "PacketStream", "SenderStats", "StreamParameters"]
+__all__ = ["PacketStream", "SenderStats", "StreamParameters"]
 
-HISTORY_PACKETS = 1024
-
+RTP_HEADER = 12  # bytes
+REPORTS_KEPT = 8  # sender reports that an answer may name; over a satellite the newest is not the one
+FIRST_ROUND_TRIP = 0.1  # s, before one was measured
 NTP_EPOCH_OFFSET = 2_208_988_800  # s from 1900 to 1970
 RTCP_SR, RTCP_SDES, RTCP_BYE = 200, 202, 203
 SDES_CNAME = 1
@@ -28,9 +29,11 @@ class SenderStats:
     frames: int = 0  # sent
     retransmitted: int = 0  # packets
     not_retransmitted: int = 0  # packets asked for, but forgotten or over the budget
+    not_repeated: int = 0  # packets asked for again while they were on their way
     keyframe_requests: int = 0  # PLI and FIR
     failed: int = 0  # frames that the transport refused
     packets_lost: int = 0  # reported by the peer
+    highest_sequence: int = 0  # reported by the peer, extended by its wraps
     fraction_lost: float = 0.0  # reported by the peer, 0 to 1
     jitter_ms: float = 0.0  # reported by the peer
     round_trip_ms: float | None = None  # None before the first report that answers ours
@@ -61,9 +64,11 @@ class PacketStream:
         self._rtx_sequence = secrets.randbelow(0x8000)
         self._timestamp_offset = secrets.randbits(32)
         self._sent = 0  # packets, never wraps
-        self._history = SentHistory(HISTORY_PACKETS)
+        self._history = SentHistory()
+        self._media_time = -1  # of the last frame
         self._last: tuple[int, float] | None = None  # RTP timestamp and capture time of the last frame
-        self._last_report: tuple[int, float] | None = None  # middle of the NTP time sent, and when
+        self._reports: dict[int, float] = {}  # middle of the NTP time sent, and when, oldest first
+        self._repaired_at = float("-inf")  # when the last retransmission left
         self.stats = SenderStats()
 
     def packets(self, frame: EncodedFrame, send_time: float) -> list[bytes]:
@@ -71,8 +76,10 @@ class PacketStream:
         parameters = self._parameters
         payloads = frame.payloads(parameters.trailer)
         extension = self._extensions.block(frame.stamp, frame.capture_time, send_time)
-        timestamp = (self._timestamp_offset + frame.media_time) & 0xFFFFFFFF
-        self._history.append(SentFrame(self._sent, payloads, extension, timestamp, frame.marker))
+        # A peer that changes its tier gets one picture of both: a frame of its own needs a time of its own.
+        self._media_time = max(self._media_time + 1, frame.media_time)
+        timestamp = (self._timestamp_offset + self._media_time) & 0xFFFFFFFF
+        self._history.append(SentFrame(self._sent, payloads, extension, timestamp, frame.marker), send_time)
         self._last = timestamp, frame.capture_time
         number = self._sequence_origin + self._sent
         self._sent += len(payloads)
@@ -88,13 +95,23 @@ class PacketStream:
         return packets
 
     def retransmission(self, sequence_number: int, now: float) -> bytes | None:
-        """The packet to send for a NACK of `sequence_number`, stamp included; None when it is gone or too much."""
+        """The packet to send for a NACK of `sequence_number`, stamp included; None when it is gone or too much.
+
+        `now` is in s since 1970. What was sent again less than a round trip ago is not sent once more.
+        """
         found = self._history.find(sequence_number & 0xFFFF, self._sequence_origin)
-        if found is None or not self._history.spend(now):
+        if found is None:
+            self.stats.not_retransmitted += 1
+            return None
+        frame, index = found
+        if self._history.on_its_way(frame.first + index, now, self.round_trip):
+            self.stats.not_repeated += 1
+            return None
+        if not self._history.spend(frame.first + index, now):
             self.stats.not_retransmitted += 1
             return None
         self.stats.retransmitted += 1
-        frame, index = found
+        self._repaired_at = now
         parameters = self._parameters
         kind, number, ssrc, payload = parameters.payload_type, sequence_number, parameters.ssrc, frame.payloads[index]
         if parameters.rtx_payload_type is not None:  # RFC 4588 4
@@ -104,7 +121,28 @@ class PacketStream:
         marker = 0x80 if frame.marker and index == len(frame.payloads) - 1 else 0
         flags = 0x90 if frame.extension else 0x80
         header = _pack_header(flags, kind | marker, number & 0xFFFF, frame.timestamp, ssrc)
-        return header + frame.extension + payload
+        return self.stamp_send_time(header + frame.extension + payload, now)
+
+    @property
+    def round_trip(self) -> float:
+        """s; an assumption before one was measured."""
+        measured = self.stats.round_trip_ms
+        return FIRST_ROUND_TRIP if measured is None else measured / 1000
+
+    def repair_time(self, now: float) -> float:
+        """Seconds until the peer may have got what was sent again last; 0 when nothing is on its way."""
+        return max(0.0, self._repaired_at + self.round_trip - now)
+
+    def stamp_send_time(self, packet: bytes, send_time: float) -> bytes:
+        """`packet`, leaving at `send_time` (s since 1970) and not when it was packed.
+
+        A receiver's bandwidth estimate reads a packet that waited here as one that waited in the network.
+        """
+        offset = self._extensions.send_time_offset
+        if offset is None:
+            return packet
+        start = RTP_HEADER + offset
+        return packet[:start] + pack_send_time(send_time) + packet[start + 3 :]
 
     def report(self, now: float) -> bytes | None:
         """A sender report with CNAME for `now` (s since 1970); None before the first frame.
@@ -117,7 +155,9 @@ class PacketStream:
         timestamp, capture_time = self._last
         rtp = (timestamp + round((now - capture_time) * self._parameters.clock_rate)) & 0xFFFFFFFF
         ntp = round((now + NTP_EPOCH_OFFSET) * 2**32)
-        self._last_report = ntp >> 16 & 0xFFFFFFFF, now
+        self._reports[ntp >> 16 & 0xFFFFFFFF] = now
+        if len(self._reports) > REPORTS_KEPT:
+            del self._reports[next(iter(self._reports))]
         packets, octets = self.stats.packets & 0xFFFFFFFF, self.stats.octets & 0xFFFFFFFF
         ssrc = self._parameters.ssrc
         return struct.pack("!BBHIQIII", 0x80, RTCP_SR, 6, ssrc, ntp, rtp, packets, octets) + self._sdes()
@@ -135,12 +175,25 @@ class PacketStream:
         return report and report + struct.pack("!BBHI", 0x81, RTCP_BYE, 1, self._parameters.ssrc)
 
     def reported(
-        self, *, fraction_lost: int, packets_lost: int, jitter: int, last_report: int, delay: int, now: float
-    ) -> None:
-        """A report block of the peer about this stream (RFC 3550 6.4.1)."""
+        self,
+        *,
+        fraction_lost: int,
+        packets_lost: int,
+        jitter: int,
+        last_report: int,
+        delay: int,
+        now: float,
+        highest_sequence: int = 0,
+    ) -> float | None:
+        """A report block of the peer about this stream (RFC 3550 6.4.1); the round trip that it tells, in s, if any."""
         stats = self.stats
         stats.fraction_lost = fraction_lost / 256
         stats.packets_lost = packets_lost
+        stats.highest_sequence = highest_sequence
         stats.jitter_ms = jitter * 1000 / self._parameters.clock_rate
-        if self._last_report is not None and self._last_report[0] == last_report:
-            stats.round_trip_ms = max(0.0, now - self._last_report[1] - delay / 65536) * 1000
+        sent_at = self._reports.get(last_report)
+        if sent_at is None:
+            return None
+        round_trip = max(0.0, now - sent_at - delay / 65536)
+        stats.round_trip_ms = round_trip * 1000
+        return round_trip

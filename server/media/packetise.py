@@ -76,10 +76,13 @@ def _fragment(nal: bytes) -> Iterator[bytes]:
         yield bytes((indicator, flags | kind)) + body[offset : offset + size]
 
 
-def packetise_vp8(frame: bytes, trailer: bytes = b"", *, picture_id: int) -> list[bytes]:
-    """Payloads of one VP8 frame with a 15-bit picture id (RFC 7741 4.2)."""
-    extension = b"\x80" + (0x8000 | picture_id & 0x7FFF).to_bytes(2, "big")
-    first, rest = b"\x90" + extension, b"\x80" + extension
+def packetise_vp8(frame: bytes, trailer: bytes = b"") -> list[bytes]:
+    """Payloads of one VP8 frame (RFC 7741 4.2), without a picture id.
+
+    A browser takes the picture with the id before as the one that a picture builds on. Payloads are shared by peers
+    that come from different tiers; no numbering would be without gaps for all of them, and sequence numbers are.
+    """
+    first, rest = b"\x10", b"\x00"
     data = memoryview(frame + trailer)
     room = PAYLOAD_MAX - len(first)
     size = math.ceil(len(data) / math.ceil(len(data) / room)) if data else 1

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from robot_bridge.protocol.console import StreamInfo
+from robot_bridge.protocol.console import Quality, Report, StreamInfo, Tier
 from server.media.aiortc_private import MediaSender
 from server.media.packet_stream import SenderStats
 from server.media.peer_stream import PeerStream
+from server.media.quality.peer_quality import PeerQuality
 from server.media.stream import Stream
 
 __all__ = ["Delivery", "PeerMedia"]
@@ -24,7 +25,10 @@ class Delivery(NamedTuple):
 class PeerMedia:
     """Ends with `close`, or by itself when the peer connection closes."""
 
-    def __init__(self, deliveries: list[Delivery], on_close: Callable[["PeerMedia"], None]) -> None:
+    def __init__(
+        self, deliveries: list[Delivery], quality: PeerQuality, on_close: Callable[["PeerMedia"], None]
+    ) -> None:
+        self.quality = quality
         self._deliveries = deliveries
         self._on_close = on_close
 
@@ -43,7 +47,34 @@ class PeerMedia:
         """Frames that this peer did not get because it could not keep up."""
         return sum(delivery.target.dropped for delivery in self._deliveries)
 
-    def report(self) -> None:
+    @property
+    def tier(self) -> Tier | None:
+        """None: it receives no video."""
+        return self.quality.tier if self.quality.cameras else None
+
+    @property
+    def loss(self) -> float | None:
+        """0 to 1, of pictures on the way to this peer; None before its first report."""
+        return self.quality.loss
+
+    @property
+    def round_trip_ms(self) -> float | None:
+        """Of RTCP; None before the first that was measured."""
+        return self.quality.round_trip_ms
+
+    def report(self, report: Report, now: float) -> None:
+        """Take the client's own report. `now` is on the monotonic clock."""
+        self.quality.report(report, now)
+
+    def drives(self, holds_seat: bool) -> None:
+        """Whether this peer holds the control seat: the operator's tier is made for who does."""
+        self.quality.drives = holds_seat
+
+    def on_quality(self, tell: Callable[[Quality], None]) -> None:
+        """Call `tell` when something else was decided for this peer's pictures."""
+        self.quality.on_quality = tell
+
+    def send_reports(self) -> None:
         """Send a sender report for each stream."""
         for delivery in self._deliveries:
             delivery.sender.report()
@@ -51,7 +82,7 @@ class PeerMedia:
     def detach(self) -> None:
         """Take no more frames. Idempotent."""
         for delivery in self._deliveries:
-            delivery.stream.leave(delivery.info.codec, delivery.target)
+            delivery.stream.leave(delivery.target)
             delivery.target.sender = None
         self._on_close(self)
 

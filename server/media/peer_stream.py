@@ -14,8 +14,18 @@ __all__ = ["FrameSender", "PeerStream"]
 class FrameSender(Protocol):
     """What sends frames over RTP."""
 
+    @property
+    def paced(self) -> bool:
+        """Whether packets wait for the pacer."""
+
+    def flush(self) -> tuple[int, int]:
+        """Send what the pacer lets through of those: packets and bytes handed to the network."""
+
     def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
-        """Send a frame: packets and bytes handed to the network. None, and nothing sent, while the socket is full."""
+        """Send a frame: packets and bytes handed to the network. None, and nothing sent, while the socket is full.
+
+        What the pacer holds back of it waits; call only when nothing waits.
+        """
 
 
 class PeerStream:
@@ -45,6 +55,11 @@ class PeerStream:
         """Frames that this peer did not get because it could not keep up."""
         return self._outbox.dropped
 
+    @property
+    def paced(self) -> bool:
+        """Whether part of the last frame has not left yet."""
+        return self.sender is not None and self.sender.paced
+
     def put(self, frame: EncodedFrame) -> None:
         before = self._outbox.dropped
         complete = self._outbox.put(frame)
@@ -54,13 +69,23 @@ class PeerStream:
             self._on_dropped()
 
     def send_next(self) -> bool:
-        frame = self._outbox.peek()
-        if frame is None or self.sender is None:
+        sender = self.sender
+        if sender is None:
             return False
-        sent = self.sender.transmit(frame)
+        if sender.paced:
+            self._count(*sender.flush())
+            if sender.paced:
+                return False
+        frame = self._outbox.peek()
+        if frame is None:
+            return False
+        sent = sender.transmit(frame)
         if sent is None:
             return False
         self._outbox.pop()
-        self._packets.inc(sent[0])
-        self._octets.inc(sent[1])
-        return self._outbox.peek() is not None
+        self._count(*sent)
+        return self._outbox.peek() is not None and not sender.paced
+
+    def _count(self, packets: int, octets: int) -> None:
+        self._packets.inc(packets)
+        self._octets.inc(octets)

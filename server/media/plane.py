@@ -30,6 +30,10 @@ from server.media.metrics import MediaMetrics
 from server.media.outbox import Outbox
 from server.media.peer_media import Delivery, PeerMedia
 from server.media.peer_stream import PeerStream
+from server.media.quality.desk import QualityDesk
+from server.media.quality.metrics import QualityMetrics
+from server.media.quality.path import RateLimits
+from server.media.quality.peer_quality import CameraLink, PeerQuality
 from server.media.settings import MediaSettings
 from server.media.video_stream import VideoStream
 
@@ -59,6 +63,7 @@ class MediaPlane:
         self._wall_clock = wall_clock
         self._capture_clock = CaptureClock()
         self._fan_out = FanOut(settings.slice_seconds, time.perf_counter)
+        self._quality = QualityDesk(settings, QualityMetrics(metrics_registry))
         self._streams: dict[str, AnyStream] = {}
         self._peers: dict[PeerMedia, None] = {}  # an ordered set
         self._stream_tasks: list[asyncio.Task[None]] = []
@@ -77,7 +82,8 @@ class MediaPlane:
         loop = asyncio.get_running_loop()
         self._stream_tasks = [loop.create_task(stream.run()) for stream in self._streams.values()]
         if not self._service_tasks:
-            self._service_tasks = [loop.create_task(fan_out.run()), loop.create_task(self._report())]
+            services = (fan_out.run(), fan_out.run_paced(), self._report(), self._quality.run())
+            self._service_tasks = [loop.create_task(service) for service in services]
 
     def feed(self, media: Media, now: float) -> None:
         """Take a picture or sound from the robot link. Called on the loop, never blocks; newest wins.
@@ -108,7 +114,7 @@ class MediaPlane:
             for kind in ("video", "audio")
         }
         deliveries: list[Delivery] = []
-        peer = PeerMedia(deliveries, lambda peer: self._peers.pop(peer, None))
+        peer = PeerMedia(deliveries, self._peer_quality(pc, priority), self._detached)
         for transceiver in pc.getTransceivers():
             stream = next(sources[transceiver.kind], None)
             codec = None
@@ -124,7 +130,30 @@ class MediaPlane:
             transceiver.direction = "sendonly"
             deliveries.append(self._deliver(peer, transceiver, stream, codec, carrier, priority))
         self._peers[peer] = None
+        peer.quality.cameras = [
+            CameraLink(each.stream, each.info.codec, each.target, each.sender)
+            for each in deliveries
+            if isinstance(each.stream, VideoStream)
+        ]
+        if peer.quality.cameras:
+            self._quality.join(peer.quality)
         return peer
+
+    def _peer_quality(self, pc: RTCPeerConnection, priority: bool) -> PeerQuality:
+        settings = self._settings
+        cameras = min(
+            sum(transceiver.kind == "video" for transceiver in pc.getTransceivers()),
+            sum(isinstance(stream, VideoStream) for stream in self._streams.values()),
+        )
+        maximum = float(max(1, cameras) * settings.video_bitrate_bps)
+        start = min(maximum, settings.quality_start_bps) if priority else maximum
+        limits = RateLimits(min(settings.quality_min_bps, start), start, maximum)
+        one_tier = priority or not settings.quality
+        return PeerQuality(operator=priority, limits=limits, tier="operator" if one_tier else "high")
+
+    def _detached(self, peer: PeerMedia) -> None:
+        self._peers.pop(peer, None)
+        self._quality.leave(peer.quality)
 
     def _deliver(
         self,
@@ -136,27 +165,32 @@ class MediaPlane:
         priority: bool,
     ) -> Delivery:
         video = stream.kind == "video"
-        output = stream.outputs[codec]
+        quality = peer.quality
         target = PeerStream(
             Outbox(self._settings.video_queue_frames if video else self._settings.audio_queue_frames, video=video),
             priority=priority,
             stream=stream.name,
             carrier=carrier,
             metrics=self._metrics,
-            on_dropped=lambda: output.request_keyframe("drop"),
+            on_dropped=lambda: stream.request_keyframe(codec, target, "drop"),
         )
 
         def ready() -> None:
             target.sender = sender
-            stream.join(codec, target)
+            stream.join(codec, target, quality.encoded_as if video else "operator")
+            if video and self._settings.quality:
+                self._quality.tick()
 
         sender = MediaSender(
             transceiver,
             _msid(stream.name),
             trailer=carrier == "trailer",
             on_ready=ready,
-            on_keyframe_request=lambda: output.request_keyframe("pli"),
+            on_keyframe_request=lambda: stream.request_keyframe(codec, target, "pli"),
             on_stopped=peer.detach,
+            listener=quality if video else None,
+            pacer=quality.pacer if video and self._settings.quality else None,
+            on_paced=lambda: self._fan_out.pace(target),
         )
         install_sender(transceiver, sender)
         info = StreamInfo(
@@ -174,7 +208,7 @@ class MediaPlane:
         while True:
             await asyncio.sleep(REPORT_SECONDS * random.uniform(0.5, 1.5))
             for peer in list(self._peers):
-                peer.report()
+                peer.send_reports()
                 await asyncio.sleep(0)
 
     def _end_streams(self) -> None:

@@ -8,6 +8,10 @@ __all__ = ["SentFrame", "SentHistory"]
 
 RETRANSMIT_BURST = 200  # packets
 RETRANSMIT_RATE = 1000.0  # packets per second; a peer's NACKs cannot make the server flood it
+KEEP_SECONDS = 2.5  # a path over a satellite needs 0.6 s for one try, and may lose that one too
+KEEP_PACKETS = 4096
+KEEP_BYTES = 3_000_000
+REPEATED = 1024  # packets of which the last retransmission is remembered
 
 
 class SentFrame(NamedTuple):
@@ -21,20 +25,30 @@ class SentFrame(NamedTuple):
 
 
 class SentHistory:
-    """The last `capacity` packets, kept by frame: payloads are shared with all other peers."""
+    """The last packets, bounded by time, number and bytes; kept by frame: payloads are shared with all other peers."""
 
-    def __init__(self, capacity: int) -> None:
-        self._capacity = capacity
+    def __init__(self) -> None:
         self._frames: deque[SentFrame] = deque()
+        self._sent_at: deque[float] = deque()
         self._next = 0
+        self._bytes = 0
         self._budget = float(RETRANSMIT_BURST)
         self._budget_at = 0.0
+        self._repeated: dict[int, float] = {}  # number to the time of its last retransmission, oldest first
 
-    def append(self, frame: SentFrame) -> None:
+    def append(self, frame: SentFrame, now: float) -> None:
+        """`now` is on any clock, the same for all calls."""
         self._frames.append(frame)
+        self._sent_at.append(now)
         self._next = frame.first + len(frame.payloads)
-        while self._next - self._frames[0].first > self._capacity and len(self._frames) > 1:
-            self._frames.popleft()
+        self._bytes += sum(map(len, frame.payloads))
+        while len(self._frames) > 1 and (
+            now - self._sent_at[0] > KEEP_SECONDS
+            or self._next - self._frames[0].first > KEEP_PACKETS
+            or self._bytes > KEEP_BYTES
+        ):
+            self._sent_at.popleft()
+            self._bytes -= sum(map(len, self._frames.popleft().payloads))
 
     def find(self, sequence_number: int, origin: int) -> tuple[SentFrame, int] | None:
         """The frame and index of the packet with this 16-bit number, where packet 0 had `origin`; None if forgotten."""
@@ -45,11 +59,20 @@ class SentHistory:
         frame = self._frames[bisect_right(self._frames, number, key=lambda frame: frame.first) - 1]
         return frame, number - frame.first
 
-    def spend(self, now: float) -> bool:
-        """Whether one more packet may be retransmitted now."""
+    def on_its_way(self, number: int, now: float, round_trip: float) -> bool:
+        """Whether packet `number` was sent again less than a round trip ago: the peer cannot have it yet."""
+        again = self._repeated.get(number)
+        return again is not None and now - again < round_trip
+
+    def spend(self, number: int, now: float) -> bool:
+        """Whether one more packet may be retransmitted now; if so, that `number` is."""
         self._budget = min(RETRANSMIT_BURST, self._budget + (now - self._budget_at) * RETRANSMIT_RATE)
         self._budget_at = now
         if self._budget < 1:
             return False
         self._budget -= 1
+        self._repeated.pop(number, None)
+        self._repeated[number] = now
+        if len(self._repeated) > REPEATED:
+            del self._repeated[next(iter(self._repeated))]
         return True

@@ -10,7 +10,10 @@ __all__ = ["MediaSettings"]
 class MediaSettings(BaseModel):
     """How pictures and sound are encoded and sent."""
 
-    video_bitrate_bps: int = Field(default=800_000, ge=50_000, le=20_000_000)
+    video_bitrate_bps: int = Field(default=800_000, ge=50_000, le=20_000_000)  # of a camera, at most
+    quality: bool = True  # follow the network; False: everybody gets everything, whatever arrives
+    quality_start_bps: int = Field(default=450_000, ge=50_000, le=20_000_000)  # all cameras, while nothing is known
+    quality_min_bps: int = Field(default=60_000, ge=20_000, le=20_000_000)  # all cameras
     video_frames_per_second: float | None = Field(default=None, ge=1, le=120)  # at most; None: as the camera gives
     keyframe_interval_seconds: float = Field(default=10.0, ge=0.5, le=300.0)
     keyframe_spacing_seconds: float = Field(default=0.3, ge=0.0, le=10.0)  # least time between two requested keyframes
@@ -18,5 +21,5 @@ class MediaSettings(BaseModel):
     opus_bitrate_bps: int = Field(default=32_000, ge=6_000, le=256_000)
     opus_packet_loss_percent: int = Field(default=10, ge=0, le=100)  # what in-band FEC is sized for
     slice_seconds: float = Field(default=0.001, gt=0.0, le=0.05)  # of one loop turn that observers may use
-    video_queue_frames: int = Field(default=3, ge=1, le=100)  # pictures that may wait for one peer
+    video_queue_frames: int = Field(default=6, ge=1, le=100)  # pictures that may wait for one peer
     audio_queue_frames: int = Field(default=10, ge=1, le=100)  # sound packets that may wait for one peer

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Generic, Literal, TypeVar
 
+from robot_bridge.protocol.console import Tier
 from robot_bridge.protocol.messages import Media
 from robot_bridge.protocol.serial import event_gap
 from server.media.errors import MediaError
@@ -16,6 +17,7 @@ from server.media.keyframes import KeyframeScheduler
 from server.media.metrics import MediaMetrics
 from server.media.output import Output
 from server.media.peer_stream import PeerStream
+from server.media.quality.plan import PicturePlan
 from server.media.settings import MediaSettings
 
 __all__ = ["Encoded", "Stream"]
@@ -60,25 +62,59 @@ class Stream(ABC, Generic[Job]):
         self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"media-{name}")
         self._peers = metrics.peers.labels(name)
         self._frames_in = metrics.frames_in.labels(name)
-        self.outputs = {
-            codec: Output(
-                name,
-                codec,
-                KeyframeScheduler(settings.keyframe_interval_seconds, settings.keyframe_spacing_seconds),
-                metrics,
-            )
-            for codec in self.codecs
-        }
+        self._outputs: dict[tuple[str, Tier], Output] = {}
+        self._members: dict[PeerStream, None] = {}  # an ordered set
 
-    def join(self, codec: str, target: PeerStream) -> None:
-        self.outputs[codec].join(target)
+    @property
+    def full_plan(self) -> PicturePlan:
+        """The best that a tier can get."""
+        return PicturePlan(self._settings.video_bitrate_bps, 1.0)
+
+    def output(self, codec: str, tier: Tier) -> Output:
+        """Made when it is first asked for; it costs nothing while nobody is in it."""
+        found = self._outputs.get((codec, tier))
+        if found is None:
+            settings = self._settings
+            keyframes = KeyframeScheduler(settings.keyframe_interval_seconds, settings.keyframe_spacing_seconds)
+            found = Output(self.name, codec, tier, self.full_plan, keyframes, self._metrics)
+            self._outputs[codec, tier] = found
+        return found
+
+    def outputs_of(self, tier: Tier) -> list[Output]:
+        """Of all codecs, as far as they exist."""
+        return [output for output in self._outputs.values() if output.tier == tier]
+
+    def join(self, codec: str, target: PeerStream, tier: Tier = "operator") -> None:
+        self.output(codec, tier).join(target)
+        self._members[target] = None
         self._peers.inc()
 
-    def leave(self, codec: str, target: PeerStream) -> None:
+    def move(self, codec: str, target: PeerStream, tier: Tier) -> None:
+        """Give `target` another tier, from that one's next keyframe on. Nothing for who is not here, or there already.
+
+        One that changes its mind on the way stays where it is.
+        """
+        if target not in self._members:
+            return
+        source = next((each for each in self._outputs.values() if target in each.targets), None)
+        for each in self._outputs.values():
+            each.arriving.pop(target, None)
+        if source is not None and source.tier != tier:
+            self.output(codec, tier).expect(target, source)
+
+    def request_keyframe(self, codec: str, target: PeerStream, cause: str) -> None:
+        """For `target`; see `Output.request_keyframe`."""
+        for output in self._outputs.values():
+            if target in output.targets:
+                output.request_keyframe(cause)
+
+    def leave(self, target: PeerStream) -> None:
         """Idempotent."""
-        if target in self.outputs[codec].targets:
-            self.outputs[codec].leave(target)
+        if target in self._members:
+            del self._members[target]
             self._peers.dec()
+        for output in self._outputs.values():
+            output.leave(target)
         self._fan_out.forget(target)
 
     def feed(self, media: Media, now: float, capture_time: float) -> None:
@@ -88,7 +124,7 @@ class Stream(ABC, Generic[Job]):
             self._drop("stale_stamp")
             return
         self._last_stamp = media.stamp
-        if any(output.targets for output in self.outputs.values()):
+        if self._members:
             self._enqueue(media, now, capture_time)
 
     def _drop(self, stage: str, count: int = 1) -> None:
@@ -96,6 +132,8 @@ class Stream(ABC, Generic[Job]):
 
     def _publish(self, output: Output, frame: EncodedFrame) -> None:
         output.count(frame)
+        if frame.keyframe and output.arriving:
+            output.arrive()
         self._fan_out.publish(frame, output.targets)
 
     async def run(self) -> None:
@@ -121,7 +159,7 @@ class Stream(ABC, Generic[Job]):
             logger.exception("stream %s: the worker failed; further failures are only counted", self.name)
         self._reported = True
         self._drop("worker_failed")
-        for output in self.outputs.values():
+        for output in self._outputs.values():
             output.keyframes.request()
 
     def _finish(self, encoded: Encoded) -> None:

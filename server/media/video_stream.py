@@ -1,7 +1,6 @@
-"""One camera: the newest picture is encoded once per codec that somebody needs."""
+"""One camera: the newest picture is encoded once per tier and codec that somebody needs."""
 
 import time
-from functools import partial
 from typing import NamedTuple
 
 import av
@@ -18,42 +17,88 @@ from server.media.output import Output
 from server.media.packetise import packetise_h264, packetise_vp8
 from server.media.picture import PictureDecoder
 from server.media.picture_encoder import VIDEO_CODECS, PictureEncoder, create_picture_encoder
+from server.media.quality.plan import PicturePlan
 from server.media.settings import MediaSettings
 from server.media.stream import Encoded, Stream
 
 __all__ = ["VideoStream"]
 
+PACKETISE = {"H264": packetise_h264, "VP8": packetise_vp8}
 
-class Order(NamedTuple):
-    """What one output needs of a picture."""
 
-    output: Output
-    keyframe: bool
-    variants: frozenset[bool]  # with and without trailer, to be packetised in the worker
-    capture_time: float
+class SourcePicture:
+    """A picture from the robot, decoded and resized at most once for all that encode it."""
+
+    def __init__(self, media: Media, capture_time: float, media_time: int) -> None:
+        self.media = media
+        self.capture_time = capture_time
+        self.media_time = media_time
+        self._sizes: dict[tuple[int, int], av.VideoFrame] = {}
+        self._whole: av.VideoFrame | None = None
+        self._error: MediaError | None = None
+
+    def frame(self, decoder: PictureDecoder, plan: PicturePlan) -> av.VideoFrame:
+        """In the size of `plan`. Runs in the stream's thread; raises MediaError."""
+        if self._error is not None:
+            raise self._error
+        if self._whole is None:
+            try:
+                self._whole = decoder.decode(self.media)
+            except MediaError as error:
+                self._error = error
+                raise
+        whole = self._whole
+        size = plan.size(whole.width, whole.height)
+        if size == (whole.width, whole.height):
+            return whole
+        if size not in self._sizes:
+            self._sizes[size] = whole.reformat(*size, interpolation="AREA")
+        return self._sizes[size]
 
 
 class PictureJob(NamedTuple):
-    media: Media
-    media_time: int
-    orders: list[Order]
+    """One picture for one output."""
+
+    source: SourcePicture
+    output: Output
+    plan: PicturePlan
+    keyframe: bool
+    variants: frozenset[bool]  # with and without trailer, to be packetised in the worker
+    capture_time: float
+    needed: frozenset[Output]  # outputs that keep their encoders
+
+    @property
+    def media(self) -> Media:
+        return self.source.media
 
 
 class VideoStream(Stream[PictureJob]):
-    """Takes yuv420p and mjpeg, encoded to H.264 and VP8; h264 is passed on to H.264 peers as it is."""
+    """Takes yuv420p and mjpeg, encoded to H.264 and VP8; h264 is passed on to H.264 peers as it is.
+
+    The operator's tier is encoded first and sent before the next one begins. When the encoders are too slow for all
+    tiers a newer picture takes the place of an older one, and the tier that waited longest comes next.
+    """
 
     kind = "video"
     codecs = VIDEO_CODECS
 
     def __init__(self, camera: Camera, settings: MediaSettings, fan_out: FanOut, metrics: MediaMetrics) -> None:
+        self.frame_rate = min(camera.frame_rate, settings.video_frames_per_second or camera.frame_rate)
+        self.size = camera.width, camera.height  # of the newest picture
         super().__init__(camera.name, camera.label, settings, fan_out, metrics)
-        self._frame_rate = camera.frame_rate
         self._clock = PictureClock()
         self._pace = FramePace(settings.video_frames_per_second)
         self._newest: tuple[Media, float, float] | None = None  # medium, now, capture time
+        self._source: SourcePicture | None = None  # of the orders
+        self._orders: list[Output] = []  # that are still to be encoded from it
+        self._began = 0.0  # when it came
+        self._others_served = 0  # observers' tiers that were encoded from it
         self._decoder = PictureDecoder()
-        self._encoders: dict[str, PictureEncoder] = {}
-        self._picture_id = 0
+        self._encoders: dict[Output, PictureEncoder] = {}
+
+    @property
+    def full_plan(self) -> PicturePlan:
+        return PicturePlan(self._settings.video_bitrate_bps, self.frame_rate)
 
     def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
         if media.codec == "h264":
@@ -62,75 +107,105 @@ class VideoStream(Stream[PictureJob]):
         if not self._pace.admit(media.time):
             self._drop("thinned")
             return
+        if media.width > 0 and media.height > 0:
+            self.size = media.width, media.height
         if self._newest is not None:
             self._drop("encoder_busy")
         self._newest = media, now, capture_time
         self._wake.set()
 
     def _pass_on(self, media: Media, capture_time: float) -> None:
-        """A picture that was encoded at the robot. Its encoder cannot be asked for keyframes."""
-        for output in self.outputs.values():
-            if output.codec != "H264" and output.targets:
-                self._drop(UnsupportedCodecError.name)
-        output = self.outputs["H264"]
+        """A picture that was encoded at the robot: its encoder cannot be asked for keyframes, and all tiers get it."""
+        capture_time = max((output.monotone(capture_time) for output in self._outputs.values()), default=capture_time)
         frame = EncodedFrame(
             media.payload,
             packetise_h264,
             keyframe=media.keyframe,
             marker=True,
             stamp=media.stamp,
-            capture_time=output.monotone(capture_time),
+            capture_time=capture_time,
             media_time=self._clock.timestamp(media.time),
         )
+        for output in self._outputs.values():
+            if output.codec != "H264" and output.targets:
+                self._drop(UnsupportedCodecError.name)
         if not frame.payloads(trailer=False):
             self._drop(PayloadError.name)
-        elif output.targets:
-            self._publish(output, frame)
+            return
+        for output in list(self._outputs.values()):
+            if output.codec == "H264" and output.needed:
+                self._publish(output, frame)
 
     def _next_job(self) -> PictureJob | None:
+        if self._newest is not None and (not self._orders or self._others_served > 0):
+            self._take_newest()
+        while self._orders:
+            output = self._orders.pop(0)
+            if output.needed and self._source is not None:
+                return self._job(self._source, output)
+        return None if self._newest is None else self._next_job()
+
+    def _take_newest(self) -> None:
+        """Begin the newest picture. What is left of the one before was not encoded for all tiers."""
         if self._newest is None:
-            return None
+            return
         media, now, capture_time = self._newest
         self._newest = None
-        orders = [
-            Order(output, output.keyframes.take(now), output.variants(), output.monotone(capture_time))
-            for output in self.outputs.values()
-            if output.targets
-        ]
-        return PictureJob(media, self._clock.timestamp(media.time), orders)
+        if self._orders:
+            self._drop("encoder_busy", len(self._orders))
+        self._source = SourcePicture(media, capture_time, self._clock.timestamp(media.time))
+        self._began, self._others_served = now, 0
+        due = [output for output in self._outputs.values() if self._due(output, media.time, now)]
+        self._orders = sorted(due, key=lambda output: (output.tier != "operator", output.encoded_at))
+
+    def _due(self, output: Output, time: float, now: float) -> bool:
+        if not output.needed or not output.cadence.take(time, output.plan.frame_rate, self.frame_rate):
+            return False
+        if now < output.paused_until or output.held_up:
+            self._drop("path_busy")
+            return False
+        return True
+
+    def _job(self, source: SourcePicture, output: Output) -> PictureJob:
+        output.encoded_at = self._began
+        self._others_served += output.tier != "operator"
+        return PictureJob(
+            source,
+            output,
+            output.plan,
+            output.keyframes.take(self._began),
+            output.variants(),
+            output.monotone(source.capture_time),
+            frozenset(each for each in self._outputs.values() if each.needed),
+        )
 
     def _work(self, job: PictureJob) -> list[Encoded]:
-        needed = {order.output.codec for order in job.orders}
-        self._encoders = {codec: encoder for codec, encoder in self._encoders.items() if codec in needed}
-        if not job.orders:
-            return []
-        try:
-            picture = self._decoder.decode(job.media)
-        except MediaError as error:
-            return [Encoded(order.output, (), 0.0, error) for order in job.orders]
-        return [self._encode(job, order, picture) for order in job.orders]
-
-    def _encode(self, job: PictureJob, order: Order, picture: av.VideoFrame) -> Encoded:
+        self._encoders = {output: encoder for output, encoder in self._encoders.items() if output in job.needed}
         started = time.perf_counter()
-        codec = order.output.codec
-        encoder = self._encoders.get(codec)
-        if encoder is None:
-            encoder = create_picture_encoder(codec, self._settings.video_bitrate_bps, self._frame_rate)
-            self._encoders[codec] = encoder
+        output, source = job.output, job.source
         try:
-            encoded = encoder.encode(picture, job.media_time, order.keyframe)
+            encoder = self._encoder(output, job.plan)
+            frame = source.frame(self._decoder, job.plan)
+            encoded = encoder.encode(frame, source.media_time, job.keyframe)
         except MediaError as error:
-            return Encoded(order.output, (), 0.0, error)
-        self._picture_id = (self._picture_id + 1) & 0x7FFF
-        frame = EncodedFrame(
+            return [Encoded(output, (), 0.0, error)]
+        packed = EncodedFrame(
             encoded.data,
-            packetise_h264 if codec == "H264" else partial(packetise_vp8, picture_id=self._picture_id),
+            PACKETISE[output.codec],
             keyframe=encoded.keyframe,
             marker=True,  # the last packet of a picture
-            stamp=job.media.stamp,
-            capture_time=order.capture_time,
-            media_time=job.media_time,
+            stamp=source.media.stamp,
+            capture_time=job.capture_time,
+            media_time=source.media_time,
         )
-        for trailer in order.variants:
-            frame.payloads(trailer)
-        return Encoded(order.output, (frame,), time.perf_counter() - started)
+        for trailer in job.variants:
+            packed.payloads(trailer)
+        return [Encoded(output, (packed,), time.perf_counter() - started)]
+
+    def _encoder(self, output: Output, plan: PicturePlan) -> PictureEncoder:
+        encoder = self._encoders.get(output)
+        if encoder is None:
+            encoder = create_picture_encoder(output.codec, plan.bitrate_bps, plan.frame_rate)
+            self._encoders[output] = encoder
+        encoder.aim(plan.bitrate_bps, plan.frame_rate)
+        return encoder

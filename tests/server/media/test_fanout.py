@@ -13,6 +13,7 @@ class FakeTarget:
         self.name = name
         self.priority = priority
         self.blocked = False
+        self.paced = False
         self.frames: list[EncodedFrame] = []
         self._log = log
         self._clock = clock

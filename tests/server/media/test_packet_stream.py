@@ -7,7 +7,8 @@ from aiortc.rtp import RtcpByePacket, RtcpPacket, RtcpSdesPacket, RtcpSrPacket, 
 from robot_bridge.protocol.carriers import EVENT_REFERENCE_URI
 from server.media.frame import EncodedFrame
 from server.media.header_extensions import ExtensionWriter
-from server.media.packet_stream import HISTORY_PACKETS, PacketStream, StreamParameters
+from server.media.packet_stream import PacketStream, StreamParameters
+from server.media.sent_history import KEEP_SECONDS
 
 UNIX = 1_790_000_000.0
 NTP = 2_208_988_800
@@ -77,7 +78,7 @@ def test_a_retransmission_wraps_the_same_payload_and_extension(index: int) -> No
     assert (packet.payload_type, packet.ssrc, packet.marker) == (98, 2222, index == 2)
     assert packet.payload == struct.pack("!H", number) + b"2.%d" % index
     assert again[12:-5] == original[12:-3]  # the extension block
-    second = source.retransmission(number, 0.0)
+    second = source.retransmission(number, 1.0)
     assert second is not None
     assert (RtpPacket.parse(second).sequence_number - packet.sequence_number) % 65536 == 1
 
@@ -101,8 +102,7 @@ def test_without_extensions_there_is_no_extension_block() -> None:
 def test_what_was_forgotten_is_counted() -> None:
     source = stream()
     first = RtpPacket.parse(source.packets(frame(1), UNIX)[0]).sequence_number
-    for i in range(HISTORY_PACKETS // 3 + 2):
-        source.packets(frame(i + 2), UNIX)
+    source.packets(frame(2), UNIX + KEEP_SECONDS + 1)
     assert source.retransmission(first, 0.0) is None
     assert source.retransmission(first - 1, 0.0) is None
     assert source.stats.not_retransmitted == 2

@@ -145,7 +145,7 @@ async def test_pictures_are_decoded_by_the_peer(codec: str) -> None:
 async def test_sender_reports_reach_the_peer_and_its_answers_come_back() -> None:
     async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
         await stream(plane, viewer, "video", picture, 2)
-        viewer.media.report()
+        viewer.media.send_reports()
         peer = cast(Any, viewer.pc.getTransceivers()[0].receiver)
         await viewer.until(lambda: bool(peer._RTCRtpReceiver__lsr))
         mid = viewer.media.streams[0].mid

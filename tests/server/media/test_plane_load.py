@@ -12,6 +12,7 @@ from aiortc.rtp import RtcpPsfbPacket
 from robot_bridge.protocol.carriers import (
     EVENT_REFERENCE_URI,
 )
+from server.media.header_extensions import ABS_SEND_TIME_URI
 from tests.server.media.feeding import read_stamp, stream, timestamps, value
 from tests.server.media.viewer import (
     TIMEOUT,
@@ -97,6 +98,7 @@ async def test_a_lost_packet_is_sent_again_with_its_stamp(codec: str) -> None:
         again = repaired()[0]
         assert int.from_bytes(again.packet.payload[:2], "big") == lost[0].packet.sequence_number
         assert again.packet.payload[2:] == lost[0].packet.payload
+        assert again.extensions.pop(ABS_SEND_TIME_URI) != lost[0].extensions.pop(ABS_SEND_TIME_URI)  # it left later
         assert again.extensions == lost[0].extensions
         assert read_stamp("native", again) == 4
         assert viewer.media.stats[viewer.media.streams[0].mid].retransmitted >= 1

@@ -1,0 +1,186 @@
+"""The quality of all peers: tiers, what each is encoded like, and who gets which.
+
+| tier | who | its bits per second |
+|---|---|---|
+| operator | who holds the control seat; while nobody does, all operators | of the one with the least |
+| high | observers (and other operators) whose paths carry it | all |
+| low | the others | of the one with the least, but no less than a floor and no more than half of high |
+
+While the operator's pictures are whole and their path shows no limit, the high tier gets the same pictures: one
+encoder serves both. As soon as that ends it has an encoder of its own. So there are at most three encoders for a camera
+and codec, and one where the network is good.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable, Iterable
+
+from robot_bridge.protocol.console import StreamQuality, Tier
+from server.media.quality.budget import CameraNeed, share_out
+from server.media.quality.ladder import PictureLadder
+from server.media.quality.metrics import QualityMetrics
+from server.media.quality.peer_quality import PeerQuality
+from server.media.quality.plan import PicturePlan
+from server.media.settings import MediaSettings
+from server.media.video_stream import VideoStream
+
+__all__ = ["QualityDesk"]
+
+TICK = 0.1  # s
+OBSERVER_TICKS = 10  # an observer is looked at once in so many
+SHARE_AFTER = 5.0  # s of an operator's path without a limit
+LOW_FLOOR_BPS = 120_000
+LOW_SHARE = 0.5  # of the high tier, at most
+
+
+class QualityDesk:
+    """One per media plane; runs on its loop. Switched off, everybody gets one tier with everything."""
+
+    def __init__(
+        self, settings: MediaSettings, metrics: QualityMetrics, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._settings = settings
+        self._metrics = metrics
+        self._clock = clock
+        self._peers: dict[PeerQuality, None] = {}  # an ordered set
+        self._ladders: dict[tuple[Tier, str], PictureLadder] = {}
+        self._plans: dict[tuple[Tier, str], PicturePlan] = {}
+        self._ticks = 0
+        self._whole_since: float | None = None  # the operator's pictures; None: they are not
+
+    def join(self, peer: PeerQuality) -> None:
+        self._peers[peer] = None
+        if self._settings.quality:
+            self.tick()
+
+    def leave(self, peer: PeerQuality) -> None:
+        """Idempotent."""
+        self._peers.pop(peer, None)
+        self._metrics.forget(peer)
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while self._settings.quality:
+            await asyncio.sleep(TICK)
+            if self._peers:
+                self.tick()
+
+    def tick(self) -> None:
+        """Look at the paths, plan the tiers, move who has to move, tell whom it concerns."""
+        now = self._clock()
+        self._ticks += 1
+        leaders = self.leaders()
+        for peer in leaders:
+            if (reason := peer.decide(now)) is not None:
+                self._metrics.lowered(reason)
+        self._plan_operator(leaders, now)
+        observers = [peer for peer in self._peers if peer not in leaders]
+        for i, peer in enumerate(observers):
+            if (i + self._ticks) % OBSERVER_TICKS == 0:
+                peer.decide(now)
+                peer.tier = peer.choice.decide(peer.path, self._needs(peer), now)
+        self._plan_low([peer for peer in observers if peer.tier == "low"], now)
+        shared = self._whole_since is not None and now - self._whole_since >= SHARE_AFTER
+        for peer in leaders:
+            self._settle(peer, "operator", "operator")
+        for i, peer in enumerate(observers):
+            if peer.tier == "operator":  # it drove until now
+                peer.tier = peer.choice.tier
+            self._settle(peer, peer.tier, "operator" if shared and peer.tier == "high" else peer.tier)
+            if (i + self._ticks) % OBSERVER_TICKS == 0:
+                self._tell(peer)
+        if self._ticks % OBSERVER_TICKS == 0:
+            for peer in leaders:
+                self._tell(peer)
+            self._measure(leaders, observers)
+
+    def leaders(self) -> list[PeerQuality]:
+        """Whom the operator's tier is for."""
+        operators = [peer for peer in self._peers if peer.operator]
+        return [peer for peer in operators if peer.drives] or operators
+
+    def _needs(self, peer: PeerQuality) -> float:
+        return len(peer.cameras) * float(self._settings.video_bitrate_bps)
+
+    def _plan_operator(self, leaders: list[PeerQuality], now: float) -> None:
+        if not leaders:
+            self._whole_since = None
+            return
+        tightest = min(leaders, key=lambda peer: peer.path.rate)
+        streams = _streams(leaders)
+        self._plan("operator", streams, tightest.path.rate, now)
+        pause = max(peer.path.paused_until for peer in leaders)
+        for stream in streams:
+            for output in stream.outputs_of("operator"):
+                output.paused_until = pause
+        whole = not any(peer.path.limited for peer in leaders) and all(
+            plan.scale == 1.0 and plan.frame_rate >= stream.frame_rate
+            for stream in streams
+            if (plan := self._plans.get(("operator", stream.name))) is not None
+        )
+        if not whole:
+            self._whole_since = None
+        elif self._whole_since is None:
+            self._whole_since = now
+
+    def _plan_low(self, members: list[PeerQuality], now: float) -> None:
+        if members:
+            least = min(peer.path.rate for peer in members)
+            most = LOW_SHARE * max(self._needs(peer) for peer in members)
+            self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now)
+
+    def _plan(self, tier: Tier, streams: list[VideoStream], total_bps: float, now: float) -> None:
+        maximum = float(self._settings.video_bitrate_bps)
+        needs = [CameraNeed(stream.size[0] * stream.size[1] * stream.frame_rate, maximum) for stream in streams]
+        for stream, bps in zip(streams, share_out(total_bps, needs), strict=True):
+            ladder = self._ladders.setdefault((tier, stream.name), PictureLadder())
+            plan = ladder.plan(bps, stream.frame_rate, stream.size, now)
+            self._plans[tier, stream.name] = plan
+            for output in stream.outputs_of(tier):
+                output.plan = plan
+
+    def _settle(self, peer: PeerQuality, tier: Tier, encoded_as: Tier) -> None:
+        peer.tier = tier
+        if peer.encoded_as == encoded_as:
+            return
+        peer.encoded_as = encoded_as
+        for camera in peer.cameras:
+            camera.stream.move(camera.codec, camera.target, encoded_as)
+            for output in camera.stream.outputs_of(encoded_as):
+                output.plan = self._plan_of(camera.stream, encoded_as)
+
+    def _plan_of(self, stream: VideoStream, tier: Tier) -> PicturePlan:
+        return stream.full_plan if tier == "high" else self._plans.get((tier, stream.name), stream.full_plan)
+
+    def _tell(self, peer: PeerQuality) -> None:
+        streams = []
+        for camera in peer.cameras:
+            plan = self._plan_of(camera.stream, peer.encoded_as)
+            width, height = plan.size(*camera.stream.size)
+            streams.append(
+                StreamQuality(
+                    stream=camera.stream.name,
+                    tier=peer.tier,
+                    width=width,
+                    height=height,
+                    frames_per_second=round(plan.frame_rate, 2),
+                    bits_per_second=plan.bitrate_bps,
+                )
+            )
+        peer.tell(streams)
+
+    def _measure(self, leaders: list[PeerQuality], observers: list[PeerQuality]) -> None:
+        tiers: dict[Tier, list[PeerQuality]] = {
+            "operator": leaders,
+            "high": [peer for peer in observers if peer.tier == "high"],
+            "low": [peer for peer in observers if peer.tier == "low"],
+        }
+        for tier, peers in tiers.items():
+            self._metrics.paths(tier, peers)
+            for stream in _streams(peers):
+                self._metrics.plan(stream.name, tier, self._plan_of(stream, tier), stream.size)
+
+
+def _streams(peers: Iterable[PeerQuality]) -> list[VideoStream]:
+    """The cameras of these peers, the main one first."""
+    return list({camera.stream: None for peer in peers for camera in peer.cameras})

@@ -1,0 +1,116 @@
+"""One peer's side of quality: what it says about its path, and what was decided for it."""
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+from robot_bridge.protocol.console import Quality, Report, StreamQuality, Tier
+from robot_bridge.protocol.serial import event_gap
+from server.media.pacer import Pacer
+from server.media.packet_stream import SenderStats
+from server.media.peer_stream import PeerStream
+from server.media.quality.observer_tier import ObserverTier
+from server.media.quality.path import PathController, RateLimits, Reason
+
+if TYPE_CHECKING:
+    from server.media.aiortc_private import MediaSender
+    from server.media.video_stream import VideoStream
+
+__all__ = ["CameraLink", "PeerQuality"]
+
+WIRE_SHARE = 0.92  # of what a receiver counts; the rest are headers
+
+
+class CameraLink(NamedTuple):
+    """One camera on its way to this peer."""
+
+    stream: "VideoStream"
+    codec: str
+    target: PeerStream
+    sender: "MediaSender"
+
+
+class PeerQuality:
+    """Hears receiver reports, bandwidth estimates and the client's own reports."""
+
+    def __init__(
+        self, *, operator: bool, limits: RateLimits, tier: Tier, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.operator = operator
+        self.drives = False  # holds the control seat
+        self.cameras: list[CameraLink] = []  # the main one first
+        self.pacer = Pacer()
+        self.path = PathController(limits, clock())
+        self.choice = ObserverTier(clock())
+        self.tier = tier  # what its pictures are made for
+        self.encoded_as = tier  # whose pictures it gets: a tier may be served by another's encoder
+        self.on_quality: Callable[[Quality], None] | None = None
+        self.quality: Quality | None = None  # last one told
+        self._clock = clock
+        self._estimates: dict[frozenset[int], int] = {}
+
+    @property
+    def estimate_bps(self) -> int | None:
+        """The peer's estimate of its bandwidth (REMB); None before the first."""
+        return sum(self._estimates.values()) if self._estimates else None
+
+    @property
+    def loss(self) -> float | None:
+        """0 to 1, of pictures; None before the first report."""
+        return self.path.losses.fraction(self._clock()) if self.path.losses.known else None
+
+    @property
+    def round_trip_ms(self) -> float | None:
+        """None before the first that was measured."""
+        return next((ms for ms in (stats.round_trip_ms for stats in self.stats()) if ms is not None), None)
+
+    def stats(self) -> list[SenderStats]:
+        return [camera.sender.stats for camera in self.cameras]
+
+    def reception(self, sender: "MediaSender", lost: int, expected: int, round_trip: float | None) -> None:
+        """A receiver report about one of its streams."""
+        self.path.received(lost, expected, round_trip, self._clock())
+
+    def bandwidth(self, bitrate_bps: int, ssrcs: frozenset[int]) -> None:
+        """A receiver estimates for all its streams together, or for each by itself."""
+        self._estimates = {known: bps for known, bps in self._estimates.items() if not known & ssrcs}
+        self._estimates[ssrcs] = bitrate_bps
+        self.path.estimated(WIRE_SHARE * sum(self._estimates.values()), self._clock())
+
+    def report(self, report: Report, now: float) -> None:
+        """The client's own report. Its gaps count for the main camera."""
+        if not self.cameras:
+            return
+        main = self.cameras[0].stream.name
+        for stream in report.streams:
+            if stream.stream != main or stream.stamp == 0 or report.event == 0:
+                continue
+            lag = max(stream.lag, event_gap(report.event, stream.stamp))
+            self.path.lagged(lag, stream.tolerance, now)
+
+    def decide(self, now: float) -> Reason | None:
+        """Look at the path; the reason if its rate was lowered."""
+        before = self.path.rate
+        self.path.sent(sum(stats.octets for stats in self.stats()), now)
+        self.path.decide(now)
+        self.pacer.limit(self.path.rate if self.path.limited else None)
+        return self.path.reason if self.path.rate < before else None
+
+    def tell(self, streams: list[StreamQuality]) -> None:
+        """Say what was decided, if it is news to the peer."""
+        quality = Quality(streams=streams, reason=self.path.reason)
+        if self.on_quality is not None and _differs(self.quality, quality):
+            self.quality = quality
+            self.on_quality(quality)
+
+
+def _differs(old: Quality | None, new: Quality) -> bool:
+    """Whether a person would call it another quality."""
+    if old is None or old.reason != new.reason or len(old.streams) != len(new.streams):
+        return True
+    return any(
+        (a.stream, a.tier, a.width, a.height) != (b.stream, b.tier, b.width, b.height)
+        or abs(a.frames_per_second - b.frames_per_second) > 0.1
+        or abs(a.bits_per_second - b.bits_per_second) > 0.2 * a.bits_per_second
+        for a, b in zip(old.streams, new.streams, strict=True)
+    )

@@ -1,0 +1,26 @@
+"""How the pictures of one camera are encoded for one tier."""
+
+from typing import NamedTuple
+
+__all__ = ["PicturePlan", "scaled_size"]
+
+MIN_SIDE = 16  # pixels
+
+
+class PicturePlan(NamedTuple):
+    """What a tier's encoder is to make of a camera's pictures."""
+
+    bitrate_bps: int
+    frame_rate: float  # per second; at most the camera's
+    scale: float = 1.0  # of both sides
+
+    def size(self, width: int, height: int) -> tuple[int, int]:
+        """The size that a picture of `width` x `height` gets."""
+        return scaled_size(width, height, self.scale)
+
+
+def scaled_size(width: int, height: int, scale: float) -> tuple[int, int]:
+    """Both sides times `scale`, even as 4:2:0 needs them; the aspect ratio stays within a pixel."""
+    if scale >= 1.0:
+        return width, height
+    return max(MIN_SIDE, round(width * scale / 2) * 2), max(MIN_SIDE, round(height * scale / 2) * 2)
