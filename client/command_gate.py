@@ -19,7 +19,7 @@ class NextCommand(NamedTuple):
 
 class CommandGate:
     """Open when the last command was answered, the event rate allows it and, with pacing `media`, the picture
-    on screen is within tolerance."""
+    on screen will be within tolerance of the next feedback as well."""
 
     def __init__(self, pacing: Pacing, tolerance: int, min_interval: float) -> None:
         self.pacing = pacing
@@ -89,4 +89,8 @@ class CommandGate:
         return NextCommand(event_after(self._feedback[0]), self._feedback[1])
 
     def _picture_is_near(self, event: int) -> bool:
-        return self._shown is not None and abs(event_gap(event, self._shown)) <= self.tolerance
+        """Near enough to stay within tolerance when the next feedback comes, one event on. At tolerance 0 none is:
+        there the picture of the newest event must do."""
+        if self._shown is None:
+            return False
+        return -self.tolerance <= event_gap(event, self._shown) <= max(self.tolerance - 1, 0)

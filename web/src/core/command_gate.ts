@@ -72,13 +72,19 @@ export function gateState(gate: CommandGate, now: number): GateState {
   if (gate.event === null) return "no_feedback";
   if (gate.inFlight !== null) return "in_flight";
   if (now - gate.lastSentMs < gate.minIntervalMs) return "rate";
-  return gate.pacing === "media" && !pictureIsWithin(gate, gate.event) ? "picture" : "open";
+  return gate.pacing === "media" && !pictureIsNear(gate, gate.event) ? "picture" : "open";
 }
 
 export function nextCommand(gate: CommandGate): NextCommand | null {
   return gate.event === null ? null : { event: eventAfter(gate.event), issue: gate.issue };
 }
 
-function pictureIsWithin(gate: CommandGate, event: number): boolean {
-  return gate.shown !== null && Math.abs(eventGap(event, gate.shown)) <= gate.tolerance;
+/**
+ * Near enough to stay within tolerance when the next feedback comes, one event on. At tolerance 0 none is: there the
+ * picture of the newest event must do.
+ */
+function pictureIsNear(gate: CommandGate, event: number): boolean {
+  if (gate.shown === null) return false;
+  const gap = eventGap(event, gate.shown);
+  return -gate.tolerance <= gap && gap <= Math.max(gate.tolerance - 1, 0);
 }
