@@ -1,0 +1,82 @@
+"""What a run is told, and what follows from its profile. No I/O."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from bench.emulator.profile import Profile
+from client.command_gate import Pacing
+from client.media_gate import GateMode
+
+__all__ = ["MODES", "PROFILES", "THESIS_PROFILES", "Choices", "MediaChoice", "Mode", "media_of"]
+
+Mode = Literal["off", "age", "feedback", "media"]
+MODES: tuple[Mode, ...] = ("off", "age", "feedback", "media")
+
+THESIS_PROFILES = ("macro-lan", "micro-lan", "hong-kong")
+PROFILES = (*THESIS_PROFILES, "lte-drive", "wifi-handover", "satellite", "bursty-loss", "narrow-uplink")
+
+
+# What the console sends by itself; profiles say otherwise where they have a reason to.
+USUAL_KBPS = 800
+USUAL_FRAME_RATE = 30.0
+USUAL_TOLERANCE = 4
+FITTING_KBPS = 300  # pictures that fit through 512 kbit/s together with sound (64 kbit/s) and headers
+
+
+@dataclass(frozen=True)
+class MediaChoice:
+    """How pictures and sound are sent. Sound is G.711 µ-law at 8 kHz, mono, unless the profile says otherwise."""
+
+    video_kbps: float
+    frames_per_second: float
+    sound_codec: str
+    tolerance: int  # events
+
+    def environment(self) -> dict[str, str]:
+        """As the console's settings."""
+        return {
+            "LOCKSTEP_MEDIA__VIDEO_BITRATE_BPS": str(round(self.video_kbps * 1000)),
+            "LOCKSTEP_MEDIA__VIDEO_FRAMES_PER_SECOND": str(self.frames_per_second),
+            "LOCKSTEP_MEDIA__SOUND_CODECS": f'["{self.sound_codec}"]',
+        }
+
+
+def media_of(profile: Profile) -> MediaChoice:
+    """The thesis' settings for its profiles, which are in their files; for others what the console does by itself."""
+    said = profile.experiment
+    bottleneck = profile.bottleneck_to_operator
+    narrow = bottleneck is not None and bottleneck.rate < 1_000_000
+    return MediaChoice(
+        said.video_kbps or (FITTING_KBPS if narrow else USUAL_KBPS),
+        said.frame_rate or USUAL_FRAME_RATE,
+        said.audio_codec or "PCMU",
+        USUAL_TOLERANCE if said.tolerance is None else said.tolerance,
+    )
+
+
+@dataclass(frozen=True)
+class Choices:
+    """One run."""
+
+    profile: str  # a name or a file
+    mode: Mode
+    seconds: float
+    tolerance: int  # events, of pictures and of sound
+    seed: int
+    robot: str = "planar"
+    browser: bool = False
+    watchers: bool = True  # clients in the other gate modes beside the operator, in the same session
+
+    @property
+    def gate(self) -> GateMode:
+        return self.mode if self.mode == "off" or self.mode == "age" else "event"
+
+    @property
+    def pacing(self) -> Pacing:
+        return "media" if self.mode == "media" else "feedback"
+
+    @property
+    def watching(self) -> tuple[GateMode, ...]:
+        """Gate modes of the watchers: those that the operator does not have."""
+        every: tuple[GateMode, ...] = ("off", "age", "event")
+        return tuple(mode for mode in every if mode != self.gate) if self.watchers else ()

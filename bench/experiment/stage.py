@@ -1,0 +1,52 @@
+"""Robot, console and network of one run: started, connected, ended."""
+
+import secrets
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from bench.emulator.network import Network
+from bench.emulator.profile import Profile
+from bench.experiment.choices import MediaChoice
+from bench.processes import Running, running_process
+
+__all__ = ["Stage", "running_stage"]
+
+
+@dataclass(frozen=True)
+class Stage:
+    network: Network
+    bridge: Running
+    console: Running
+    event_log: Path
+    near_link: str  # an operator's, past the network, from beside the console
+
+    @property
+    def link(self) -> str:
+        """An operator's link through the network."""
+        return self.network.link(self.near_link)
+
+
+@asynccontextmanager
+async def running_stage(robot: str, profile: Profile, media: MediaChoice, seed: int) -> AsyncIterator[Stage]:
+    """Raises ProcessFailed."""
+    lockstep = str(Path(sys.executable).with_name("lockstep"))
+    with TemporaryDirectory(prefix="lockstep-experiment-") as directory:
+        log = Path(directory) / "events.jsonl"
+        environment = {
+            **media.environment(),
+            "LOCKSTEP_STATE_DIR": directory,
+            "LOCKSTEP_SECRET": secrets.token_urlsafe(32),
+            "LOCKSTEP_SCENE": "false",
+        }
+        robot_command = (lockstep, "robot", robot, "--port", "0", "--event-log", str(log), "--json")
+        async with running_process(*robot_command) as (bridge, ready):
+            host, _, port = ready["robot"].removeprefix("tcp://").rpartition(":")
+            async with Network(profile, robot=(host, int(port)), seed=seed) as network:
+                serve = (lockstep, "serve", "--robot", network.robot_address, "--port", "0", "--json", "--quiet")
+                async with running_process(*serve, environment=environment) as (console, links):
+                    await network.open_console(links["console"])
+                    yield Stage(network, bridge, console, log, links["operator"])

@@ -1,0 +1,12 @@
+from bench.experiment.browser import pad_axes
+from robot_bridge.robots.planar.description import DESCRIPTION
+
+
+def test_the_sticks_stand_where_the_axes_values_come_from() -> None:
+    tilts = pad_axes(DESCRIPTION.layers[0], DESCRIPTION.axes, [0.4, -0.8, 1.5])
+    assert tilts == {1: -0.5, 0: 1.0, 2: -1.0}  # forward is up, left is left, and both are negative
+
+
+def test_at_rest_the_sticks_stand_in_the_middle() -> None:
+    tilts = pad_axes(DESCRIPTION.layers[0], DESCRIPTION.axes, [0.0, 0.0, 0.0])
+    assert {abs(tilt) for tilt in tilts.values()} == {0.0}
