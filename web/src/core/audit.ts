@@ -13,6 +13,8 @@ export interface AuditEntry {
   readonly count: number; // of the same, merged
 }
 
+const KEPT = 5000; // lines, as many as the console keeps at hand
+
 /** Kinds that are looked at together. */
 export type AuditGroup = "all" | "driving" | "stops" | "refusals" | "people" | "notes" | "robot";
 
@@ -39,8 +41,19 @@ const KINDS: ReadonlyMap<string, AuditGroup> = new Map([
   ["note", "notes"],
 ]);
 
-/** The lines of an answer; what is no line is left out. */
-export function parseAudit(answer: unknown): AuditEntry[] {
+/** One answer of the console. */
+export interface AuditPage {
+  readonly entries: readonly AuditEntry[];
+  readonly trouble: string; // why it cannot be written at present; "" when it can
+}
+
+/** What an answer says; what is no line is left out. */
+export function parseAudit(answer: unknown): AuditPage {
+  const trouble = isRecord(answer) ? answer["trouble"] : undefined;
+  return { entries: entriesOf(answer), trouble: typeof trouble === "string" ? trouble : "" };
+}
+
+function entriesOf(answer: unknown): AuditEntry[] {
   const found = isRecord(answer) ? answer["records"] : undefined;
   return Array.isArray(found)
     ? found
@@ -54,7 +67,7 @@ export function parseAudit(answer: unknown): AuditEntry[] {
 export function mergeAudit(
   known: readonly AuditEntry[],
   fresh: readonly AuditEntry[],
-  limit: number,
+  limit = KEPT,
 ): AuditEntry[] {
   const byNumber = new Map([...known, ...fresh].map((entry) => [entry.n, entry]));
   return [...byNumber.values()].sort((one, other) => other.n - one.n).slice(0, limit);

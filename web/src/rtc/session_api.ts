@@ -1,4 +1,4 @@
-import { parseAudit, type AuditEntry } from "../core/audit";
+import { parseAudit, type AuditPage } from "../core/audit";
 import {
   parseInvitations,
   parseNewInvitation,
@@ -9,6 +9,8 @@ import type { Role } from "../core/seat_standing";
 import { ConsoleError, type ConsoleApi } from "./console_api";
 
 const LIMIT_MS = 8000;
+/** Of the audit trail in one answer, the most that the console gives. */
+export const AUDIT_LINES = 500;
 
 /** Invitations and the audit trail over HTTP. All of it raises ConsoleError. */
 export class SessionApi {
@@ -28,9 +30,9 @@ export class SessionApi {
     await this.ask("DELETE", `/api/invitations/${encodeURIComponent(id)}`);
   }
 
-  /** Lines after number `after`; the newest ones for -1. */
-  async audit(after: number): Promise<AuditEntry[]> {
-    return parseAudit(await this.ask("GET", `/api/audit?after=${after}`));
+  /** The first lines after number `after`; the newest ones for -1. */
+  async audit(after: number): Promise<AuditPage> {
+    return parseAudit(await this.ask("GET", `/api/audit?after=${after}&limit=${AUDIT_LINES}`));
   }
 
   private ask(method: string, path: string, body?: object): Promise<unknown> {

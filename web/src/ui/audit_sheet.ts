@@ -7,96 +7,125 @@ import {
   type AuditEntry,
   type AuditGroup,
 } from "../core/audit";
-import { troubleWords, type SessionApi } from "../rtc/session_api";
+import { AUDIT_LINES, troubleWords, type SessionApi } from "../rtc/session_api";
 import { button, grouped, h, setHidden, setPressed, setText } from "./dom";
 import type { SheetContent } from "./sheet";
 
 const REFRESH_MS = 2000;
-const KEPT = 5000; // lines, as many as the console keeps
 const SHOWN = 200; // rows at first, and more at each asking
 
 /** Who drove when, and what was refused, stopped and handed over; it follows what happens. */
 export function createAuditSheet(api: SessionApi): SheetContent {
-  const filters = h("div", "audit-filters", { role: "group", "aria-label": "Kinds" });
-  const state = h("p", "audit-state", { role: "status" });
-  const rows = h("tbody");
-  const table = h("table", "audit-table", {}, headRow(), rows);
-  const more = button("quiet-button", "Show older", () => {
-    limit += SHOWN;
-    show();
-  });
-  const scroll = h("div", "audit-scroll", { tabindex: "0", "aria-label": "Audit trail" }, table, more);
-  const names = Object.keys(AUDIT_GROUPS) as AuditGroup[];
-  const chips = new Map(names.map((group) => [group, createChip(group)]));
-  let group: AuditGroup = "all";
-  let entries: AuditEntry[] = [];
-  let limit = SHOWN;
-  let trouble: string | null = null;
-  let loaded = false;
-  let timer: ReturnType<typeof setTimeout> | undefined;
-  filters.append(...chips.values());
-
+  const sheet = new AuditSheet(api);
   return {
     name: "audit",
     title: "Audit trail",
-    element: h("div", "audit-body", {}, filters, state, scroll),
-    opened() {
-      loaded = false;
-      trouble = null;
-      limit = SHOWN;
-      show();
-      void refresh();
-    },
-    closed() {
-      clearTimeout(timer);
-      timer = undefined;
-    },
+    element: sheet.element,
+    opened: () => sheet.open(),
+    closed: () => sheet.close(),
   };
+}
 
-  function createChip(name: AuditGroup): HTMLButtonElement {
-    return button("chip-button audit-chip", AUDIT_GROUPS[name], () => {
-      group = name;
-      limit = SHOWN;
-      show();
-      scroll.scrollTop = 0;
-    });
+class AuditSheet {
+  readonly element: HTMLElement;
+  private readonly state = h("p", "audit-state", { role: "status" });
+  private readonly rows = h("tbody");
+  private readonly table = h("table", "audit-table", {}, headRow(), this.rows);
+  private readonly more = button("quiet-button", "Show older", () => void this.showOlder());
+  private readonly scroll: HTMLElement;
+  private readonly chips: ReadonlyMap<AuditGroup, HTMLButtonElement>;
+  private group: AuditGroup = "all";
+  private entries: readonly AuditEntry[] = []; // newest first
+  private limit = SHOWN;
+  private trouble = "";
+  private loaded = false;
+  private opening = 0; // counts up; an answer to an earlier one is not shown
+  private timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(private readonly api: SessionApi) {
+    const names = Object.keys(AUDIT_GROUPS) as AuditGroup[];
+    this.chips = new Map(names.map((group) => [group, this.createChip(group)]));
+    const filters = h(
+      "div",
+      "audit-filters",
+      { role: "group", "aria-label": "Kinds" },
+      ...this.chips.values(),
+    );
+    this.scroll = h(
+      "div",
+      "audit-scroll",
+      { tabindex: "0", "aria-label": "Audit trail" },
+      this.table,
+      this.more,
+    );
+    this.element = h("div", "audit-body", {}, filters, this.state, this.scroll);
   }
 
-  async function refresh(): Promise<void> {
-    const mine = setTimeout(() => undefined);
-    timer = mine;
+  open(): void {
+    this.loaded = false;
+    this.trouble = "";
+    this.limit = SHOWN;
+    this.show();
+    void this.follow(++this.opening);
+  }
+
+  close(): void {
+    this.opening += 1;
+    clearTimeout(this.timer);
+  }
+
+  private async follow(opening: number): Promise<void> {
+    await this.ask(this.entries[0]?.n ?? -1);
+    if (opening !== this.opening) return;
+    this.show();
+    this.timer = setTimeout(() => void this.follow(opening), REFRESH_MS);
+  }
+
+  private async showOlder(): Promise<void> {
+    this.limit += SHOWN;
+    const oldest = this.entries.at(-1)?.n ?? 1;
+    if (this.limit > this.entries.length && oldest > 1) await this.ask(Math.max(0, oldest - 1 - AUDIT_LINES));
+    this.show();
+  }
+
+  private async ask(after: number): Promise<void> {
     try {
-      const fresh = await api.audit(entries[0]?.n ?? -1);
-      trouble = null;
-      loaded = true;
-      if (fresh.length > 0) entries = mergeAudit(entries, fresh, KEPT);
+      const { entries, trouble } = await this.api.audit(after);
+      this.trouble = trouble === "" ? "" : `The console cannot write the trail at present: ${trouble}.`;
+      this.loaded = true;
+      this.entries = mergeAudit(this.entries, entries);
     } catch (error) {
-      trouble = troubleWords(error);
+      this.trouble = `${troubleWords(error)} What is below is as it was.`;
     }
-    if (timer !== mine) return; // closed, or opened again, meanwhile
-    show();
-    timer = setTimeout(() => void refresh(), REFRESH_MS);
   }
 
-  function show(): void {
-    const found = filterAudit(entries, group);
-    for (const [name, chip] of chips) {
-      setPressed(chip, name === group);
-      setText(chip, `${AUDIT_GROUPS[name]} ${countGroup(entries, name)}`);
+  private show(): void {
+    const found = filterAudit(this.entries, this.group);
+    for (const [name, chip] of this.chips) {
+      setPressed(chip, name === this.group);
+      setText(chip, `${AUDIT_GROUPS[name]} ${countGroup(this.entries, name)}`);
     }
-    setText(state, stateWords(found.length));
-    setHidden(state, state.textContent === "");
-    state.dataset["tone"] = trouble === null ? "calm" : "bad";
-    setHidden(table, found.length === 0);
-    setHidden(more, found.length <= limit);
-    rows.replaceChildren(...found.slice(0, limit).map(rowOf));
+    setText(this.state, this.trouble || this.emptyWords(found.length));
+    setHidden(this.state, this.state.textContent === "");
+    this.state.dataset["tone"] = this.trouble === "" ? "calm" : "bad";
+    setHidden(this.table, found.length === 0);
+    setHidden(this.more, found.length <= this.limit && (this.entries.at(-1)?.n ?? 1) <= 1);
+    this.rows.replaceChildren(...found.slice(0, this.limit).map(rowOf));
   }
 
-  function stateWords(count: number): string {
-    if (trouble !== null) return `${trouble} The trail below is as it was.`;
-    if (!loaded && entries.length === 0) return "Loading…";
+  private emptyWords(count: number): string {
+    if (!this.loaded && this.entries.length === 0) return "Loading…";
     if (count > 0) return "";
-    return entries.length === 0 ? "Nothing was recorded yet." : "Nothing of this kind was recorded.";
+    return this.entries.length === 0 ? "Nothing was recorded yet." : "Nothing of this kind was recorded.";
+  }
+
+  private createChip(name: AuditGroup): HTMLButtonElement {
+    return button("chip-button audit-chip", AUDIT_GROUPS[name], () => {
+      this.group = name;
+      this.limit = SHOWN;
+      this.show();
+      this.scroll.scrollTop = 0;
+    });
   }
 }
 
@@ -105,15 +134,10 @@ function headRow(): HTMLElement {
   return h("thead", "", {}, h("tr", "", {}, ...cells));
 }
 
-function whoOf({ who, role }: AuditEntry): (Node | string)[] {
-  if (who === "") return [];
-  return role === "" ? [who] : [who, h("span", "audit-role", {}, ` ${role}`)];
-}
-
 function rowOf(entry: AuditEntry): HTMLElement {
   const when = new Date(entry.time * 1000);
-  const time = h("time", "", { datetime: when.toISOString(), title: when.toString() });
   const day = when.toDateString() === new Date().toDateString() ? "" : `${when.toISOString().slice(5, 10)} `;
+  const time = h("time", "", { datetime: when.toISOString(), title: when.toString() });
   time.append(day + when.toTimeString().slice(0, 8));
   return h(
     "tr",
@@ -125,4 +149,9 @@ function rowOf(entry: AuditEntry): HTMLElement {
     h("td", "audit-who", {}, ...whoOf(entry)),
     h("td", "audit-what", {}, auditWords(entry)),
   );
+}
+
+function whoOf({ who, role }: AuditEntry): (Node | string)[] {
+  if (who === "") return [];
+  return role === "" ? [who] : [who, h("span", "audit-role", {}, ` ${role}`)];
 }

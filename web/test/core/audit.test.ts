@@ -30,8 +30,9 @@ const RECORDS = {
 
 describe("the audit trail", () => {
   it("is read from the console's answer; what is no line is left out", () => {
-    const entries = parseAudit(RECORDS);
+    const { entries, trouble } = parseAudit(RECORDS);
     expect(entries.map((entry) => entry.n)).toEqual([1, 2, 3, 4]);
+    expect([trouble, parseAudit({ trouble: "disk full" }).trouble]).toEqual(["", "disk full"]);
     expect(entries[1]).toEqual({
       n: 2,
       time: 6,
@@ -43,17 +44,17 @@ describe("the audit trail", () => {
       detail: "was Ben",
       count: 1,
     });
-    expect([parseAudit(null), parseAudit({ records: 3 }), parseAudit([])]).toEqual([[], [], []]);
+    for (const none of [null, { records: 3 }, []]) expect(parseAudit(none).entries).toEqual([]);
   });
 
   it("is newest first, each line once, and bounded", () => {
-    const entries = parseAudit(RECORDS);
+    const { entries } = parseAudit(RECORDS);
     const merged = mergeAudit(entries.slice(0, 3), entries.slice(1), 3);
     expect(merged.map((entry) => entry.n)).toEqual([4, 3, 2]);
   });
 
   it("is filtered by what belongs together", () => {
-    const entries = parseAudit(RECORDS);
+    const { entries } = parseAudit(RECORDS);
     expect(filterAudit(entries, "driving").map((entry) => entry.n)).toEqual([2]);
     expect(filterAudit(entries, "all")).toHaveLength(4);
     expect(countGroup(entries, "notes")).toBe(0);
@@ -61,7 +62,7 @@ describe("the audit trail", () => {
   });
 
   it("says what happened in one line", () => {
-    const [start, seat, refusal] = parseAudit(RECORDS).map(auditWords);
+    const [start, seat, refusal] = parseAudit(RECORDS).entries.map(auditWords);
     expect([start, seat, refusal]).toEqual(["", "granted: was Ben", "late ×17"]);
   });
 });
