@@ -18,6 +18,7 @@ from pydantic import ValidationError
 from robot_bridge.cli import robot_app
 from robot_bridge.robots.registry import robot_names
 from server.app import create_app, make_access
+from server.bench_commands import add_bench_commands
 from server.bridge_process import BridgeFailed, BridgeProcess
 from server.links import ConsoleLinks, console_links
 from server.logs import configure_logs
@@ -37,6 +38,7 @@ GC_THRESHOLDS = (5_000, 20, 50)  # allocations, young collections, middle collec
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
 app.add_typer(robot_app, name="robot")
+add_bench_commands(app)
 
 Host = Annotated[str | None, typer.Option(help="Address to listen on; 127.0.0.1 unless set.")]
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the console; 0 takes any free one.")]

@@ -18,17 +18,14 @@ from bench.processes import ProcessFailed
 from client.errors import ConsoleError
 from robot_bridge.robots.registry import robot_names
 
-__all__ = ["app"]
+__all__ = ["experiment_command"]
 
 EXIT_BROKEN = 1  # a verdict is false
 EXIT_USAGE = 2
 EXIT_FAILED = 3  # something did not run
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
-
-@app.command()
-def experiment(
+def experiment_command(
     profile: Annotated[
         str, typer.Argument(help=f"A network: {', '.join(PROFILES)}, or the file of one; or all; growth; outage.")
     ],

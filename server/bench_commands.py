@@ -1,0 +1,37 @@
+"""Commands that measure. They live in `bench/`, which nothing here imports: it is loaded when one is asked for."""
+
+from importlib import import_module
+from typing import Any
+
+import typer
+
+__all__ = ["add_bench_commands"]
+
+# name → function that typer can run, and what `lockstep --help` says of it
+COMMANDS = {
+    "experiment": (
+        "bench.experiment.cli",
+        "experiment_command",
+        "Repeat the thesis' experiments on emulated networks.",
+    ),
+    "soak": ("bench.soak.cli", "soak_command", "Drive for a long time while everything fails now and then."),
+}
+
+
+def add_bench_commands(app: typer.Typer) -> None:
+    for name in COMMANDS:
+        _add(app, name)
+
+
+def _add(app: typer.Typer, name: str) -> None:
+    module, function, about = COMMANDS[name]
+
+    def run(context: typer.Context) -> None:
+        command: Any = getattr(import_module(module), function)
+        measuring = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        measuring.command()(command)
+        measuring(context.args, prog_name=f"lockstep {name}")
+
+    # Its own parser sees everything, --help included.
+    everything = {"ignore_unknown_options": True, "allow_extra_args": True}
+    app.command(name, help=about, add_help_option=False, context_settings=everything)(run)
