@@ -3,12 +3,13 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 
+from bench.emulator.bottleneck import Bottleneck
 from bench.emulator.client_paths import ClientPaths
 from bench.emulator.path import PathStatistics
 from bench.emulator.profile import Direction
 from bench.emulator.stream_path import StreamPath
 
-__all__ = ["NetworkStatistics", "QueueStatistics", "collect"]
+__all__ = ["NetworkStatistics", "QueueStatistics", "collect", "count_queue"]
 
 
 @dataclass
@@ -53,15 +54,19 @@ def collect(
         for (kind, direction), path in client.paths.items():
             found.count(kind, direction, path.statistics)
         for direction, bottleneck in client.bottlenecks.items():
-            queue = found.queues.setdefault(direction, QueueStatistics())
-            total = queue.mean * queue.passed + bottleneck.total_wait
-            queue.passed += bottleneck.passed
-            queue.dropped += bottleneck.dropped
-            queue.mean = total / queue.passed if queue.passed else 0.0
-            queue.longest = max(queue.longest, bottleneck.longest_wait)
-            queue.now = max(queue.now, bottleneck.wait(now))
+            count_queue(found, direction, bottleneck, now)
     for direction, stream in signalling.items():
         found.count("signalling", direction, stream.statistics)
     for (name, direction), statistics in robot.items():
         found.count(name, direction, statistics)
     return found
+
+
+def count_queue(found: NetworkStatistics, direction: Direction, bottleneck: Bottleneck, now: float) -> None:
+    queue = found.queues.setdefault(direction, QueueStatistics())
+    total = queue.mean * queue.passed + bottleneck.total_wait
+    queue.passed += bottleneck.passed
+    queue.dropped += bottleneck.dropped
+    queue.mean = total / queue.passed if queue.passed else 0.0
+    queue.longest = max(queue.longest, bottleneck.longest_wait)
+    queue.now = max(queue.now, bottleneck.wait(now))
