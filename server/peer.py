@@ -2,6 +2,7 @@
 
 import asyncio
 import secrets
+from collections.abc import Callable
 from typing import Protocol
 
 import structlog
@@ -10,10 +11,12 @@ from aiortc import RTCDataChannel, RTCPeerConnection
 from robot_bridge.protocol.console import (
     ClientMessage,
     Participant,
+    Quality,
     Report,
     Role,
     ServerMessage,
     StreamInfo,
+    Tier,
     encode_console_message,
 )
 from robot_bridge.protocol.messages import Stop
@@ -49,6 +52,14 @@ class PeerStreams(Protocol):
 
     @property
     def streams(self) -> list[StreamInfo]: ...
+    @property
+    def tier(self) -> Tier | None: ...
+    @property
+    def loss(self) -> float | None: ...
+
+    def report(self, report: Report, now: float) -> None: ...
+    def drives(self, holds_seat: bool) -> None: ...
+    def on_quality(self, tell: Callable[[Quality], None]) -> None: ...
 
     async def close(self) -> None: ...
 
@@ -85,6 +96,7 @@ class Peer:
         self.wanted_name = clean_name(identity.name, identity.role)
         self.name = self.wanted_name  # what others see; `Peers` keeps it unique
         self.report = Report()  # newest
+        self._quality: Quality | None = None  # newest
         self.ended = ""  # why; "" while it lives
         self._media = media
         self._host = host
@@ -96,6 +108,7 @@ class Peer:
         self._heard_at = self._loop.time()
         self._connected = asyncio.Event()
         self._end = asyncio.Event()
+        media.on_quality(self._quality_decided)
         pc.on("datachannel", self._channel_offered)
         pc.on("connectionstatechange", self._connection_changed)
 
@@ -160,7 +173,17 @@ class Peer:
             gap=max((stream.gap for stream in self.report.streams), key=abs, default=0),
             picture_delay_ms=self.report.picture_delay_ms,
             round_trip_ms=self.report.round_trip_ms,
+            loss=None if self._media.loss is None else round(self._media.loss, 2),
+            tier=self._media.tier,
         )
+
+    def drives(self, holds_seat: bool) -> None:
+        """Whether it holds the control seat: its media come first then."""
+        self._media.drives(holds_seat)
+
+    def _quality_decided(self, quality: Quality) -> None:
+        self._quality = quality
+        self.send("session", quality)
 
     def dropped(self) -> int:
         """Messages that did not fit."""
@@ -220,6 +243,8 @@ class Peer:
         channel.on("message", lambda data: self._received(name, data))
         channel.on("close", lambda: self.end("channel closed"))
         self._host.channel_opened(self, name)
+        if name == "session" and self._quality is not None:
+            self.send("session", self._quality)
 
     def _received(self, channel: ChannelName, data: object) -> None:
         """Only a valid message counts as life."""
@@ -234,6 +259,7 @@ class Peer:
         self._heard_at = now
         if isinstance(message, Report):
             self.report = message
+            self._media.report(message, now)
         self._host.message_received(self, channel, message)
 
     def _parse(self, channel: ChannelName, data: object, now: float) -> ClientMessage:

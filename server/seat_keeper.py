@@ -101,6 +101,8 @@ class SeatKeeper:
             holder = self._peers.by_id(seat.holder)
             self._audit.seat(seat, _actor(holder), _actor(actor))
             self._peers.tell("session", seat)
+            for peer in self._peers:
+                peer.drives(peer.id == seat.holder)
         if outcome.refusal is not None:
             refused = self._peers.by_id(outcome.refusal.peer)
             if refused is not None:

@@ -69,6 +69,8 @@ class PeerMedia:
     def drives(self, holds_seat: bool) -> None:
         """Whether this peer holds the control seat: the operator's tier is made for who does."""
         self.quality.drives = holds_seat
+        for delivery in self._deliveries:
+            delivery.target.priority = holds_seat or self.quality.operator
 
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
         """Call `tell` when something else was decided for this peer's pictures."""
