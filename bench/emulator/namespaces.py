@@ -115,6 +115,9 @@ class Namespaces:
         """As `Network.outage`."""
         (self._robot_outages if robot else self._client_outages).demand(time.monotonic(), seconds, hold=hold)
 
+    def cut_robot(self) -> None:
+        """Nothing here: connections belong to the processes on the two sides."""
+
     def statistics(self) -> NetworkStatistics:
         """What has happened to all packets so far."""
         found = NetworkStatistics()

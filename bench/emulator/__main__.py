@@ -1,0 +1,3 @@
+from bench.emulator.cli import main
+
+main()
