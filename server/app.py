@@ -11,16 +11,20 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import HTTPConnection
+from starlette.types import Scope
 
-from server import api, scene_proxy, whep
+from server import api, api_ice, scene_proxy, whep
 from server.access import Access
 from server.audit_tail import AuditTail
 from server.console import Console
-from server.errors import ConsoleError, http_error
+from server.errors import AccessError, ConsoleError, TooManyRequests, http_error
+from server.front_door import FrontDoor, HostNames
+from server.guard import Guard
 from server.media.aiortc_private import own_addresses, restrict_ice_hosts
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
 from server.page import page_router
+from server.rate_limits import RateLimits
 from server.scene import SceneView
 from server.security import SAFE_METHODS, SecurityHeaders, check_origin
 from server.services import Services, services
@@ -43,7 +47,9 @@ def create_app(settings: Settings, access: Access | None = None) -> FastAPI:
         media = MediaPlane(settings.media, metrics.registry)
         scene = await _start_scene(settings, metrics)
         console = Console(settings, metrics, media, scene, AuditTail())
-        app.state.services = Services(settings, access or make_access(settings), metrics, console, media, scene)
+        app.state.services = Services(
+            settings, access or make_access(settings), metrics, console, media, Guard(settings), scene
+        )
         try:
             async with asyncio.TaskGroup() as tasks:
                 running = [tasks.create_task(console.run(), name="console")]
@@ -67,6 +73,7 @@ def create_app(settings: Settings, access: Access | None = None) -> FastAPI:
     )
     app.include_router(whep.router)
     app.include_router(api.router)
+    app.include_router(api_ice.router)
     app.include_router(scene_proxy.router)
     app.include_router(page_router())
     app.add_exception_handler(ConsoleError, _answer_console_error)
@@ -80,7 +87,13 @@ def create_app(settings: Settings, access: Access | None = None) -> FastAPI:
             allow_headers=["Authorization", "Content-Type", "If-Match"],
             expose_headers=["Location", "ETag", "Link"],
         )
-    app.add_middleware(SecurityHeaders)
+    app.add_middleware(
+        FrontDoor,
+        hosts=HostNames((settings.host, *settings.own_names)),
+        requests=RateLimits(settings.max_request_rate, settings.max_request_burst),
+        count=_count_refused,
+    )
+    app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None)
     return app
 
 
@@ -121,9 +134,16 @@ async def _answer_console_error(request: Request, error: Exception) -> Response:
 
 
 def _answer(request: Request, error: ConsoleError) -> Response:
+    if isinstance(error, AccessError) and not services(request).guard.may_fail(request.scope):
+        error = TooManyRequests("too many requests without a valid token from this address")
     entry = http_error(error)
     services(request).metrics.bad_input.labels("http", entry.name).inc()
     return _error_response(entry.status, entry.name, error.detail, entry.headers)
+
+
+def _count_refused(scope: Scope, name: str) -> None:
+    """What the front door turned away."""
+    scope["app"].state.services.metrics.bad_input.labels("http", name).inc()
 
 
 async def _answer_http_exception(request: Request, error: Exception) -> Response:

@@ -1,11 +1,14 @@
 """Reads request bodies with a bound, before anything else looks at them."""
 
+import asyncio
 from typing import TypeVar
 
 import msgspec
 from fastapi import Request
+from starlette.requests import ClientDisconnect
 
-from server.errors import BadJson, BodyTooLarge, WrongMediaType
+from server.errors import BadJson, BodyTooLarge, BodyTooSlow, WrongMediaType
+from server.services import services
 
 __all__ = ["media_type", "read_json", "read_text"]
 
@@ -24,6 +27,7 @@ async def read_text(request: Request, expected: str, bound: int) -> str:
     Raises:
         WrongMediaType: it is not declared as `expected`, or it is not UTF-8.
         BodyTooLarge: longer than `bound` bytes; reading stops there.
+        BodyTooSlow: it does not come in time.
     """
     if media_type(request) != expected:
         raise WrongMediaType(f"the Content-Type has to be {expected}")
@@ -49,8 +53,14 @@ async def read_json(request: Request, kind: type[Body]) -> Body:
 
 async def _read(request: Request, bound: int) -> bytes:
     body = bytearray()
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > bound:
-            raise BodyTooLarge(f"more than {bound} bytes")
+    try:
+        async with asyncio.timeout(services(request).settings.request_timeout):
+            async for chunk in request.stream():
+                body += chunk
+                if len(body) > bound:
+                    raise BodyTooLarge(f"more than {bound} bytes")
+    except TimeoutError as error:
+        raise BodyTooSlow("the body did not come in time") from error
+    except ClientDisconnect as error:
+        raise BodyTooSlow("the body never came whole") from error
     return bytes(body)

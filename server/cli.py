@@ -1,6 +1,7 @@
 """The command `lockstep`: `up` runs a robot and a console, `serve` only the console, `robot` only the robot."""
 
 import asyncio
+import datetime
 import gc
 import json
 import logging
@@ -20,11 +21,16 @@ from robot_bridge.robots.registry import robot_names
 from server.app import create_app, make_access
 from server.bench_commands import add_bench_commands
 from server.bridge_process import BridgeFailed, BridgeProcess
+from server.cli_options import AllowedHosts, PublicUrl, Stun, Tls, TlsCert, TlsKey, Turn, TurnSecret
+from server.guarded_http import guarded_by
 from server.links import ConsoleLinks, console_links
 from server.logs import configure_logs
+from server.media.aiortc_private import own_addresses
 from server.serve import PortTaken, bind, running, wait_for_signal
 from server.services import Services
 from server.settings import Settings
+from server.state_dir import default_state_dir
+from server.tls import Certificate, fingerprint, own_names, self_signed
 
 __all__ = ["app", "main"]
 
@@ -57,11 +63,20 @@ def up(
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
+    public_url: PublicUrl = None,
+    allowed_host: AllowedHosts = None,
+    tls: Tls = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
+    stun: Stun = None,
+    turn: Turn = None,
+    turn_secret: TurnSecret = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Run a simulated robot and the console, and print the links that open it."""
-    settings = _settings(host=host, port=port, ice_hosts=ice_host)
+    network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
+    settings = _settings(host=host, port=port, ice_hosts=ice_host, **network)
     options = [] if event_log is None else ["--event-log", str(event_log)]
     bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, _say)
     _run(settings, bridge, as_json, quiet)
@@ -73,18 +88,40 @@ def serve(
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
+    public_url: PublicUrl = None,
+    allowed_host: AllowedHosts = None,
+    tls: Tls = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
+    stun: Stun = None,
+    turn: Turn = None,
+    turn_secret: TurnSecret = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Run the console for a robot bridge that runs elsewhere."""
-    _run(_settings(robot=robot, host=host, port=port, ice_hosts=ice_host), None, as_json, quiet)
+    network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
+    _run(_settings(robot=robot, host=host, port=port, ice_hosts=ice_host, **network), None, as_json, quiet)
+
+
+def _network(
+    public_url: PublicUrl,
+    allowed_hosts: AllowedHosts,
+    tls: Tls,
+    tls_cert: TlsCert,
+    tls_key: TlsKey,
+    stun: Stun,
+    turn: Turn,
+    turn_secret: TurnSecret,
+) -> dict[str, object]:
+    """The arguments by the names of their settings."""
+    return dict(locals())
 
 
 def _settings(**flags: object) -> Settings:
     """What the environment says, overridden by the flags that were given."""
     given = {name: value for name, value in flags.items() if value is not None and value != []}
-    if isinstance(hosts := given.get("ice_hosts"), list):
-        given["ice_hosts"] = ",".join(hosts)
+    given = {name: ",".join(value) if isinstance(value, list) else value for name, value in given.items()}
     try:
         return Settings(**given)  # type: ignore[arg-type]
     except ValidationError as error:
@@ -97,6 +134,7 @@ def _run(settings: Settings, bridge: BridgeProcess | None, as_json: bool, quiet:
     configure_logs(logging.WARNING if quiet else logging.INFO)
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
+        _check_files(settings)
         listener = bind(settings.host, settings.port)
         uvloop.run(_serve(settings, listener, bridge, as_json))
     except PortTaken as error:
@@ -105,6 +143,17 @@ def _run(settings: Settings, bridge: BridgeProcess | None, as_json: bool, quiet:
     except BridgeFailed as error:
         _say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error
+
+
+def _check_files(settings: Settings) -> None:
+    """Before anything runs."""
+    try:
+        for path in (settings.tls_cert, settings.tls_key):
+            if path is not None:
+                path.read_bytes()
+    except OSError as error:
+        _say(f"{error.filename}: {error.strerror}")
+        raise typer.Exit(EXIT_USAGE) from error
 
 
 def _calm_garbage_collection() -> None:
@@ -119,6 +168,7 @@ def _calm_garbage_collection() -> None:
 
 async def _serve(settings: Settings, listener: socket.socket, bridge: BridgeProcess | None, as_json: bool) -> None:
     """Until a signal: the bridge first, then the console; the console ends first."""
+    certificate = _certificate(settings)
     stopping = asyncio.get_running_loop().create_task(wait_for_signal())
     try:
         if bridge is not None:
@@ -128,7 +178,8 @@ async def _serve(settings: Settings, listener: socket.socket, bridge: BridgeProc
             settings = settings.model_copy(update={"robot": address})
         access = make_access(settings)
         application = create_app(settings, access)
-        async with running(application, listener), asyncio.TaskGroup() as tasks:
+        http = guarded_by(settings, application)
+        async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
             _calm_garbage_collection()
             watching = None if bridge is None else tasks.create_task(bridge.watch())
             links = console_links(settings, listener, access)
@@ -144,6 +195,18 @@ async def _serve(settings: Settings, listener: socket.socket, bridge: BridgeProc
             await stopping
         if bridge is not None:
             await bridge.close()
+
+
+def _certificate(settings: Settings) -> Certificate | None:
+    """What to encrypt HTTP with; None: not at all."""
+    if settings.tls_cert is not None and settings.tls_key is not None:
+        return Certificate(settings.tls_cert, settings.tls_key)
+    if not settings.tls:
+        return None
+    names = own_names(settings.host) | set(settings.tls_names) | set(settings.own_names) | set(own_addresses())
+    certificate = self_signed(settings.state_dir or default_state_dir(), names - {"*"}, datetime.datetime.now(datetime.UTC))
+    _say(f"the certificate is our own; its SHA-256 fingerprint is {fingerprint(certificate)}")
+    return certificate
 
 
 async def _unless(stopping: asyncio.Task[None], starting: Coroutine[None, None, str]) -> str | None:

@@ -79,7 +79,7 @@ class Console:
         self.clock = EventClock()
         self.audit = AuditTrail(self.clock, audit_log)
         self.robot = RobotConnection(settings, self)
-        self.peers = Peers(settings.max_peers, metrics)
+        self.peers = Peers(settings, metrics)
         times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
         self.notes = NoteBoard(time.monotonic())
@@ -186,7 +186,7 @@ class Console:
 
     def input_refused(self, peer: Peer, channel: str, error: ChannelError) -> None:
         self._metrics.bad_input.labels(channel, error.name).inc()
-        if channel == "other" or isinstance(error, Flood):
+        if channel in ("other", "transport") or isinstance(error, Flood):
             return  # no answer: there is no channel for it, or it would feed the flood
         answer = Refusal(
             event=0, reason="malformed", current=self.clock.event, detail=f"{error.name}: {error.detail}"[:500]

@@ -27,6 +27,7 @@ ConsoleError
 │   ├── Flood
 │   ├── MalformedMessage
 │   ├── MessageTooLarge
+│   ├── TransportRefused    below the channels; each has its own name
 │   ├── UnknownChannel
 │   └── WrongChannel
 └── Unavailable             right now it cannot be done
@@ -73,6 +74,7 @@ __all__ = [
     "TokenMissing",
     "TooManyPeers",
     "TooManyRequests",
+    "TransportRefused",
     "Unavailable",
     "UnknownChannel",
     "WrongChannel",
@@ -197,6 +199,14 @@ class MalformedMessage(ChannelError):
 
 class MessageTooLarge(ChannelError):
     name = "too_large"
+
+
+class TransportRefused(ChannelError):
+    name = "transport"
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.name = name
 
 
 class UnknownChannel(ChannelError):

@@ -22,6 +22,8 @@ import structlog
 from aiortc import RTCIceCandidate, RTCIceGatherer, RTCPeerConnection
 from aiortc.rtcicetransport import RTCIceTransport, candidate_to_aioice
 
+from server.peer_guards_private import guard_ice
+
 __all__ = ["IceSession", "LocalIce"]
 
 log = structlog.get_logger(__name__)
@@ -63,15 +65,20 @@ class IceSession:
         username: str,
         gatherer: Callable[[], RTCIceGatherer],
         connect_timeout: float,
+        on_refused: Callable[[str], None],
     ) -> None:
+        """`on_refused` gets the name of what a peer had too much of."""
         self.tag = _new_tag()
         self.username = username  # the peer's, of the newest session
         self._transport = _transport_of(pc)
         self._gatherer = gatherer
         self._connect_timeout = connect_timeout
+        self._on_refused = on_refused
         self._candidates = 0
         self._next: Any = None  # the connection that is to take over
         self._taking_over: asyncio.Task[None] | None = None
+        if self._transport is not None:
+            guard_ice(self._transport._connection, on_refused)
         self._lingering: set[asyncio.Task[None]] = set()
 
     @property
@@ -88,6 +95,7 @@ class IceSession:
         await self._give_up()
         gatherer = self._gatherer()
         connection: Any = gatherer._connection
+        guard_ice(connection, self._on_refused)
         connection._queue = _DataOnly(_queue_of(self._transport))
         self._next, self._candidates = connection, 0
         try:

@@ -35,7 +35,8 @@ def console_links(settings: Settings, listener: socket.socket, access: Access) -
     """The links for what `listener` really listens on."""
     host, port = listener.getsockname()[:2]
     shown = _own_address() if host in ANY else host
-    console = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}"
+    scheme = "https" if settings.encrypted else "http"
+    console = settings.public_url or f"{scheme}://{f'[{shown}]' if ':' in shown else shown}:{port}"
     return ConsoleLinks(
         console=console,
         operator=f"{console}/#token={access.issue('operator', 'operator')}",

@@ -24,15 +24,17 @@ from server.access import Identity
 from server.audit import Actor
 from server.channel_writer import ChannelWriter
 from server.channels import ChannelName, MessageBudget, channel_name, parse_message
-from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
+from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests, TransportRefused
 from server.ice_restart_private import IceSession
 from server.names import clean_name
+from server.rate_limits import RateLimits
 
 __all__ = ["Peer", "PeerHost", "PeerLimits", "PeerStreams"]
 
 log = structlog.get_logger(__name__)
 
 CLOSE_TIMEOUT = 5.0  # s; aiortc says goodbye to the remote, which may not answer
+FORGIVEN_RATE = 2.0  # Hz, of bad messages
 MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
 
 
@@ -45,6 +47,10 @@ class PeerLimits(Protocol):
     def peer_connect_timeout(self) -> float: ...
     @property
     def max_message_rate(self) -> float: ...
+    @property
+    def max_observer_rate(self) -> float: ...
+    @property
+    def max_bad_messages(self) -> int: ...
 
 
 class PeerStreams(Protocol):
@@ -103,7 +109,9 @@ class Peer:
         self._limits = limits
         self._loop = asyncio.get_running_loop()
         self._writers: dict[ChannelName, ChannelWriter] = {}
-        self._budget = MessageBudget(limits.max_message_rate, self._loop.time())
+        rate = limits.max_observer_rate if identity.role == "observer" else limits.max_message_rate
+        self._budget = MessageBudget(rate, self._loop.time())
+        self._patience = RateLimits(FORGIVEN_RATE, limits.max_bad_messages)
         self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
         self._heard_at = self._loop.time()
         self._connected = asyncio.Event()
@@ -111,6 +119,11 @@ class Peer:
         media.on_quality(self._quality_decided)
         pc.on("datachannel", self._channel_offered)
         pc.on("connectionstatechange", self._connection_changed)
+
+    @property
+    def connected(self) -> bool:
+        """It was, at least once."""
+        return self._connected.is_set()
 
     @property
     def role(self) -> Role:
@@ -237,6 +250,7 @@ class Peer:
                 raise DuplicateChannel(name)
         except ChannelError as error:
             self._host.input_refused(self, "other", error)
+            self._lose_patience(self._loop.time())
             channel.close()
             return
         self._writers[name] = ChannelWriter(channel)
@@ -255,6 +269,7 @@ class Peer:
             message = self._parse(channel, data, now)
         except ChannelError as error:
             self._host.input_refused(self, channel, error)
+            self._lose_patience(now)
             return
         self._heard_at = now
         if isinstance(message, Report):
@@ -268,6 +283,19 @@ class Peer:
         except ChannelError:
             self._budget.spend(now)
             raise
-        if not isinstance(message, Stop):
+        try:
             self._budget.spend(now)
+        except Flood:
+            if not isinstance(message, Stop):
+                raise
+            self._lose_patience(now)  # a stop is heard all the same
         return message
+
+    def transport_refused(self, name: str) -> None:
+        """What came was more than fits, below the channels. SCTP cannot leave a message out."""
+        self._host.input_refused(self, "transport", TransportRefused(name))
+        self.end("too much")
+
+    def _lose_patience(self, now: float) -> None:
+        if not self._patience.spend("", now):
+            self.end("bad messages")

@@ -1,14 +1,17 @@
 """The peers that are connected: admitted, told, seen off."""
 
 import asyncio
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 import structlog
 
 from robot_bridge.protocol.console import Participant, Participants, ServerMessage, encode_console_message
+from server.access import Identity
 from server.channels import ChannelName
-from server.errors import NotFound, ShuttingDown, TooManyPeers
+from server.errors import NotFound, ShuttingDown, TooManyPeers, TooManyRequests
 from server.metrics import Metrics
 from server.names import unique_name
 from server.peer import Peer
@@ -21,14 +24,25 @@ FEW = 10  # participants up to which everybody's measured values are shared
 CLOSE_TIMEOUT = 8.0  # s for all peers together
 
 
-class Peers:
-    """At most `bound` peers. Each runs in a task that this object owns; `close` waits for all of them."""
+class PeersLimits(Protocol):
+    """The settings that all peers together need."""
 
-    def __init__(self, bound: int, metrics: Metrics) -> None:
-        self._bound = bound
+    @property
+    def max_peers(self) -> int: ...
+    @property
+    def reserved_places(self) -> int: ...
+    @property
+    def max_unconnected(self) -> int: ...
+
+
+class Peers:
+    """At most `max_peers` peers. Each runs in a task that this object owns; `close` waits for all of them."""
+
+    def __init__(self, limits: PeersLimits, metrics: Metrics) -> None:
+        self._limits = limits
         self._metrics = metrics
         self._sessions: dict[Peer, asyncio.Task[None]] = {}
-        self._reserved = 0
+        self._reserved: Counter[str] = Counter()  # places of peers that are being negotiated, by token
         self._closing = False
 
     def __iter__(self) -> Iterator[Peer]:
@@ -60,22 +74,32 @@ class Peers:
         return changed
 
     @contextmanager
-    def place(self) -> Iterator[None]:
-        """Keeps a place while a peer is being negotiated.
+    def place(self, identity: Identity) -> Iterator[None]:
+        """Keeps a place while a peer is being negotiated. The last ones are not for observers.
 
         Raises:
             TooManyPeers: all places are taken.
+            TooManyRequests: so many peers of this link have not connected yet.
             ShuttingDown: the console ends.
         """
         if self._closing:
             raise ShuttingDown("the console is shutting down")
-        if len(self._sessions) + self._reserved >= self._bound:
-            raise TooManyPeers(f"all {self._bound} places are taken")
-        self._reserved += 1
+        limits, token_id = self._limits, identity.token_id
+        bound = limits.max_peers
+        if identity.role == "observer":
+            bound = max(1, bound - limits.reserved_places)
+        if len(self._sessions) + self._reserved.total() >= bound:
+            raise TooManyPeers(f"all {bound} places are taken")
+        waiting = sum(peer.identity.token_id == token_id and not peer.connected for peer in self._sessions)
+        if waiting + self._reserved[token_id] >= limits.max_unconnected:
+            raise TooManyRequests(f"{limits.max_unconnected} peers of this link have not connected yet")
+        self._reserved[token_id] += 1
         try:
             yield
         finally:
-            self._reserved -= 1
+            self._reserved[token_id] -= 1
+            if self._reserved[token_id] == 0:
+                del self._reserved[token_id]
 
     def admit(self, peer: Peer) -> None:
         task = asyncio.get_running_loop().create_task(self._run(peer), name=f"peer {peer.id}")

@@ -28,16 +28,26 @@ SCENE_POLICY = (
 HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "SAMEORIGIN",  # for browsers that do not know frame-ancestors
     "Cross-Origin-Opener-Policy": "same-origin",
-    "Permissions-Policy": "camera=(), microphone=(), geolocation=(), gamepad=(self)",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "X-Permitted-Cross-Domain-Policies": "none",
+    "Permissions-Policy": (
+        "gamepad=(self), fullscreen=(self), screen-wake-lock=(self), clipboard-write=(self), autoplay=(self), "
+        "camera=(), microphone=(), geolocation=(), usb=(), serial=(), bluetooth=(), hid=(), midi=(), payment=(), "
+        "display-capture=(), browsing-topics=()"
+    ),
 }
+HSTS = "max-age=31536000"  # RFC 6797; no sub-domains: they are not ours to decide for
 
 
 class SecurityHeaders:
     """Adds the headers to every HTTP answer."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, lasting_tls: bool = False) -> None:
+        """`lasting_tls`: a certificate that browsers trust, so that they may insist on TLS from now on."""
         self._app = app
+        self._headers = HEADERS | ({"Strict-Transport-Security": HSTS} if lasting_tls else {})
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -49,7 +59,7 @@ class SecurityHeaders:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 headers["Content-Security-Policy"] = policy
-                for name, value in HEADERS.items():
+                for name, value in self._headers.items():
                     headers[name] = value
             await send(message)
 

@@ -10,10 +10,13 @@ from contextlib import asynccontextmanager
 import uvicorn
 from starlette.applications import Starlette
 
+from server.tls import Certificate
+
 __all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
 
 BACKLOG = 128
 SHUTDOWN_TIMEOUT = 3  # s for HTTP requests under way
+MAX_HEAD = 16 * 1024  # bytes of a request's head
 MAX_WEBSOCKET_MESSAGE = 64 * 1024  # bytes from a viewer of the scene
 
 
@@ -69,17 +72,32 @@ class _Server(uvicorn.Server):
 
 
 @asynccontextmanager
-async def running(app: Starlette, listener: socket.socket) -> AsyncIterator[None]:
-    """While entered, `app` answers on `listener`; on leaving it shuts down gracefully."""
+async def running(
+    app: Starlette,
+    listener: socket.socket,
+    *,
+    http: type[asyncio.Protocol] | None = None,
+    tls: Certificate | None = None,
+) -> AsyncIterator[None]:
+    """While entered, `app` answers on `listener`; on leaving it shuts down gracefully.
+
+    Args:
+        http: the protocol of its connections; None is uvicorn's own
+        tls: what it encrypts with; None: nothing is encrypted
+    """
     config = uvicorn.Config(
         app,
         access_log=False,  # a path can hold a ticket
-        log_level="warning",
+        log_level="error",  # uvicorn warns of every request that is not HTTP; we count them
         lifespan="on",
         ws="websockets-sansio",
         ws_max_size=MAX_WEBSOCKET_MESSAGE,
         timeout_graceful_shutdown=SHUTDOWN_TIMEOUT,
         server_header=False,
+        http=http or "h11",
+        h11_max_incomplete_event_size=MAX_HEAD,
+        ssl_certfile=None if tls is None else tls.chain,
+        ssl_keyfile=None if tls is None else tls.key,
     )
     server = _Server(config)
     serving = asyncio.get_running_loop().create_task(server.serve([listener]), name="http")

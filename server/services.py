@@ -8,6 +8,7 @@ from starlette.requests import HTTPConnection
 from server.access import Access, Identity
 from server.console import Console
 from server.errors import SceneUnavailable
+from server.guard import Guard
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
 from server.scene import SceneView
@@ -23,6 +24,7 @@ class Services:
     metrics: Metrics
     console: Console
     media: MediaPlane
+    guard: Guard
     scene: SceneView | None  # None when it is switched off or could not start
 
     def scene_or_error(self) -> SceneView:

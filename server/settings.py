@@ -2,22 +2,23 @@
 
 import ipaddress
 import secrets
+from pathlib import Path
 from typing import Annotated, Self
 from urllib.parse import urlsplit
 
 from pydantic import Field, SecretStr, field_validator, model_validator
-from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+from pydantic_settings import SettingsConfigDict
 
+from server.limit_settings import LimitSettings
 from server.media.settings import MediaSettings
+from server.network_settings import NameList, NetworkSettings
 
 __all__ = ["Settings"]
 
 MIN_SECRET_BYTES = 32  # RFC 7518 3.2: an HS256 key is at least as long as the hash
 
-Addresses = Annotated[tuple[str, ...], NoDecode]  # "10.0.0.1,192.168.0.7" in the environment
 
-
-class Settings(BaseSettings):
+class Settings(NetworkSettings, LimitSettings):
     """All that can be set. Times in seconds."""
 
     model_config = SettingsConfigDict(env_prefix="LOCKSTEP_", env_nested_delimiter="__", frozen=True, extra="ignore")
@@ -25,9 +26,10 @@ class Settings(BaseSettings):
     host: str = "127.0.0.1"  # address that HTTP listens on
     port: Annotated[int, Field(ge=0, le=65535)] = 8000  # 0: any free port
     robot: str = "tcp://127.0.0.1:5600"  # the robot bridge
-    ice_hosts: Addresses = ()  # addresses offered to peers; empty: all interfaces, and loopback when bound to it
-    allowed_origins: Addresses = ()  # other origins whose pages may use the HTTP API, "https://example.org"
+    ice_hosts: NameList = ()  # addresses offered to peers; empty: all interfaces, and loopback when bound to it
+    allowed_origins: NameList = ()  # other origins whose pages may use the HTTP API, "https://example.org"
     secret: SecretStr = Field(default_factory=lambda: SecretStr(secrets.token_urlsafe(MIN_SECRET_BYTES)))
+    state_dir: Path | None = None  # signing key, invitations, audit log; None: ~/.local/state/lockstep
     token_seconds: Annotated[float, Field(gt=0)] = 7 * 24 * 3600.0
 
     observer_feedback_hz: Annotated[float, Field(gt=0, le=100)] = 12.5

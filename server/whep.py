@@ -10,6 +10,7 @@ from aiortc.sdp import SessionDescription, candidate_from_sdp, candidate_to_sdp
 from fastapi import APIRouter, Depends, Request, Response
 
 from server.access import Identity
+from server.api_ice import servers_for
 from server.body import read_text
 from server.data_transport_private import tune_data_transport
 from server.errors import (
@@ -23,9 +24,11 @@ from server.errors import (
     RobotUnreachable,
 )
 from server.ice_restart_private import IceSession
+from server.ice_servers import IceServers, for_aiortc, link_headers
 from server.media.aiortc_private import create_peer_connection
 from server.offer import FragmentCandidate, format_fragment, parse_fragment, prepare_offer
 from server.peer import Peer
+from server.peer_guards_private import guard_data
 from server.services import Services, authorized, services
 
 __all__ = ["router"]
@@ -49,8 +52,10 @@ async def create(
     offer = prepare_offer(await read_text(request, SDP, here.settings.max_sdp_bytes))
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
-    with here.console.peers.place():
-        peer, answer = await _negotiate(here, identity, offer, trailer=stamp == "trailer")
+    here.guard.offer(identity.token_id)
+    ice = servers_for(here.settings, identity.token_id)
+    with here.console.peers.place(identity):
+        peer, answer = await _negotiate(here, identity, offer, ice, trailer=stamp == "trailer")
         here.console.peers.admit(peer)
     headers = {
         "Location": f"/whep/{peer.resource}",
@@ -58,6 +63,8 @@ async def create(
         "Cache-Control": "no-store",
         "ETag": peer.ice.tag,
     }
+    if ice.ice_servers:
+        headers["Link"] = ", ".join(link_headers(ice))
     return Response(answer, status_code=201, media_type=SDP, headers=headers)
 
 
@@ -127,9 +134,12 @@ def _own(here: Services, resource: str, identity: Identity) -> Peer:
     return peer
 
 
-async def _negotiate(here: Services, identity: Identity, offer: str, *, trailer: bool) -> tuple[Peer, str]:
-    # No STUN server: our host candidates are a setting, the peer's address is learnt from its checks.
-    pc = create_peer_connection()
+async def _negotiate(
+    here: Services, identity: Identity, offer: str, ice: IceServers, *, trailer: bool
+) -> tuple[Peer, str]:
+    # No STUN server unless asked for: our host candidates are a setting, the peer's address is learnt from its checks.
+    own_servers = for_aiortc(ice) if here.settings.relay_console else []
+    pc = create_peer_connection(own_servers)
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
             await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
@@ -137,8 +147,16 @@ async def _negotiate(here: Services, identity: Identity, offer: str, *, trailer:
             media = here.media.attach(pc, offer, priority=identity.role == "operator", trailer=trailer)
             try:
                 # Before the answer: the first events can come while it is still on its way.
-                ice = IceSession(pc, _username(offer), _new_gatherer, here.settings.peer_connect_timeout)
-                peer = Peer(pc, media, ice, identity, here.console, here.settings)
+                refused = here.metrics.bad_input.labels
+                session = IceSession(
+                    pc,
+                    _username(offer),
+                    lambda: RTCIceGatherer(own_servers),
+                    here.settings.peer_connect_timeout,
+                    lambda name: refused("transport", name).inc(),
+                )
+                peer = Peer(pc, media, session, identity, here.console, here.settings)
+                guard_data(pc, peer.transport_refused)
                 await pc.setLocalDescription(await pc.createAnswer())
             except BaseException:
                 await media.close()
@@ -154,10 +172,6 @@ async def _negotiate(here: Services, identity: Identity, offer: str, *, trailer:
         await _discard(pc)
         raise
     return peer, pc.localDescription.sdp
-
-
-def _new_gatherer() -> RTCIceGatherer:
-    return RTCIceGatherer(iceServers=[])
 
 
 def _username(offer: str) -> str:

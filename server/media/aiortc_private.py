@@ -23,6 +23,7 @@ import pylibsrtp
 from aiortc import (
     RTCBundlePolicy,
     RTCConfiguration,
+    RTCIceServer,
     RTCPeerConnection,
     RTCRtpSender,
     RTCRtpTransceiver,
@@ -86,13 +87,13 @@ def own_addresses() -> list[str]:
     return list(_gather_host_addresses(use_ipv4=True, use_ipv6=True))
 
 
-def create_peer_connection() -> RTCPeerConnection:
-    """A peer connection that contacts no STUN or TURN server.
+def create_peer_connection(ice_servers: Sequence[RTCIceServer] = ()) -> RTCPeerConnection:
+    """A peer connection that contacts no STUN and TURN servers but these.
 
     Each section of an offer starts with a transport of its own: with a shared one aiortc would keep the candidates
     of the last section only, and browsers put them all into the first.
     """
-    return RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_COMPAT))
+    return RTCPeerConnection(RTCConfiguration(iceServers=list(ice_servers), bundlePolicy=RTCBundlePolicy.MAX_COMPAT))
 
 
 def offered_extensions(offer_sdp: str) -> dict[str, dict[str, int]]:

@@ -31,7 +31,7 @@ async def test_a_connected_transport_has_the_parts_that_a_restart_replaces() -> 
 
 async def test_a_connection_without_sections_has_nothing_to_restart() -> None:
     pc = RTCPeerConnection()
-    session = IceSession(pc, "abcd", _gatherer, 1.0)
+    session = IceSession(pc, "abcd", _gatherer, 1.0, lambda name: None)
     assert not session.connected
     with pytest.raises(RuntimeError):
         await session.restart("other", "x" * 22, [])

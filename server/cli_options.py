@@ -1,0 +1,22 @@
+"""Options of the command line that several commands share; each is a setting too (LOCKSTEP_…)."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["AllowedHosts", "PublicUrl", "Stun", "Tls", "TlsCert", "TlsKey", "Turn", "TurnSecret"]
+
+PublicUrl = Annotated[str | None, typer.Option(help="Where people find the console, as behind a proxy.")]
+AllowedHosts = Annotated[
+    list[str] | None,
+    typer.Option("--allowed-host", help="Further name that requests may be for; may be given again."),
+]
+Tls = Annotated[str | None, typer.Option(help="self-signed: encrypt with a certificate of the console's own making.")]
+TlsCert = Annotated[Path | None, typer.Option(help="Certificate chain for TLS, PEM.")]
+TlsKey = Annotated[Path | None, typer.Option(help="Its private key, PEM.")]
+Stun = Annotated[list[str] | None, typer.Option(help="stun:host[:port]; may be given again.")]
+Turn = Annotated[
+    list[str] | None, typer.Option(help="turn:host[:port][?transport=udp|tcp]; may be given again.", metavar="URI")
+]
+TurnSecret = Annotated[str | None, typer.Option(help="Secret shared with the TURN server. Better in the environment.")]

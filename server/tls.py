@@ -1,0 +1,109 @@
+"""TLS: a self-signed certificate for the names and addresses that the console goes by, kept in the state directory."""
+
+import datetime
+import ipaddress
+import os
+import socket
+from pathlib import Path
+from typing import NamedTuple
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+__all__ = ["Certificate", "fingerprint", "own_names", "self_signed"]
+
+DAYS = 397  # more is refused by some browsers
+RENEW_DAYS = 30  # before its end it is made anew
+CERTIFICATE, KEY = "tls-cert.pem", "tls-key.pem"
+
+
+class Certificate(NamedTuple):
+    """Files in PEM."""
+
+    chain: Path
+    key: Path
+
+
+def self_signed(directory: Path, names: set[str], now: datetime.datetime) -> Certificate:
+    """The certificate kept in `directory`; a new one when there is none, it ends soon, or it lacks one of `names`.
+
+    The same certificate at every start: who has told a browser to trust it is not asked again.
+    """
+    kept = Certificate(directory / CERTIFICATE, directory / KEY)
+    if not _is_good(kept, names, now):
+        directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+        key = ec.generate_private_key(ec.SECP256R1())
+        _write(kept.key, _pem(key))
+        _write(kept.chain, _certificate(key, names, now).public_bytes(serialization.Encoding.PEM))
+    return kept
+
+
+def own_names(listening_on: str) -> set[str]:
+    """Names and addresses of this machine by which it may be asked for on `listening_on`."""
+    names = {"localhost", "127.0.0.1", "::1", socket.gethostname().lower()}
+    if listening_on not in ("", "0.0.0.0", "::"):
+        names.add(listening_on)
+    return names
+
+
+def fingerprint(certificate: Certificate) -> str:
+    """SHA-256 of the certificate, as browsers show it."""
+    digest = _load(certificate).fingerprint(hashes.SHA256()).hex().upper()
+    return ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
+
+
+def _load(certificate: Certificate) -> x509.Certificate:
+    return x509.load_pem_x509_certificate(certificate.chain.read_bytes())
+
+
+def _is_good(kept: Certificate, names: set[str], now: datetime.datetime) -> bool:
+    try:
+        found = _load(kept)
+        key = serialization.load_pem_private_key(kept.key.read_bytes(), None)
+        known = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except (OSError, ValueError, TypeError, x509.ExtensionNotFound):
+        return False
+    in_it = {str(each) for kind in (x509.DNSName, x509.IPAddress) for each in known.get_values_for_type(kind)}
+    lasts = found.not_valid_before_utc <= now < found.not_valid_after_utc - datetime.timedelta(days=RENEW_DAYS)
+    return lasts and names <= in_it and key.public_key() == found.public_key()
+
+
+def _certificate(key: ec.EllipticCurvePrivateKey, names: set[str], now: datetime.datetime) -> x509.Certificate:
+    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "Lockstep console")])
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(subject)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - datetime.timedelta(minutes=5))
+        .not_valid_after(now + datetime.timedelta(days=DAYS))
+        .add_extension(x509.SubjectAlternativeName([_general_name(name) for name in sorted(names)]), critical=False)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+
+
+def _general_name(name: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ipaddress.ip_address(name))
+    except ValueError:
+        return x509.DNSName(name)
+
+
+def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
+    return key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    )
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Whole or not at all, and for nobody else to read."""
+    beside = path.with_suffix(".new")
+    descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(data)
+    beside.replace(path)

@@ -1,0 +1,93 @@
+"""Host names, and requests of an address; over real HTTP where the console's own answer matters."""
+
+import pytest
+from starlette.types import Message, Receive, Scope, Send
+
+from server.errors import HostRefused
+from server.front_door import FrontDoor, HostNames, client_address
+from server.rate_limits import RateLimits
+from tests.server.rig import running_rig
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "127.0.0.1:8000",
+        "[::1]:8000",
+        "192.168.1.7",
+        "localhost",
+        "a.localhost:1",
+        "Robot.Example",
+        "here",
+        "here.local",
+    ],
+)
+def test_addresses_and_own_names_pass(host: str) -> None:
+    HostNames(("robot.example",), machine="here").check(host)
+
+
+@pytest.mark.parametrize("host", [None, "", "evil.example", "127.0.0.1.evil.example", "[::1", "localhost.evil", ":80"])
+def test_other_names_are_refused(host: str | None) -> None:
+    with pytest.raises(HostRefused):
+        HostNames(("robot.example",), machine="here").check(host)
+
+
+def test_with_a_star_every_name_passes() -> None:
+    HostNames(("*",)).check("evil.example")
+
+
+def test_ipv6_clients_are_counted_by_their_network() -> None:
+    assert client_address({"client": ("192.0.2.1", 5)}) == "192.0.2.1"
+    assert client_address({"client": ("2001:db8::1", 5)}) == client_address({"client": ("2001:db8::2", 5)})
+    assert client_address({"client": ("2001:db8:0:1::1", 5)}) != client_address({"client": ("2001:db8::2", 5)})
+    assert client_address({"client": ("unix", 0)}) == "unix"
+    assert client_address({"client": None}) == ""
+
+
+async def test_a_name_that_is_not_ours_gets_no_page_and_no_api() -> None:
+    async with running_rig(allowed_hosts="robot.example") as rig:
+        for path in ("/", "/api/session", "/healthz"):
+            answer = await rig.http.get(path, headers={"Host": "evil.example", **rig.token("observer")})
+            assert (answer.status_code, answer.json()["error"]) == (421, "host_refused"), path
+            assert answer.headers["x-content-type-options"] == "nosniff"
+        assert rig.count("lockstep_bad_input_total", where="http", reason="host_refused") == 3
+        assert (await rig.http.get("/healthz", headers={"Host": "robot.example:8000"})).status_code == 200
+
+
+async def test_an_address_that_asks_too_often_is_refused_but_may_still_stop_the_robot() -> None:
+    async with running_rig(max_request_burst=3, max_request_rate=0.001) as rig:
+        answers = [await rig.http.get("/api/session", headers=rig.token("observer")) for _ in range(4)]
+        assert [answer.status_code for answer in answers] == [200, 200, 200, 429]
+        assert answers[3].json()["error"] == "too_many_requests"
+        assert answers[3].headers["retry-after"]
+        assert (await rig.http.post("/api/stop", headers=rig.token("observer"))).status_code == 200
+        assert (await rig.http.get("/healthz")).status_code == 200
+
+
+async def test_who_fails_to_say_who_they_are_too_often_is_told_so_and_others_are_not_disturbed() -> None:
+    async with running_rig(max_refused_burst=2, max_refused_rate=0.001) as rig:
+        answers = [await rig.http.get("/api/session", headers={"Authorization": "Bearer x"}) for _ in range(3)]
+        assert [answer.status_code for answer in answers] == [401, 401, 429]
+        assert (await rig.http.get("/api/session", headers=rig.token("observer"))).status_code == 200
+
+
+async def test_a_websocket_for_a_foreign_name_is_closed_and_other_scopes_pass() -> None:
+    passed: list[str] = []
+    sent: list[Message] = []
+    counted: list[str] = []
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        passed.append(scope["type"])
+
+    async def receive() -> Message:
+        raise AssertionError("nothing to receive")
+
+    async def send(message: Message) -> None:
+        sent.append(message)
+
+    door = FrontDoor(app, HostNames(()), RateLimits(1, 9), lambda scope, name: counted.append(name), lambda: 0.0)
+    await door({"type": "websocket", "path": "/", "headers": [(b"host", b"evil.example")]}, receive, send)
+    await door({"type": "lifespan"}, receive, send)
+    assert passed == ["lifespan"]
+    assert sent == [{"type": "websocket.close", "code": 1008}]
+    assert counted == ["host_refused"]
