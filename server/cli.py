@@ -204,7 +204,9 @@ def _certificate(settings: Settings) -> Certificate | None:
     if not settings.tls:
         return None
     names = own_names(settings.host) | set(settings.tls_names) | set(settings.own_names) | set(own_addresses())
-    certificate = self_signed(settings.state_dir or default_state_dir(), names - {"*"}, datetime.datetime.now(datetime.UTC))
+    certificate = self_signed(
+        settings.state_dir or default_state_dir(), names - {"*"}, datetime.datetime.now(datetime.UTC)
+    )
     _say(f"the certificate is our own; its SHA-256 fingerprint is {fingerprint(certificate)}")
     return certificate
 
