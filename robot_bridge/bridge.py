@@ -58,6 +58,7 @@ class Bridge:
         self._source_faults: list[str] = []  # "camera overview: ..."
         self._running: asyncio.Task[None] | None = None
         self._at_rest = asyncio.Event()  # nothing is driven
+        self._rested = True  # at the last tick
         self._robot_error: Exception | None = None
         self._closed = False
 
@@ -235,6 +236,9 @@ class Bridge:
             self._note_limits(self._limits.acting)
         if self._shaper.at_rest:
             self._at_rest.set()
+        if self._shaper.at_rest != self._rested:
+            self._rested = self._shaper.at_rest
+            self._record("at_rest" if self._rested else "driven", self._core.current)
         if self._core.issue_due(now):
             self._issue(time.monotonic())
 

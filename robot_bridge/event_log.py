@@ -15,7 +15,9 @@ import msgspec
 
 __all__ = ["EventKind", "EventLog"]
 
-EventKind = Literal["start", "executed", "feedback", "refused", "media", "stop", "reset", "rest", "limit"]
+EventKind = Literal[
+    "start", "executed", "feedback", "refused", "media", "stop", "reset", "rest", "limit", "driven", "at_rest"
+]
 Field = str | int | float | bool | list[float] | list[str]
 
 MAX_WAITING = 10_000  # lines

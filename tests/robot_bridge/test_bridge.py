@@ -5,6 +5,7 @@ import logging
 import signal
 import sys
 from pathlib import Path
+from typing import cast
 
 import msgspec
 import pytest
@@ -71,6 +72,9 @@ async def test_without_commands_the_robot_is_at_rest_within_hold_while_the_link_
     assert isinstance(executed, float)
     assert all(values == NEUTRAL for when, values in robot.applied if when >= executed + hold + MARGIN)
     assert any(values != NEUTRAL for when, values in robot.applied if when >= executed)
+    driven, at_rest = log_lines(log, "driven"), log_lines(log, "at_rest")
+    assert len(driven) == len(at_rest) == 1
+    assert cast(float, driven[0]["time"]) < executed < cast(float, at_rest[0]["time"])
 
 
 async def test_when_the_operator_link_ends_the_robot_comes_to_rest_long_before_hold() -> None:
