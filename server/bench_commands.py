@@ -14,6 +14,11 @@ COMMANDS = {
         "experiment_command",
         "Repeat the thesis' experiments on emulated networks.",
     ),
+    "network": (
+        "bench.emulator.cli",
+        "network_command",
+        "Put a bad network between a console and whoever uses it.",
+    ),
     "soak": ("bench.soak.cli", "soak_command", "Drive for a long time while everything fails now and then."),
 }
 

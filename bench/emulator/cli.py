@@ -20,16 +20,13 @@ from bench.emulator.orders import Impaired, obey
 from bench.emulator.profile import Profile, load_profile, profile_names
 from server.serve import PortTaken, wait_for_signal
 
-__all__ = ["app", "main"]
+__all__ = ["main", "network_command"]
 
 EXIT_USAGE = 2
 EXIT_PORT_TAKEN = 3
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
-
-@app.command()
-def network(
+def network_command(
     profile: Annotated[str, typer.Argument(help=f"A network: {', '.join(profile_names())}, or the file of one.")],
     console: Annotated[
         str | None, typer.Option(help="The console's URL, or a link with a token, to put a proxy in front of.")
@@ -143,4 +140,6 @@ async def _wait(process: asyncio.subprocess.Process) -> None:
 
 
 def main() -> None:
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(network_command)
     app(prog_name=f"{Path(sys.executable).name} -m bench.emulator")
