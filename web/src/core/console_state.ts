@@ -11,6 +11,7 @@ import type {
   Welcome,
 } from "../wire";
 import type { Pacing } from "./command_gate";
+import { requestAnswer, type SeatNews } from "./seat_news";
 import { handOver, type HandOver } from "./hand_over";
 import type { GateMode } from "./media_gate";
 import { isNewer } from "./serial";
@@ -41,6 +42,7 @@ export interface ConsoleState {
   robot: RobotState | null;
   seat: Seat | null;
   handOver: HandOver | null; // the last one
+  seatNews: SeatNews | null; // what was last to be told about the seat, a new object each time
   participants: readonly Participant[];
   quality: Quality | null; // of this peer's pictures
   notes: SharedNote[]; // oldest first
@@ -69,6 +71,7 @@ export function createConsoleState(): ConsoleState {
     robot: null,
     seat: null,
     handOver: null,
+    seatNews: null,
     participants: [],
     quality: null,
     notes: [],
@@ -131,7 +134,7 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       state.stop = message.stop;
       return;
     case "refusal":
-      note(state, "warning", refusalWords(message), wallMs);
+      takeRefusal(state, message, wallMs);
       return;
     case "feedback":
       if (isNews(state.feedback, message)) takeFeedbackState(state, message);
@@ -177,7 +180,16 @@ function takeSeat(state: ConsoleState, seat: Seat, wallMs: number): void {
   state.seat = seat;
   if (change === null) return;
   state.handOver = change;
+  state.seatNews = { words: change.words };
   note(state, "info", change.words, wallMs);
+}
+
+/** A page that only looked whether the seat is free asked for nothing, so nothing was refused. */
+function takeRefusal(state: ConsoleState, refusal: Refusal, wallMs: number): void {
+  const answer = requestAnswer(refusal, state.seat?.name ?? "");
+  if (answer !== null) state.seatNews = { words: answer };
+  if (refusal.reason === "seat_taken" && answer === null) return;
+  note(state, "warning", answer ?? refusalWords(refusal), wallMs);
 }
 
 function refusalWords(refusal: Refusal): string {

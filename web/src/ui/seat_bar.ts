@@ -1,10 +1,10 @@
 import { seatAction, seatStanding, type SeatAction } from "../core/seat_standing";
 import { seatWords } from "../core/seat_words";
-import type { HandOver } from "../core/hand_over";
+import type { SeatNews } from "../core/seat_news";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
 
-/** A hand-over is told this long. */
+/** News are told this long. */
 const NEWS_MS = 10_000;
 
 /** Who drives, who asks for it, and the one button for it: always in the same place. */
@@ -27,14 +27,14 @@ export function createSeatBar(app: ConsoleApp): Panel {
     words,
     buttons,
   );
-  let told: HandOver | null = null;
+  let told: SeatNews | null = null;
   let toldMs = -Infinity;
   return {
     element,
     update(now) {
       const { state, session } = app;
-      if (state.handOver !== told) {
-        told = state.handOver;
+      if (state.seatNews !== told) {
+        told = state.seatNews;
         toldMs = now;
       }
       const me = state.welcome?.peer ?? null;
