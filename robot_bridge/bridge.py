@@ -12,6 +12,7 @@ from typing import Self
 
 from robot_bridge.axis_shaper import AxisShaper
 from robot_bridge.check_description import check_description
+from robot_bridge.check_link import check_link
 from robot_bridge.counters import BridgeCounters
 from robot_bridge.errors import RobotFailed
 from robot_bridge.event_core import Answered, EventCore, Executed, Refused
@@ -38,7 +39,10 @@ class Bridge:
     def __init__(self, robot: Robot, settings: BridgeSettings) -> None:
         """Raises:
         DescriptionError: the robot's description contradicts itself.
+        InsecureLink: anybody who reaches the address could drive, and the settings do not say that this is wanted.
+        SecretError: the TLS files are no good.
         """
+        check_link(settings)
         self.description = robot.describe()
         check_description(self.description)
         self.epoch = secrets.token_hex(8)
@@ -51,7 +55,16 @@ class Bridge:
         )
         self._limits = MotionLimits(self.description, robot, robot.tick_seconds)
         self._shaper = AxisShaper(self.description.axes, hold=self.description.hold, limiter=self._limits)
-        self._links = LinkServer(self, self.description, self.epoch, self.counters, max_links=settings.max_links)
+        self._links = LinkServer(
+            self,
+            self.description,
+            self.epoch,
+            self.counters,
+            max_links=settings.max_links,
+            max_strangers=settings.max_strangers,
+            secret=settings.secret,
+            tls=None if settings.tls is None else settings.tls.bridge_context(),
+        )
         self._log: EventLog | None = None
         self._acting: frozenset[str] = frozenset()  # limits that slowed the robot in the last tick
         self._acted: set[str] = set()  # and since the last feedback

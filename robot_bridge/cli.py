@@ -3,6 +3,7 @@
 import asyncio
 import json
 import logging
+import os
 import signal
 import sys
 from pathlib import Path
@@ -12,11 +13,17 @@ import typer
 import uvloop
 
 from robot_bridge.bridge import Bridge
+from robot_bridge.check_link import check_link
 from robot_bridge.errors import BridgeError
+from robot_bridge.link_tls import LinkTls
+from robot_bridge.protocol.errors import SecretError
+from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.robots.registry import create_robot, robot_names
 from robot_bridge.settings import BridgeSettings
 
 __all__ = ["main", "robot_app", "run"]
+
+SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
 
 robot_app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
@@ -29,19 +36,56 @@ def run(
     event_log: Annotated[
         Path | None, typer.Option(help="Append a JSON line for each event, refusal and medium.")
     ] = None,
+    link_secret_file: Annotated[
+        Path | None,
+        typer.Option(
+            envvar="LOCKSTEP_LINK_SECRET_FILE",
+            help="File with the secret that clients have to know; or LOCKSTEP_LINK_SECRET.",
+        ),
+    ] = None,
+    link_tls_cert: Annotated[Path | None, typer.Option(help="Certificate: speak TLS.")] = None,
+    link_tls_key: Annotated[Path | None, typer.Option(help="Its key, if it stands in another file.")] = None,
+    link_tls_ca: Annotated[
+        Path | None, typer.Option(help="Ask clients for a certificate that this one signed.")
+    ] = None,
+    insecure_link: Annotated[
+        bool, typer.Option(help="Listen beyond loopback although anybody there could drive the robot.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the address as one JSON line once ready.")] = False,
 ) -> None:
     """Run a robot and its bridge until interrupted."""
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    settings = BridgeSettings(host=host, port=port, event_log=event_log)
     try:
+        settings = BridgeSettings(
+            host=host,
+            port=port,
+            event_log=event_log,
+            secret=_secret(link_secret_file),
+            tls=_tls(link_tls_cert, link_tls_key, link_tls_ca),
+            insecure=insecure_link,
+        )
+        check_link(settings)  # before the robot is made, which can take long
         uvloop.run(_serve(name, settings, as_json))
-    except BridgeError as error:
+    except (BridgeError, SecretError) as error:
         typer.echo(f"lockstep robot: {error.detail}", err=True)
         raise typer.Exit(1) from error
     except OSError as error:
         typer.echo(f"lockstep robot: {error}", err=True)
         raise typer.Exit(1) from error
+
+
+def _secret(path: Path | None) -> LinkSecret | None:
+    """The file's, or the environment's: an argument would be seen by everybody on the machine."""
+    if path is not None:
+        return LinkSecret.read(path)
+    text = os.environ.get(SECRET_VARIABLE, "")
+    return LinkSecret(text) if text else None
+
+
+def _tls(certificate: Path | None, key: Path | None, authority: Path | None) -> LinkTls | None:
+    if certificate is None and key is None and authority is None:
+        return None
+    return LinkTls(certificate=certificate, key=key, authority=authority)
 
 
 async def _serve(name: str, settings: BridgeSettings, as_json: bool) -> None:
@@ -50,7 +94,7 @@ async def _serve(name: str, settings: BridgeSettings, as_json: bool) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stopping.set)
     async with Bridge(create_robot(name), settings) as bridge:
-        _announce(name, bridge, as_json)
+        _announce(name, bridge, "tcp" if settings.tls is None else "tls", as_json)
         waits = {loop.create_task(stopping.wait()), loop.create_task(bridge.wait())}
         try:
             done, _ = await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
@@ -62,9 +106,9 @@ async def _serve(name: str, settings: BridgeSettings, as_json: bool) -> None:
         bridge.report()
 
 
-def _announce(name: str, bridge: Bridge, as_json: bool) -> None:
+def _announce(name: str, bridge: Bridge, scheme: str, as_json: bool) -> None:
     host, port = bridge.address
-    url = f"tcp://{f'[{host}]' if ':' in host else host}:{port}"
+    url = f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
     typer.echo(json.dumps({"robot": url}) if as_json else f"{name} at {url}")
     sys.stdout.flush()
 

@@ -5,10 +5,19 @@ BridgeError
 ├── UnknownRobot            no robot of that name
 ├── DescriptionError        the robot's description contradicts itself
 ├── ListenError             the bridge cannot listen on the address
+├── InsecureLink            the bridge will not listen there without a secret or client certificates
 └── RobotFailed             the robot adapter raised while running
 """
 
-__all__ = ["BridgeError", "DescriptionError", "ListenError", "RobotFailed", "RobotUnavailable", "UnknownRobot"]
+__all__ = [
+    "BridgeError",
+    "DescriptionError",
+    "InsecureLink",
+    "ListenError",
+    "RobotFailed",
+    "RobotUnavailable",
+    "UnknownRobot",
+]
 
 
 class BridgeError(Exception):
@@ -43,6 +52,10 @@ class DescriptionError(BridgeError):
 
 class ListenError(BridgeError):
     name = "listen"
+
+
+class InsecureLink(BridgeError):
+    name = "insecure_link"
 
 
 class RobotFailed(BridgeError):

@@ -1,6 +1,7 @@
 """The robot link from the outside: what the console's server uses, and anybody who writes a client."""
 
 import asyncio
+import ssl
 import time
 from collections import Counter
 from types import TracebackType
@@ -10,6 +11,7 @@ from robot_bridge.link_session import BadInput, ClientSession, kind_of
 from robot_bridge.link_transport import TICK_INTERVAL, LinkTransport
 from robot_bridge.media_outbox import MediaOutbox
 from robot_bridge.protocol.errors import HandshakeError, LinkError, LinkLost, LinkRefused
+from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.protocol.messages import Goodbye, Hello, LinkMessage, LinkRole, Media
 
 __all__ = ["RobotLink"]
@@ -30,13 +32,24 @@ class RobotLink:
     counted in `drops`.
     """
 
-    def __init__(self, host: str, port: int, role: LinkRole, *, name: str = "") -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        role: LinkRole,
+        *,
+        name: str = "",
+        secret: LinkSecret | None = None,
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        """`secret`: both sides prove that they know it. `tls`: as `LinkTls.client_context` makes it."""
         self.role: LinkRole = role
         self.bad_input: Counter[str] = Counter()  # by name, {"malformed": 1}
         self.drops: Counter[str] = Counter()  # by message kind, {"feedback": 2}; media are in `media_drops`
         self._host = host
         self._port = port
-        self._session = ClientSession(time.monotonic(), role, name)
+        self._tls = tls
+        self._session = ClientSession(time.monotonic(), role, name, secret)
         self._transport = _ClientTransport(self, self._session)
         self._inbox: dict[int, LinkMessage] = {}  # by arrival, oldest first
         self._arrivals = 0
@@ -77,7 +90,7 @@ class RobotLink:
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(CONNECT_TIMEOUT):
-                await loop.create_connection(lambda: self._transport, self._host, self._port)
+                await loop.create_connection(lambda: self._transport, self._host, self._port, ssl=self._tls)
                 self._tick()
                 while self._session.hello is None and self._session.ended is None:
                     self._news.clear()

@@ -1,6 +1,8 @@
 """The bridge's listening side: admits links, hands their messages on, sends to them by role."""
 
 import asyncio
+import socket
+import ssl
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -9,10 +11,12 @@ from typing import Protocol
 
 from robot_bridge.counters import BridgeCounters
 from robot_bridge.errors import ListenError
+from robot_bridge.link_guard import LinkGuard
 from robot_bridge.link_session import BadInput, BridgeSession
 from robot_bridge.link_transport import TICK_INTERVAL, LinkTransport
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.framing import frame
+from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.protocol.messages import (
     Command,
     EventNotice,
@@ -26,10 +30,12 @@ from robot_bridge.protocol.messages import (
     Stop,
     encode_message,
 )
+from robot_bridge.tls_acceptor import TlsAcceptor
 
 __all__ = ["LinkHandler", "LinkPeer", "LinkServer"]
 
 CLOSE_TIMEOUT = 1.0  # s for goodbyes to leave when the bridge closes
+BACKLOG = 64
 
 
 class LinkHandler(Protocol):
@@ -51,10 +57,11 @@ class LinkHandler(Protocol):
 class LinkPeer(LinkTransport):
     """One admitted or applying link."""
 
-    def __init__(self, server: "LinkServer", clock: Callable[[], float]) -> None:
-        super().__init__(BridgeSession(clock(), self._admit), clock)
+    def __init__(self, server: "LinkServer", clock: Callable[[], float], secret: LinkSecret | None) -> None:
+        super().__init__(BridgeSession(clock(), self._admit, secret), clock)
         self._server = server
         self.name = ""  # what the client calls itself, "console"
+        self.address = ""  # where it comes from, "10.0.0.9"
 
     def _admit(self, hello: Hello) -> Hello | Goodbye:
         self.name = hello.name
@@ -62,6 +69,8 @@ class LinkPeer(LinkTransport):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
+        address = transport.get_extra_info("peername")
+        self.address = str(address[0]) if address else ""
         self._server.connected(self)
 
     def received(self, event: LinkMessage | BadInput) -> None:
@@ -86,18 +95,27 @@ class LinkServer:
         counters: BridgeCounters,
         *,
         max_links: int,
+        max_strangers: int,
+        secret: LinkSecret | None = None,
+        tls: ssl.SSLContext | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._handler = handler
         self._hello = Hello(role="robot", name=description.name, epoch=epoch, description=description)
         self._counters = counters
         self._max_links = max_links
+        self._max_strangers = max_strangers
+        self._secret = secret
+        self._tls = tls
         self._clock = clock
+        self._guard = LinkGuard()
         self._connections: set[LinkPeer] = set()  # sockets, those that are closing included
+        self._strangers: dict[LinkPeer, None] = {}  # not admitted yet, oldest first
+        self._known: set[LinkPeer] = set()  # admitted
         self._operator: LinkPeer | None = None
         self._events: set[LinkPeer] = set()
         self._media: set[LinkPeer] = set()
-        self._server: asyncio.Server | None = None
+        self._server: asyncio.Server | TlsAcceptor | None = None
         self._all_gone = asyncio.Event()
 
     @property
@@ -118,11 +136,25 @@ class LinkServer:
         """
         loop = asyncio.get_running_loop()
         try:
-            self._server = await loop.create_server(lambda: LinkPeer(self, self._clock), host, port)
+            if self._tls is None:
+                self._server = await loop.create_server(self._new_peer, host, port)
+                address = self._server.sockets[0].getsockname()
+            else:
+                listener = socket.create_server((host, port), family=family_of(host), backlog=BACKLOG)
+                address = listener.getsockname()
+                self._server = TlsAcceptor(
+                    listener, self._tls, self._new_peer, self._tls_failed, max_handshakes=self._max_strangers
+                )
+                self._server.start()
         except OSError as error:
             raise ListenError(f"cannot listen on {host}:{port}: {error}") from error
-        address = self._server.sockets[0].getsockname()
         return str(address[0]), int(address[1])
+
+    def _new_peer(self) -> LinkPeer:
+        return LinkPeer(self, self._clock, self._secret)
+
+    def _tls_failed(self) -> None:
+        self._counters.bad_input["tls"] += 1
 
     async def run(self) -> None:
         """Heartbeats, until cancelled."""
@@ -133,9 +165,11 @@ class LinkServer:
 
     async def close(self) -> None:
         """Stop listening, say goodbye to all, and wait until they are gone."""
-        if self._server is not None:
-            self._server.close()
-            self._server = None
+        server, self._server = self._server, None
+        if isinstance(server, TlsAcceptor):
+            await server.close()
+        elif server is not None:
+            server.close()
         for peer in list(self._connections):
             peer.end("closing", "the bridge is closing")
         try:
@@ -169,10 +203,16 @@ class LinkServer:
     # called by the links
 
     def admit(self, peer: LinkPeer, hello: Hello) -> Hello | Goodbye:
+        """Called once the peer has proven the secret, where there is one."""
+        self._guard.succeeded(peer.address)
+        if len(self._known) >= self._max_links:
+            return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
+        if hello.role == "operator" and self._operator is not None:
+            return Goodbye(error="taken", detail="another operator link is open")
+        self._strangers.pop(peer, None)
+        self._known.add(peer)
         match hello.role:
             case "operator":
-                if self._operator is not None:
-                    return Goodbye(error="taken", detail="another operator link is open")
                 self._operator = peer
             case "events":
                 self._events.add(peer)
@@ -183,15 +223,27 @@ class LinkServer:
 
     def connected(self, peer: LinkPeer) -> None:
         self._connections.add(peer)
+        self._strangers[peer] = None
         if self._server is None:
             peer.end("closing", "the bridge is closing")
-        elif len(self._connections) > self._max_links:
-            peer.end("full", f"this bridge takes {self._max_links} links")
+        elif self._is_blocked(peer.address):
+            self._counters.bad_input["throttled"] += 1
+            peer.end("unauthorised", "too many failed tries from this address; wait")
+        elif len(self._strangers) > self._max_strangers:
+            next(iter(self._strangers)).end("full", "too many connections that have not been admitted")
+
+    def _is_blocked(self, address: str) -> bool:
+        """An address with an admitted link is never made to wait for what somebody else tries from there."""
+        if not self._guard.is_blocked(address, self._clock()):
+            return False
+        return all(peer.address != address for peer in self._known)
 
     def received(self, peer: LinkPeer, event: LinkMessage | BadInput) -> None:
         match event:
             case BadInput():
                 self._counters.bad_input[event.name] += 1
+                if event.name == "unauthorised":
+                    self._guard.failed(peer.address, self._clock())
                 if peer.session.ended is None:
                     self._handler.link_bad_input(peer, event)
             case Hello():
@@ -204,6 +256,8 @@ class LinkServer:
     def ended(self, peer: LinkPeer) -> None:
         if peer.session.ended is not None:
             self._counters.endings[peer.session.ended.error] += 1
+        self._strangers.pop(peer, None)
+        self._known.discard(peer)
         self._events.discard(peer)
         self._media.discard(peer)
         if self._operator is peer:
@@ -214,6 +268,10 @@ class LinkServer:
         self._connections.discard(peer)
         self._counters.drops.update(peer.drops)
         self._all_gone.set()
+
+
+def family_of(host: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 
 def encode_once(message: LinkMessage) -> Callable[[], bytes]:

@@ -8,10 +8,14 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Literal, NamedTuple
 
+import msgspec
+
 from robot_bridge.protocol.errors import FramingError, MessageError
-from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_MEDIA_FRAME, FrameReader
+from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader
+from robot_bridge.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
 from robot_bridge.protocol.messages import (
     PROTOCOL_VERSION,
+    Challenge,
     Command,
     EventNotice,
     Feedback,
@@ -57,7 +61,7 @@ class LinkState(Enum):
 class BadInput(NamedTuple):
     """Something the other side should not have sent; it counts as nothing but bad input."""
 
-    name: Literal["malformed", "not_allowed", "framing", "handshake"]
+    name: Literal["malformed", "not_allowed", "framing", "handshake", "unauthorised"]
     detail: str
     event: int = 0  # of a command that was not allowed; 0 otherwise
 
@@ -174,11 +178,17 @@ class LinkSession:
 
 
 class BridgeSession(LinkSession):
-    """The bridge's side. `admit` answers a hello of a known version and role: with our hello, or a goodbye."""
+    """The bridge's side. `admit` answers a hello of a known version and role: with our hello, or a goodbye.
 
-    def __init__(self, now: float, admit: Callable[[Hello], Hello | Goodbye]) -> None:
-        super().__init__(now, max_frame=MAX_CONTROL_FRAME)
+    With a secret it is asked only about clients that have proven to know it.
+    """
+
+    def __init__(self, now: float, admit: Callable[[Hello], Hello | Goodbye], secret: LinkSecret | None = None) -> None:
+        super().__init__(now, max_frame=MAX_HELLO_FRAME)
         self._admit = admit
+        self._secret = secret
+        self._challenged: Hello | None = None  # the hello that was answered with a challenge
+        self._nonce = b""  # of that challenge
 
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         """Returns the hello when it was admitted."""
@@ -188,48 +198,101 @@ class BridgeSession(LinkSession):
             return self._reject("version", f"this bridge speaks version {PROTOCOL_VERSION}, not {message.version}")
         if message.role not in FROM_CLIENT:
             return self._reject("role", f"a client cannot have the role {message.role}")
-        answer = self._admit(message)
+        if self._secret is None:
+            return self._open_for(message, b"", now)
+        if self._challenged is None:
+            return self._challenge(message)
+        return self._check(message, self._challenged, self._secret, now)
+
+    def _challenge(self, hello: Hello) -> BadInput | None:
+        if len(hello.nonce) != NONCE_BYTES:
+            return self._reject("unauthorised", "this bridge asks for the link secret")
+        self._challenged, self._nonce = hello, draw_nonce()
+        self._outgoing.append(Challenge(nonce=self._nonce))
+        return None
+
+    def _check(self, hello: Hello, first: Hello, secret: LinkSecret, now: float) -> LinkMessage | BadInput | None:
+        proof = secret.client_proof(first.nonce, self._nonce, first.role)
+        if not LinkSecret.same(hello.proof, proof) or (hello.role, hello.nonce) != (first.role, first.nonce):
+            return self._reject("unauthorised", "wrong link secret")
+        return self._open_for(hello, first.nonce, now)
+
+    def _open_for(self, hello: Hello, client_nonce: bytes, now: float) -> LinkMessage | None:
+        answer = self._admit(hello)
         if isinstance(answer, Goodbye):
             self.end(answer.error, answer.detail)
             return None
-        self._open(message.role, FROM_CLIENT[message.role], now)
+        if self._secret is not None:
+            proof = self._secret.bridge_proof(client_nonce, self._nonce, answer.epoch)
+            answer = msgspec.structs.replace(answer, proof=proof)
+        self._open(hello.role, FROM_CLIENT[hello.role], now)
+        self._reader.max_frame = MAX_CONTROL_FRAME
         self._outgoing.append(answer)
-        return message
+        return hello
 
     def _reject(self, error: str, detail: str) -> BadInput:
         self.end(error, detail)
-        return BadInput("handshake", detail)
+        return BadInput("unauthorised" if error == "unauthorised" else "handshake", detail)
 
 
 class ClientSession(LinkSession):
-    """The client's side: sends its hello at once and returns the bridge's."""
+    """The client's side: sends its hello at once and returns the bridge's.
 
-    def __init__(self, now: float, role: LinkRole, name: str = "") -> None:
+    With a secret it goes on only with a bridge that has proven to know it too.
+    """
+
+    def __init__(self, now: float, role: LinkRole, name: str = "", secret: LinkSecret | None = None) -> None:
         super().__init__(now, max_frame=MAX_MEDIA_FRAME if role == "media" else MAX_CONTROL_FRAME)
         if role not in FROM_ROBOT:
             raise ValueError(f"a client cannot have the role {role}")
         self.role = role
         self.hello: Hello | None = None  # the bridge's; None before the handshake
-        self._outgoing.append(Hello(role=role, name=name))
+        self._secret = secret
+        self._bridge_nonce: bytes | None = None  # None before a challenge
+        self._said = Hello(role=role, name=name, nonce=b"" if secret is None else draw_nonce())
+        self._outgoing.append(self._said)
 
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         if isinstance(message, Goodbye):
             self._finish(message)
             return None
+        if isinstance(message, Challenge):
+            return self._answer(message)
         if not isinstance(message, Hello):
             return self._reject("handshake", f"expected hello, not {kind_of(message)}")
         if message.version != PROTOCOL_VERSION or message.role != "robot" or not message.epoch:
             return self._reject("version", f"not a bridge of version {PROTOCOL_VERSION}")
         if self.role != "events" and message.description is None:
             return self._reject("handshake", "the bridge sent no description")
+        if not self._is_proven(message):
+            return self._reject("unauthorised", "the bridge does not prove that it knows the link secret")
         assert self.role is not None  # set by __init__
         self._open(self.role, FROM_ROBOT[self.role], now)
         self.hello = message
         return message
 
+    def _answer(self, challenge: Challenge) -> BadInput | None:
+        if self._secret is None:
+            return self._reject("unauthorised", "the bridge asks for the link secret")
+        if self._bridge_nonce is not None or len(challenge.nonce) != NONCE_BYTES:
+            return self._reject("handshake", "not a challenge of this protocol")
+        self._bridge_nonce = challenge.nonce
+        proof = self._secret.client_proof(self._said.nonce, challenge.nonce, self._said.role)
+        self._outgoing.append(msgspec.structs.replace(self._said, proof=proof))
+        return None
+
+    def _is_proven(self, hello: Hello) -> bool:
+        """Without a secret of ours nothing needs to be proven; with one, also an unasked bridge is refused."""
+        if self._secret is None:
+            return True
+        if self._bridge_nonce is None:
+            return False
+        proof = self._secret.bridge_proof(self._said.nonce, self._bridge_nonce, hello.epoch)
+        return LinkSecret.same(hello.proof, proof)
+
     def _reject(self, error: str, detail: str) -> BadInput:
         self.end(error, detail)
-        return BadInput("handshake", detail)
+        return BadInput("unauthorised" if error == "unauthorised" else "handshake", detail)
 
 
 def kind_of(message: LinkMessage) -> str:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from robot_bridge.link_tls import LinkTls
+from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.protocol.serial import FIRST_EVENT
 
 __all__ = ["BridgeSettings"]
@@ -14,5 +16,9 @@ class BridgeSettings:
     port: int = 5600  # 0: any free one
     event_log: Path | None = None  # JSON lines of all that happened to events; None writes nothing
     first_event: int = FIRST_EVENT  # tests start near the wrap
-    max_links: int = 32
+    max_links: int = 32  # admitted ones
+    max_strangers: int = 16  # connections that are not admitted yet; the oldest goes when there are more
+    secret: LinkSecret | None = None  # that clients have to know
+    tls: LinkTls | None = None
+    insecure: bool = False  # listen beyond loopback although anybody could drive
     log_interval: float = 60.0  # s between log lines with the counters

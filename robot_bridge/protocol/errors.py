@@ -5,10 +5,11 @@ LinkError
 ├── MessageError            a frame is not a message of the protocol
 ├── HandshakeError          the two sides cannot work together
 ├── LinkRefused             the bridge said no to our hello
+├── SecretError             the link's secret or TLS files are no good
 └── LinkLost                the connection ended or went silent
 """
 
-__all__ = ["FramingError", "HandshakeError", "LinkError", "LinkLost", "LinkRefused", "MessageError"]
+__all__ = ["FramingError", "HandshakeError", "LinkError", "LinkLost", "LinkRefused", "MessageError", "SecretError"]
 
 
 class LinkError(Exception):
@@ -43,6 +44,10 @@ class HandshakeError(LinkError):
 
 class LinkRefused(LinkError):
     name = "refused"
+
+
+class SecretError(LinkError):
+    name = "secret"
 
 
 class LinkLost(LinkError):

@@ -13,6 +13,7 @@ from robot_bridge.protocol.serial import MAX_EVENT
 
 __all__ = [
     "PROTOCOL_VERSION",
+    "Challenge",
     "Command",
     "EventNotice",
     "EventReference",
@@ -42,6 +43,7 @@ EventReference = Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]
 IssueNumber = Annotated[int, msgspec.Meta(ge=1)]
 AxisValues = Annotated[list[float], msgspec.Meta(max_length=MAX_AXES)]
 Text = Annotated[str, msgspec.Meta(max_length=500)]
+Proof = Annotated[bytes, msgspec.Meta(max_length=64)]
 
 LinkRole = Literal["robot", "operator", "events", "media"]
 MediaCodec = Literal["yuv420p", "mjpeg", "h264", "pcm_s16le"]
@@ -73,13 +75,24 @@ class StopState(msgspec.Struct, frozen=True):
 
 
 class Hello(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
-    """First message both ways. The bridge answers with its epoch and, but for `events`, the description."""
+    """First message both ways. The bridge answers with its epoch and, but for `events`, the description.
+
+    A client that knows the link's secret sends a nonce, and again with the proof when it is challenged.
+    """
 
     version: int = PROTOCOL_VERSION
     role: LinkRole
     name: Text = ""  # who is calling, for logs
     epoch: Text = ""  # one run of a bridge; only the bridge sets it
     description: RobotDescription | None = None  # only the bridge sets it
+    nonce: Proof = b""  # 32 random bytes of a client that knows the secret; else empty
+    proof: Proof = b""  # that the sender knows the secret, for the nonces of both sides; else empty
+
+
+class Challenge(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="challenge"):
+    """The bridge's answer to a hello without proof: say hello again, with it."""
+
+    nonce: Proof  # 32 random bytes
 
 
 class Command(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="command"):
@@ -173,7 +186,9 @@ class Goodbye(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
     detail: Text = ""
 
 
-LinkMessage = Hello | Command | Feedback | Refusal | EventNotice | Media | Rest | Stop | Reset | Ping | Pong | Goodbye
+LinkMessage = (
+    Hello | Challenge | Command | Feedback | Refusal | EventNotice | Media | Rest | Stop | Reset | Ping | Pong | Goodbye
+)
 
 _decoder: msgspec.msgpack.Decoder[LinkMessage] = msgspec.msgpack.Decoder(LinkMessage)
 _encoder = msgspec.msgpack.Encoder()

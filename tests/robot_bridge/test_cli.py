@@ -1,5 +1,6 @@
 import asyncio
 import json
+import os
 import signal
 import sys
 from pathlib import Path
@@ -10,7 +11,11 @@ from typer.testing import CliRunner
 from robot_bridge import cli
 from robot_bridge.errors import RobotUnavailable
 from robot_bridge.link_client import RobotLink
+from robot_bridge.link_tls import LinkTls
+from robot_bridge.protocol.errors import LinkRefused
+from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.robots.base import Robot
+from tests.support.certificates import Authority
 
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
@@ -62,3 +67,48 @@ def test_an_event_log_that_cannot_be_written_is_an_error_and_not_a_traceback(tmp
     result = CliRunner().invoke(cli.robot_app, ["planar", "--port", "0", "--event-log", str(tmp_path / "no" / "log")])
     assert result.exit_code == 1
     assert "No such file" in result.output
+
+
+def test_beyond_loopback_it_does_not_start_without_a_secret_and_says_what_to_do() -> None:
+    result = CliRunner().invoke(cli.robot_app, ["planar", "--port", "0", "--host", "0.0.0.0"])
+    assert result.exit_code == 1
+    assert "--link-secret-file" in result.output
+
+
+def test_a_secret_that_is_too_short_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("too short")
+    for arguments, environment in (
+        (["--link-secret-file", str(tmp_path / "secret")], {}),
+        ([], {"LOCKSTEP_LINK_SECRET": "too short"}),
+        ([], {"LOCKSTEP_LINK_SECRET_FILE": str(tmp_path / "secret")}),
+    ):
+        result = CliRunner().invoke(cli.robot_app, ["planar", "--port", "0", *arguments], env=environment)
+        assert result.exit_code == 1
+        assert "at least 32 bytes" in result.output
+
+
+async def test_the_secret_of_the_environment_is_asked_for_and_tls_shows_in_the_address(tmp_path: Path) -> None:
+    secret = LinkSecret.draw()
+    authority = Authority(tmp_path)
+    certificate = authority.issue("bridge")
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "robot_bridge", "planar", "--port", "0", "--json", "--host", "0.0.0.0"),
+        *("--link-tls-cert", str(certificate)),
+        stdout=asyncio.subprocess.PIPE,
+        env={**os.environ, "LOCKSTEP_LINK_SECRET": secret.reveal()},
+    )
+    try:
+        assert process.stdout is not None
+        async with asyncio.timeout(20):
+            address = json.loads(await process.stdout.readline())["robot"]
+        assert address.startswith("tls://0.0.0.0:")
+        tls = LinkTls(authority=authority.certificate).client_context()
+        port = int(address.rpartition(":")[2])
+        async with RobotLink("127.0.0.1", port, "events", secret=secret, tls=tls) as link:
+            await anext(link)
+        with pytest.raises(LinkRefused, match="unauthorised"):
+            await RobotLink("127.0.0.1", port, "events", tls=tls).connect()
+    finally:
+        process.terminate()
+        async with asyncio.timeout(20):
+            await process.communicate()

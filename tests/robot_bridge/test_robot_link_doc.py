@@ -8,10 +8,12 @@ from typing import get_args
 import msgspec
 import pytest
 
+from robot_bridge.link_guard import REFILL, TRIES
 from robot_bridge.link_session import FROM_CLIENT, FROM_ROBOT, HELLO_TIMEOUT, PING_INTERVAL, SILENCE, kind_of
 from robot_bridge.media_outbox import ORDERED_DEPTH
 from robot_bridge.protocol import description
-from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_MEDIA_FRAME, FrameReader, frame
+from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader, frame
+from robot_bridge.protocol.link_secret import MIN_SECRET_BYTES
 from robot_bridge.protocol.messages import (
     Command,
     Feedback,
@@ -122,6 +124,11 @@ def test_the_numbers_are_those_of_the_code() -> None:
     assert f"hello within {HELLO_TIMEOUT:g} s" in TEXT
     assert f"up to {ORDERED_DEPTH} messages" in TEXT
     assert f"({BridgeSettings().max_links} unless configured)" in TEXT
+    assert f"At most {BridgeSettings().max_strangers} connections that are not admitted" in TEXT
+    assert f"({MAX_HELLO_FRAME} bytes)" in TEXT
+    assert f"failed {TRIES} times" in TEXT
+    assert f"{REFILL:g} s for each further try" in TEXT
+    assert f"at least {MIN_SECRET_BYTES} bytes" in TEXT
     assert all(f"`{codec}`" in TEXT for codec in get_args(MediaCodec))
     assert first_column(section("goodbye, both ways")) == {"type", "error", "detail"}
     assert all(f"`{name}`" in section("feedback, bridge to operator") for name in StopState.__struct_fields__)
