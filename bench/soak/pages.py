@@ -82,7 +82,7 @@ class OperatorPage(WatchedPage):
     seat_requests = 0
 
     async def act(self, statistics: dict[str, Any]) -> None:
-        if not statistics["connected"] or statistics["stopped"]:
+        if not statistics["connected"] or statistics["stop"]["stopped"]:
             await self._let_go()
         elif not (statistics["seat"] and statistics["seat"]["mine"]):
             await self._let_go()

@@ -73,18 +73,18 @@ class _Soak:
             world.calm_seconds,
         )
         self._crowd.fill()
-        background = [asyncio.get_running_loop().create_task(each.run()) for each in (operator, observer)]
-        background += [asyncio.get_running_loop().create_task(each.run()) for each in self._intruders]
-        background.append(asyncio.get_running_loop().create_task(self._sample_memory()))
         try:
-            await self._play(schedule(self._minutes, self._seed))
-            self._say("the plan is played; waiting for everybody to be back")
-            await self._until_live(operator, observer)
-            refused = await self._refusals()
+            async with asyncio.TaskGroup() as tasks:  # somebody's failure ends the soak
+                background = [tasks.create_task(each.run()) for each in (operator, observer)]
+                background += [tasks.create_task(each.run()) for each in self._intruders]
+                background.append(tasks.create_task(self._sample_memory()))
+                await self._play(schedule(self._minutes, self._seed))
+                self._say("the plan is played; waiting for everybody to be back")
+                await self._until_live(operator, observer)
+                refused = await self._refusals()
+                for task in background:
+                    task.cancel()
         finally:
-            for task in background:
-                task.cancel()
-            await asyncio.gather(*background, return_exceptions=True)
             await self._crowd.close()
         return self._verdict(operator, observer, refused)
 
