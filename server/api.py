@@ -128,6 +128,7 @@ async def healthz(request: Request) -> Response:
 async def metrics(request: Request) -> Response:
     here = services(request)
     here.metrics.collect(here.console.robot.bad_input(), here.console.robot.drops())
+    here.metrics.collect_audit(here.audit.lost, here.audit.failures)
     text = here.metrics.text()
     return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})
 

@@ -13,13 +13,13 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import HTTPConnection
 from starlette.types import Scope
 
-from server import api, api_ice, scene_proxy, whep
-from server.access import Access
-from server.audit_tail import AuditTail
+from server import api, api_access, api_ice, scene_proxy, whep
+from server.audit_log import AuditLog, open_audit_log
 from server.console import Console
 from server.errors import AccessError, ConsoleError, TooManyRequests, http_error
 from server.front_door import FrontDoor, HostNames
 from server.guard import Guard
+from server.link_warden import LinkWarden
 from server.media.aiortc_private import own_addresses, restrict_ice_hosts
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
@@ -29,30 +29,43 @@ from server.scene import SceneView
 from server.security import SAFE_METHODS, SecurityHeaders, check_origin
 from server.services import Services, services
 from server.settings import Settings
+from server.state import ConsoleState, open_state
 
-__all__ = ["create_app", "make_access"]
+__all__ = ["create_app"]
 
 log = structlog.get_logger(__name__)
 
 LOOPBACK = "127.0.0.1"
 
 
-def create_app(settings: Settings, access: Access | None = None) -> FastAPI:
-    """The app. It connects to the robot while its lifespan runs; `access` stands in for one made from the settings."""
+def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI:
+    """The app. It connects to the robot while its lifespan runs; `state` stands in for what the settings name."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        opened = state or open_state(settings)
+        with open_audit_log(opened.directory, settings) as audit:
+            async with _console(app, opened, audit):
+                yield
+
+    @asynccontextmanager
+    async def _console(app: FastAPI, opened: ConsoleState, audit: AuditLog) -> AsyncIterator[None]:
         _restrict_ice(settings)
         metrics = Metrics()
         media = MediaPlane(settings.media, metrics.registry)
         scene = await _start_scene(settings, metrics)
-        console = Console(settings, metrics, media, scene, AuditTail())
+        console = Console(settings, metrics, media, scene, audit)
+        audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
+        warden = LinkWarden(opened.invitations, console.peers, metrics)
         app.state.services = Services(
-            settings, access or make_access(settings), metrics, console, media, Guard(settings), scene
+            settings, metrics, console, media, opened, audit, warden, Guard(settings), scene
         )
         try:
             async with asyncio.TaskGroup() as tasks:
-                running = [tasks.create_task(console.run(), name="console")]
+                running = [
+                    tasks.create_task(console.run(), name="console"),
+                    tasks.create_task(warden.run(), name="links"),
+                ]
                 if scene is not None:
                     running.append(tasks.create_task(scene.run(), name="scene"))
                 yield
@@ -73,6 +86,7 @@ def create_app(settings: Settings, access: Access | None = None) -> FastAPI:
     )
     app.include_router(whep.router)
     app.include_router(api.router)
+    app.include_router(api_access.router)
     app.include_router(api_ice.router)
     app.include_router(scene_proxy.router)
     app.include_router(page_router())
@@ -95,10 +109,6 @@ def create_app(settings: Settings, access: Access | None = None) -> FastAPI:
     )
     app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None)
     return app
-
-
-def make_access(settings: Settings) -> Access:
-    return Access(settings.secret.get_secret_value(), settings.token_seconds, settings.scene_ticket_seconds)
 
 
 def _restrict_ice(settings: Settings) -> None:

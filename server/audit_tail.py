@@ -17,6 +17,10 @@ class AuditTail:
     def __iter__(self) -> Iterator[AuditRecord]:
         return iter(list(self._records))
 
+    @property
+    def next_number(self) -> int:
+        return self._records[-1].n + 1 if self._records else 1
+
     def append(self, record: AuditRecord) -> None:
         self._records.append(record)
 

@@ -2,31 +2,36 @@
 
 import asyncio
 import time
+from collections.abc import Iterator
 from typing import Protocol
 
 from robot_bridge.protocol.console import Seat
 from server.audit import Actor, AuditKind, AuditRecord, RefusalMerger
 from server.event_clock import EventClock
 
-__all__ = ["AuditLog", "AuditTrail"]
+__all__ = ["AuditTrail", "RecordKeeper"]
 
 NOBODY = Actor()
 MERGE_SECONDS = 1.0  # refusals of one kind become one record
 
 
-class AuditLog(Protocol):
-    """Keeps records; returns at once."""
+class RecordKeeper(Protocol):
+    """The log. Returns at once; iterating gives the last records, oldest first."""
 
+    @property
+    def next_number(self) -> int: ...
+
+    def __iter__(self) -> Iterator[AuditRecord]: ...
     def append(self, record: AuditRecord) -> None: ...
 
 
 class AuditTrail:
     """Run `run` as a task. All else is called on the loop and returns at once."""
 
-    def __init__(self, clock: EventClock, log: AuditLog, first: int = 1) -> None:
+    def __init__(self, clock: EventClock, log: RecordKeeper) -> None:
         self._clock = clock
         self._log = log
-        self._next = first
+        self._next = log.next_number
         self._refusals = RefusalMerger()
         self._holder = Actor()
         self._claims: list[str] = []

@@ -1,4 +1,4 @@
-"""The command `lockstep`: `up` runs a robot and a console, `serve` only the console, `robot` only the robot."""
+"""The command `lockstep`: `up` runs a robot and a console, `serve` only the console, `robot` only the robot …"""
 
 import asyncio
 import datetime
@@ -9,27 +9,33 @@ import socket
 import sys
 from collections.abc import Coroutine
 from contextlib import suppress
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 import uvloop
-from pydantic import ValidationError
+from pydantic import SecretStr, ValidationError
 
 from robot_bridge.cli import robot_app
+from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.robots.registry import robot_names
-from server.app import create_app, make_access
+from server.app import create_app
 from server.bench_commands import add_bench_commands
 from server.bridge_process import BridgeFailed, BridgeProcess
+from server.cli_access import add_access_commands
 from server.cli_options import AllowedHosts, PublicUrl, Stun, Tls, TlsCert, TlsKey, Turn, TurnSecret
+from server.console_address import write_address
 from server.guarded_http import guarded_by
-from server.links import ConsoleLinks, console_links
+from server.link_access import link_access
+from server.links import ConsoleLinks, console_links, listening_url
 from server.logs import configure_logs
 from server.media.aiortc_private import own_addresses
 from server.serve import PortTaken, bind, running, wait_for_signal
 from server.services import Services
 from server.settings import Settings
-from server.state_dir import default_state_dir
+from server.state import ConsoleState, open_state
+from server.state_dir import StateDirUnusable, default_state_dir
 from server.tls import Certificate, fingerprint, own_names, self_signed
 
 __all__ = ["app", "main"]
@@ -42,6 +48,12 @@ PATIENCE = 2.0  # s until somebody who waits for a robot is told so
 SWITCH_INTERVAL = 0.0005  # s; Python's own is ten times that
 GC_THRESHOLDS = (5_000, 20, 50)  # allocations, young collections, middle collections
 
+
+class Switch(StrEnum):
+    ON = "on"
+    OFF = "off"
+
+
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
 app.add_typer(robot_app, name="robot")
 add_bench_commands(app)
@@ -51,6 +63,9 @@ Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the co
 Json = Annotated[bool, typer.Option("--json", help="Print the links as one JSON line, once ready.")]
 IceHosts = Annotated[
     list[str] | None, typer.Option("--ice-host", help="Address offered to browsers for media; may be given again.")
+]
+Quality = Annotated[
+    Switch | None, typer.Option(help="Whether bitrate, rate and size of pictures follow the network; on unless set.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings.")]
 
@@ -63,6 +78,7 @@ def up(
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
+    quality: Quality = None,
     public_url: PublicUrl = None,
     allowed_host: AllowedHosts = None,
     tls: Tls = None,
@@ -76,18 +92,29 @@ def up(
 ) -> None:
     """Run a simulated robot and the console, and print the links that open it."""
     network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
-    settings = _settings(host=host, port=port, ice_hosts=ice_host, **network)
+    settings = _settings(host=host, port=port, ice_hosts=ice_host, media=_media(quality), **network)
     options = [] if event_log is None else ["--event-log", str(event_log)]
-    bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, _say)
+    secret = link_access(settings).secret or LinkSecret.draw()
+    settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
+    bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, secret.reveal(), _say)
     _run(settings, bridge, as_json, quiet)
 
 
 @app.command()
 def serve(
-    robot: Annotated[str | None, typer.Option(help="Where the robot bridge is, tcp://host:port.")] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="Where the robot bridge is, tcp://host:port or tls://host:port.")
+    ] = None,
+    link_secret_file: Annotated[
+        Path | None, typer.Option(help="File with the secret that the bridge asks for; or LOCKSTEP_LINK_SECRET.")
+    ] = None,
+    link_tls_ca: Annotated[Path | None, typer.Option(help="What signed the bridge's certificate.")] = None,
+    link_tls_cert: Annotated[Path | None, typer.Option(help="Certificate to show to a bridge that asks.")] = None,
+    link_tls_key: Annotated[Path | None, typer.Option(help="Its key, if it stands in another file.")] = None,
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
+    quality: Quality = None,
     public_url: PublicUrl = None,
     allowed_host: AllowedHosts = None,
     tls: Tls = None,
@@ -101,7 +128,23 @@ def serve(
 ) -> None:
     """Run the console for a robot bridge that runs elsewhere."""
     network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
-    _run(_settings(robot=robot, host=host, port=port, ice_hosts=ice_host, **network), None, as_json, quiet)
+    settings = _settings(
+        robot=robot,
+        link_secret_file=link_secret_file,
+        link_tls_ca=link_tls_ca,
+        link_tls_cert=link_tls_cert,
+        link_tls_key=link_tls_key,
+        host=host,
+        port=port,
+        ice_hosts=ice_host,
+        media=_media(quality),
+        **network,
+    )
+    _run(settings, None, as_json, quiet)
+
+
+def _media(quality: Switch | None) -> dict[str, bool] | None:
+    return None if quality is None else {"quality": quality is Switch.ON}
 
 
 def _network(
@@ -136,10 +179,14 @@ def _run(settings: Settings, bridge: BridgeProcess | None, as_json: bool, quiet:
     try:
         _check_files(settings)
         listener = bind(settings.host, settings.port)
-        uvloop.run(_serve(settings, listener, bridge, as_json))
+        state = open_state(settings, fall_back=True)
+        uvloop.run(_serve(settings, state, listener, bridge, as_json))
     except PortTaken as error:
         _say(f"{error}; choose another with --port")
         raise typer.Exit(EXIT_PORT_TAKEN) from error
+    except StateDirUnusable as error:
+        _say(str(error))
+        raise typer.Exit(EXIT_USAGE) from error
     except BridgeFailed as error:
         _say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error
@@ -166,7 +213,9 @@ def _calm_garbage_collection() -> None:
     gc.set_threshold(*GC_THRESHOLDS)
 
 
-async def _serve(settings: Settings, listener: socket.socket, bridge: BridgeProcess | None, as_json: bool) -> None:
+async def _serve(
+    settings: Settings, state: ConsoleState, listener: socket.socket, bridge: BridgeProcess | None, as_json: bool
+) -> None:
     """Until a signal: the bridge first, then the console; the console ends first."""
     certificate = _certificate(settings)
     stopping = asyncio.get_running_loop().create_task(wait_for_signal())
@@ -176,13 +225,14 @@ async def _serve(settings: Settings, listener: socket.socket, bridge: BridgeProc
             if address is None:
                 return
             settings = settings.model_copy(update={"robot": address})
-        access = make_access(settings)
-        application = create_app(settings, access)
+        application = create_app(settings, state)
         http = guarded_by(settings, application)
         async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
             _calm_garbage_collection()
             watching = None if bridge is None else tasks.create_task(bridge.watch())
-            links = console_links(settings, listener, access)
+            url = listening_url(settings, listener)
+            links = console_links(settings, url, state)
+            write_address(state.directory, url)
             announcing = tasks.create_task(_announce(application.state.services, links, as_json))
             await stopping
             for task in (watching, announcing):
@@ -235,6 +285,9 @@ async def _announce(here: Services, links: ConsoleLinks, as_json: bool) -> None:
     await robot.reached.wait()
     sys.stdout.write(json.dumps(links._asdict()) + "\n" if as_json else links.for_people())
     sys.stdout.flush()
+
+
+add_access_commands(app, _settings)
 
 
 def _say(text: str) -> None:

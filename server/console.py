@@ -27,7 +27,7 @@ from robot_bridge.protocol.console import (
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback, Media, Ping, Pong, Refusal, Reset, Rest, Stop, StopState
 from server.audit import Actor
-from server.audit_trail import AuditLog, AuditTrail
+from server.audit_trail import AuditTrail, RecordKeeper
 from server.channels import ChannelName
 from server.command_desk import Absorbed, Answer, CommandDesk, Forward, Outcome, Refuse
 from server.errors import ChannelError, Flood, LinkDown
@@ -48,6 +48,7 @@ log = structlog.get_logger(__name__)
 
 CROWD = 10  # peers; the list of participants goes out at most once a second, ten times more rarely to 100
 UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
+UNWRITTEN = "The audit log cannot be written ({}). The console goes on; what happens now may be missing from the log."
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
 
@@ -74,7 +75,7 @@ class Console:
         metrics: Metrics,
         media: MediaFeed,
         viewer: FeedbackViewer | None,
-        audit_log: AuditLog,
+        audit_log: RecordKeeper,
     ) -> None:
         self.clock = EventClock()
         self.audit = AuditTrail(self.clock, audit_log)
@@ -83,6 +84,8 @@ class Console:
         times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
         self.notes = NoteBoard(time.monotonic())
+        for record in audit_log:
+            self.notes.remember(record)
         self._metrics = metrics
         self._media = media
         self._viewer = viewer
@@ -91,6 +94,7 @@ class Console:
         self._forwarded_at = 0.0  # when the command in flight left
         self._shown_stop = StopState()  # what everyone was told last
         self._link_was_up = False
+        self._audit_trouble = ""
 
     async def run(self) -> None:
         """Until cancelled. The peers end before the links: the last thing that leaves is the rest."""
@@ -144,6 +148,16 @@ class Console:
         self.audit.record("reset", by, where)
         log.warning("reset", by=by.name, where=where)
 
+    def audit_trouble(self, trouble: str, lost: int) -> None:
+        """The audit log cannot be written, for a reason, or can again: "". `lost`: records that never will be."""
+        self._audit_trouble = trouble
+        self._metrics.audit_failing.set(bool(trouble))
+        if trouble:
+            self.peers.tell("session", Notice(level="warning", text=UNWRITTEN.format(trouble)))
+            return
+        self.audit.record("audit", what="written again", detail=f"{lost} records lost since the start")
+        self.peers.tell("session", Notice(level="info", text="The audit log is written again."))
+
     # PeerHost
 
     def channel_opened(self, peer: Peer, channel: ChannelName) -> None:
@@ -160,6 +174,8 @@ class Console:
             peer.send("session", self.peers.participants())
             for note in self.notes:
                 peer.send("session", note)
+            if self._audit_trouble:
+                peer.send("session", Notice(level="warning", text=UNWRITTEN.format(self._audit_trouble)))
 
     def message_received(self, peer: Peer, channel: ChannelName, message: ClientMessage) -> None:
         self.seat.heard(peer)

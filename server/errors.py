@@ -10,6 +10,7 @@ ConsoleError
 │   └── OriginRefused       a page of another site
 ├── RequestError            the request is not understood
 │   ├── BadJson
+│   ├── BadParameter
 │   ├── BadSdp
 │   ├── BadSdpFragment
 │   ├── BodyTooLarge
@@ -18,6 +19,7 @@ ConsoleError
 │   ├── NotConnected
 │   ├── NotFound
 │   ├── PreconditionFailed
+│   ├── TooManyInvitations
 │   ├── PreconditionRequired
 │   ├── TooManyRequests
 │   └── WrongMediaType
@@ -44,6 +46,7 @@ __all__ = [
     "HTTP_ERRORS",
     "AccessError",
     "BadJson",
+    "BadParameter",
     "BadSdp",
     "BadSdpFragment",
     "BinaryMessage",
@@ -72,6 +75,7 @@ __all__ = [
     "ShuttingDown",
     "TokenInvalid",
     "TokenMissing",
+    "TooManyInvitations",
     "TooManyPeers",
     "TooManyRequests",
     "TransportRefused",
@@ -131,6 +135,10 @@ class BadJson(RequestError):
     pass
 
 
+class BadParameter(RequestError):
+    pass
+
+
 class BadSdp(RequestError):
     pass
 
@@ -168,6 +176,10 @@ class TooManyRequests(RequestError):
 
 
 class NotFound(RequestError):
+    pass
+
+
+class TooManyInvitations(RequestError):
     pass
 
 
@@ -257,6 +269,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     NotAllowed: HttpError(403, "not_allowed"),
     OriginRefused: HttpError(403, "origin_refused"),
     BadJson: HttpError(400, "bad_json"),
+    BadParameter: HttpError(422, "bad_parameter"),
     BadSdp: HttpError(400, "bad_sdp"),
     BadSdpFragment: HttpError(400, "bad_sdp_fragment"),
     NotFound: HttpError(404, "not_found"),
@@ -264,6 +277,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     WrongMediaType: HttpError(415, "wrong_media_type"),
     BodyTooSlow: HttpError(408, "too_slow", {"Connection": "close"}),
     NotConnected: HttpError(409, "not_connected"),
+    TooManyInvitations: HttpError(409, "too_many_invitations"),
     PreconditionFailed: HttpError(412, "precondition_failed"),
     HostRefused: HttpError(421, "host_refused"),
     PreconditionRequired: HttpError(428, "precondition_required"),

@@ -1,12 +1,14 @@
-"""The links that open the console, as they are printed."""
+"""The links that open the console."""
 
 import socket
-from typing import NamedTuple
+import time
+from typing import NamedTuple, get_args
 
-from server.access import Access
+from robot_bridge.protocol.console import Role
 from server.settings import Settings
+from server.state import ConsoleState
 
-__all__ = ["ConsoleLinks", "console_links"]
+__all__ = ["ConsoleLinks", "console_link", "console_links", "listening_url"]
 
 ANY = ("0.0.0.0", "::")
 
@@ -26,24 +28,31 @@ class ConsoleLinks(NamedTuple):
             f"\n  To drive, open:   {self.operator}\n"
             f"\n  To watch, open:   {self.observer}\n"
             f"\n  To supervise:     {self.supervisor}\n"
-            "\n  Whoever has the first link can drive the robot; share the second. The third may take control from anybody."
+            "\n  Whoever has the first link can drive the robot; share the second. The third takes control from anyone."
             "\n  `lockstep invite` makes links that end when you say. Ctrl-C ends everything.\n\n"
         )
 
 
-def console_links(settings: Settings, listener: socket.socket, access: Access) -> ConsoleLinks:
-    """The links for what `listener` really listens on."""
+def console_link(console: str, token: str) -> str:
+    return f"{console}/#token={token}"
+
+
+def listening_url(settings: Settings, listener: socket.socket) -> str:
+    """How others reach what `listener` really listens on, unless the settings say better."""
     host, port = listener.getsockname()[:2]
     shown = _own_address() if host in ANY else host
     scheme = "https" if settings.encrypted else "http"
-    console = settings.public_url or f"{scheme}://{f'[{shown}]' if ':' in shown else shown}:{port}"
-    return ConsoleLinks(
-        console=console,
-        operator=f"{console}/#token={access.issue('operator', 'operator')}",
-        observer=f"{console}/#token={access.issue('observer', 'observer')}",
-        supervisor=f"{console}/#token={access.issue('supervisor', 'supervisor')}",
-        robot=settings.robot,
+    return settings.public_url or f"{scheme}://{f'[{shown}]' if ':' in shown else shown}:{port}"
+
+
+def console_links(settings: Settings, console: str, state: ConsoleState) -> ConsoleLinks:
+    """One link for each role: the same as at the last start, while they are good for long enough."""
+    now = time.time()
+    made = state.invitations.update(
+        lambda known: {role: known.for_start(role, settings.token_seconds, now) for role in get_args(Role)}
     )
+    links = {role: console_link(console, state.access.sign(each.identity, each.created)) for role, each in made.items()}
+    return ConsoleLinks(console=console, robot=settings.robot, **links)
 
 
 def _own_address() -> str:

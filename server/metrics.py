@@ -14,6 +14,7 @@ class Metrics:
         self.registry = CollectorRegistry()
         self._robot_bad_input: Totals[str] = Totals()
         self._robot_drops: Totals[str] = Totals()
+        self._audit = (0, 0)
         registry = self.registry
         ProcessCollector(registry=registry)
         self.bad_input = Counter(
@@ -33,6 +34,9 @@ class Metrics:
         self.link_losses = Counter("lockstep_robot_link_losses", "Times the robot link went down", registry=registry)
         self.event = Gauge("lockstep_event", "Event reference", registry=registry)
         self.stopped = Gauge("lockstep_stopped", "1 while the robot is stopped", registry=registry)
+        self.audit_failing = Gauge("lockstep_audit_failing", "1 while the log cannot be written", registry=registry)
+        self.audit_lost = Counter("lockstep_audit_lost", "Audit records that were never written", registry=registry)
+        self.audit_failures = Counter("lockstep_audit_failures", "Failed writes of the audit log", registry=registry)
         self.internal_errors = Counter("lockstep_internal_errors", "Our own faults", ["where"], registry=registry)
         self.robot_turnaround = Histogram(
             "lockstep_robot_turnaround_seconds",
@@ -48,6 +52,12 @@ class Metrics:
         for name, total in drops.items():
             self.dropped.labels(f"robot {name}").inc(total - self._robot_drops[name])
         self._robot_bad_input, self._robot_drops = bad_input.copy(), drops.copy()
+
+    def collect_audit(self, lost: int, failures: int) -> None:
+        """The same for the audit log's writer."""
+        self.audit_lost.inc(lost - self._audit[0])
+        self.audit_failures.inc(failures - self._audit[1])
+        self._audit = (lost, failures)
 
     def text(self) -> bytes:
         """The exposition format, version 0.0.4."""

@@ -5,10 +5,13 @@ from collections.abc import Iterator
 
 from robot_bridge.protocol.console import Role, SharedNote
 from robot_bridge.protocol.messages import RefusalReason
+from robot_bridge.protocol.serial import FIRST_EVENT
+from server.audit import AuditRecord
 from server.names import printable
 
 __all__ = ["NoteBoard"]
 
+ROLES: dict[str, Role] = {"observer": "observer", "operator": "operator", "supervisor": "supervisor"}
 KEPT = 100
 BURST = 5.0  # notes of one peer at once
 PEER_RATE = 0.5  # notes a second of one peer
@@ -41,6 +44,19 @@ class NoteBoard:
         self._all = _Bucket(BOARD_RATE, BOARD_BURST, now)
         self._peers: dict[str, _Bucket] = {}
 
+    def remember(self, record: AuditRecord) -> None:
+        """A note of an earlier run, from the audit log."""
+        if record.kind == "note" and record.role in ROLES:
+            self._keep(
+                record.peer,
+                record.who,
+                ROLES[record.role],
+                record.detail,
+                record.epoch,
+                max(record.event, FIRST_EVENT),
+                record.time,
+            )
+
     def __iter__(self) -> Iterator[SharedNote]:
         """The last ones, oldest first."""
         return iter(list(self._kept))
@@ -57,15 +73,11 @@ class NoteBoard:
             return "too_often"
         mine.spend()
         self._all.spend()
+        return self._keep(peer, name, role, text, epoch, event, round(clock, 3))
+
+    def _keep(self, peer: str, name: str, role: Role, text: str, epoch: str, event: int, clock: float) -> SharedNote:
         note = SharedNote(
-            id=self._next_id,
-            peer=peer,
-            name=name,
-            role=role,
-            text=text,
-            epoch=epoch,
-            event=event,
-            time=round(clock, 3),
+            id=self._next_id, peer=peer, name=name, role=role, text=text, epoch=epoch, event=event, time=clock
         )
         self._next_id += 1
         self._kept.append(note)

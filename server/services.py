@@ -6,13 +6,16 @@ from fastapi import Request
 from starlette.requests import HTTPConnection
 
 from server.access import Access, Identity
+from server.audit_log import AuditLog
 from server.console import Console
 from server.errors import SceneUnavailable
 from server.guard import Guard
+from server.link_warden import LinkWarden
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
 from server.scene import SceneView
 from server.settings import Settings
+from server.state import ConsoleState
 
 __all__ = ["Services", "authorized", "services"]
 
@@ -20,12 +23,18 @@ __all__ = ["Services", "authorized", "services"]
 @dataclass(frozen=True)
 class Services:
     settings: Settings
-    access: Access
     metrics: Metrics
     console: Console
     media: MediaPlane
+    state: ConsoleState
+    audit: AuditLog
+    warden: LinkWarden
     guard: Guard
     scene: SceneView | None  # None when it is switched off or could not start
+
+    @property
+    def access(self) -> Access:
+        return self.state.access
 
     def scene_or_error(self) -> SceneView:
         """Raises SceneUnavailable when there is no 3D scene."""

@@ -1,7 +1,6 @@
 """Settings of the console: environment variables LOCKSTEP_*, overridden by flags."""
 
 import ipaddress
-import secrets
 from pathlib import Path
 from typing import Annotated, Self
 from urllib.parse import urlsplit
@@ -9,7 +8,9 @@ from urllib.parse import urlsplit
 from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import SettingsConfigDict
 
+from robot_bridge.protocol.errors import SecretError
 from server.limit_settings import LimitSettings
+from server.link_access import link_access
 from server.media.settings import MediaSettings
 from server.network_settings import NameList, NetworkSettings
 
@@ -25,14 +26,21 @@ class Settings(NetworkSettings, LimitSettings):
 
     host: str = "127.0.0.1"  # address that HTTP listens on
     port: Annotated[int, Field(ge=0, le=65535)] = 8000  # 0: any free port
-    robot: str = "tcp://127.0.0.1:5600"  # the robot bridge
+    robot: str = "tcp://127.0.0.1:5600"  # the robot bridge; tls://host:port where it speaks TLS
+    link_secret: SecretStr | None = None  # that the bridge asks for
+    link_secret_file: Path | None = None  # the same, in a file; comes first
+    link_tls_cert: Path | None = None  # shown to a bridge that asks for a certificate
+    link_tls_key: Path | None = None
+    link_tls_ca: Path | None = None  # signed the bridge's certificate; None: one that this machine trusts
     ice_hosts: NameList = ()  # addresses offered to peers; empty: all interfaces, and loopback when bound to it
     allowed_origins: NameList = ()  # other origins whose pages may use the HTTP API, "https://example.org"
-    secret: SecretStr = Field(default_factory=lambda: SecretStr(secrets.token_urlsafe(MIN_SECRET_BYTES)))
     state_dir: Path | None = None  # signing key, invitations, audit log; None: ~/.local/state/lockstep
+    secret: SecretStr | None = None  # signs the links; None: a key in the state directory
     token_seconds: Annotated[float, Field(gt=0)] = 7 * 24 * 3600.0
 
     observer_feedback_hz: Annotated[float, Field(gt=0, le=100)] = 12.5
+    audit_bytes: Annotated[int, Field(ge=4096)] = 10_000_000  # of one file of the audit log
+    audit_files: Annotated[int, Field(ge=1, le=1000)] = 10  # then the oldest goes
     seat_timeout: Annotated[float, Field(gt=0)] = 3.0  # of silence, then the seat is free and the robot rests
     seat_idle_seconds: Annotated[float, Field(gt=0)] = 300.0  # without an intention to move, then the seat is free
     seat_claim_seconds: Annotated[float, Field(gt=0)] = 60.0  # until a claim on the seat counts as declined
@@ -63,19 +71,32 @@ class Settings(NetworkSettings, LimitSettings):
             ipaddress.ip_address(address)
         return value
 
+    @field_validator("secret", "state_dir", "link_secret", "link_secret_file", mode="before")
+    @classmethod
+    def _empty_is_unset(cls, value: object) -> object:
+        return None if value == "" else value
+
     @field_validator("secret")
     @classmethod
-    def _check_secret(cls, value: SecretStr) -> SecretStr:
-        if len(value.get_secret_value().encode()) < MIN_SECRET_BYTES:
+    def _check_secret(cls, value: SecretStr | None) -> SecretStr | None:
+        if value is not None and len(value.get_secret_value().encode()) < MIN_SECRET_BYTES:
             raise ValueError(f"at least {MIN_SECRET_BYTES} bytes are needed")
         return value
 
     @model_validator(mode="after")
     def _check_robot(self) -> Self:
         parts = urlsplit(self.robot)
-        if parts.scheme != "tcp" or not parts.hostname or not parts.port:
-            raise ValueError(f"{self.robot!r} is not tcp://host:port")
+        if parts.scheme not in ("tcp", "tls") or not parts.hostname or not parts.port:
+            raise ValueError(f"{self.robot!r} is not tcp://host:port or tls://host:port")
+        try:
+            link_access(self)
+        except SecretError as error:
+            raise ValueError(error.detail) from error
         return self
+
+    @property
+    def robot_uses_tls(self) -> bool:
+        return urlsplit(self.robot).scheme == "tls"
 
     @property
     def robot_host(self) -> str:

@@ -1,13 +1,152 @@
-"""Where the console keeps what has to outlive it: keys, its certificate, revocations, the audit."""
+"""The directory that outlives the console: signing key, invitations, audit log. Only its owner can read it."""
 
+import fcntl
 import os
-from collections.abc import Mapping
+import secrets
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["default_state_dir"]
+__all__ = ["StateDamaged", "StateDir", "StateDirUnusable", "default_state_dir"]
+
+KEY_FILE = "signing.key"
+KEY_BYTES = 32  # RFC 7518 3.2: an HS256 key is at least as long as the hash
+MAX_LOGS = 64  # consoles that share one directory
 
 
-def default_state_dir(environment: Mapping[str, str] = os.environ) -> Path:
-    """$XDG_STATE_HOME/lockstep (XDG Base Directory 0.8), which is ~/.local/state/lockstep unless that is set."""
-    base = environment.get("XDG_STATE_HOME", "")
-    return (Path(base) if Path(base).is_absolute() else Path.home() / ".local" / "state") / "lockstep"
+class StateDirUnusable(Exception):
+    """It cannot be made, read or written.
+
+    Attributes:
+        path: the file or directory
+        reason: for a person
+    """
+
+    def __init__(self, path: Path, reason: str) -> None:
+        super().__init__(path, reason)
+        self.path = path
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"the state directory cannot be used ({self.path}: {self.reason}); set another with LOCKSTEP_STATE_DIR"
+
+
+class StateDamaged(StateDirUnusable):
+    """A file in it is not what it should be; nobody knows which links are good."""
+
+
+def default_state_dir() -> Path:
+    """By the XDG base directory specification."""
+    base = os.environ.get("XDG_STATE_HOME", "")
+    return (Path(base) if os.path.isabs(base) else Path("~/.local/state").expanduser()) / "lockstep"
+
+
+class StateDir:
+    """Made when it is not there. Files are replaced in one step, so a reader never sees half of one.
+
+    Raises:
+        StateDirUnusable: from every method.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with _named(path):
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            path.chmod(0o700)
+
+    def signing_key(self) -> str:
+        """Made at the first call; two consoles that start at once agree on one."""
+        path = self.path / KEY_FILE
+        with _named(path):
+            if not path.exists():
+                fresh = self._temporary(secrets.token_urlsafe(KEY_BYTES).encode())
+                try:
+                    with suppress(FileExistsError):
+                        os.link(fresh, path)
+                finally:
+                    os.unlink(fresh)
+            path.chmod(0o600)
+            key = path.read_text(errors="replace").strip()
+        if len(key.encode()) < KEY_BYTES:
+            raise StateDamaged(path, f"not a key of {KEY_BYTES} bytes or more")
+        return key
+
+    def read(self, name: str) -> bytes | None:
+        """None when there is no such file."""
+        path = self.path / name
+        with _named(path):
+            try:
+                return path.read_bytes()
+            except FileNotFoundError:
+                return None
+
+    def write(self, name: str, data: bytes) -> None:
+        path = self.path / name
+        with _named(path):
+            os.replace(self._temporary(data), path)
+
+    def version(self, name: str) -> tuple[int, int] | None:
+        """Another one whenever the file was replaced; None when there is no such file."""
+        path = self.path / name
+        with _named(path):
+            try:
+                status = path.stat()
+            except FileNotFoundError:
+                return None
+        return status.st_ino, status.st_mtime_ns
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Only one process at a time is inside, for what reads, changes and writes."""
+        with _named(self.path / "lock"):
+            handle = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX)
+            except OSError:
+                os.close(handle)
+                raise
+        try:
+            yield
+        finally:
+            os.close(handle)
+
+    @contextmanager
+    def own_log(self, name: str) -> Iterator[Path]:
+        """A log that no other process writes: NAME.jsonl, or NAME-2.jsonl, … while another console has that."""
+        for number in range(1, MAX_LOGS + 1):
+            stem = name if number == 1 else f"{name}-{number}"
+            with _named(self.path / f"{stem}.lock"):
+                handle = os.open(self.path / f"{stem}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+                try:
+                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    os.close(handle)
+                    continue
+            try:
+                yield self.path / f"{stem}.jsonl"
+            finally:
+                os.close(handle)
+            return
+        raise StateDirUnusable(self.path, f"{MAX_LOGS} consoles write logs here already")
+
+    def _temporary(self, data: bytes) -> str:
+        """A file of this directory with `data`, safely on disk."""
+        handle, name = tempfile.mkstemp(dir=self.path, prefix=".new-")  # mode 0600
+        try:
+            with open(handle, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError:
+            os.unlink(name)
+            raise
+        return name
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise StateDirUnusable(path, error.strerror or str(error)) from error

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import httpx
@@ -17,10 +18,11 @@ from robot_bridge.protocol.messages import Feedback
 from robot_bridge.robots.registry import create_robot
 from robot_bridge.settings import BridgeSettings
 from server.access import Access
-from server.app import create_app, make_access
+from server.app import create_app
 from server.serve import bind, running
 from server.services import Services
 from server.settings import Settings
+from server.state import open_state
 
 __all__ = ["PATIENCE", "Rig", "TestPeer", "eventually", "running_bridge", "running_console", "running_rig"]
 
@@ -159,14 +161,26 @@ async def running_bridge(port: int = 0) -> AsyncIterator[Bridge]:
 @asynccontextmanager
 async def running_console(robot_port: int, **settings: Any) -> AsyncIterator[Rig]:
     """A console on a free port; the scene only when asked for."""
-    wanted = Settings(**{"robot": f"tcp://127.0.0.1:{robot_port}", "port": 0, "scene": False, **settings})
-    access = make_access(wanted)
-    app = create_app(wanted, access)
+    with TemporaryDirectory() as directory:
+        given: dict[str, Any] = {
+            "robot": f"tcp://127.0.0.1:{robot_port}",
+            "port": 0,
+            "scene": False,
+            "state_dir": directory,
+        }
+        async with _console(Settings(**(given | settings))) as rig:
+            yield rig
+
+
+@asynccontextmanager
+async def _console(wanted: Settings) -> AsyncIterator[Rig]:
+    state = open_state(wanted)
+    app = create_app(wanted, state)
     listener = bind(wanted.host, wanted.port)
     try:
         url = f"http://127.0.0.1:{listener.getsockname()[1]}"
         async with running(app, listener), httpx.AsyncClient(base_url=url, trust_env=False) as http:
-            yield Rig(url, app, access, http)
+            yield Rig(url, app, state.access, http)
     finally:
         listener.close()
 

@@ -23,10 +23,12 @@ async def test_a_console_that_ends_with_peers_connected_ends_them_and_rests_the_
                 driver = peers[0]
                 driver.send("session", SeatRequest())
                 now = await driver.feedback()
-                values = [0.2] + [0.0] * (len(now.axes) - 1)
                 await driver.until(lambda each: isinstance(each, Seat) and each.holder != "")  # the seat
-                driver.send("control", Command(event=event_after(now.event), issue=now.issue, values=values))
-                await driver.feedback(lambda each: each.event == event_after(now.event))
+                for speed in (0.0, 0.2):
+                    now, values = driver.newest_feedback(), [speed] + [0.0] * (len(now.axes) - 1)
+                    following = event_after(now.event)
+                    driver.send("control", Command(event=following, issue=now.issue, values=values))
+                    await driver.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
             async with asyncio.timeout(PATIENCE):
                 for peer in peers:
                     await peer.closed.wait()

@@ -1,37 +1,61 @@
 import socket
+import time
+from pathlib import Path
 
 import pytest
 
-from server.access import Access
-from server.links import console_links
+from server.links import console_links, listening_url
 from server.serve import PortTaken, bind
 from server.settings import Settings
+from server.state import ConsoleState, open_state
 
-ACCESS = Access("a secret of at least thirty-two bytes", 60, 60)
+
+@pytest.fixture
+def state(tmp_path: Path) -> ConsoleState:
+    return open_state(Settings(state_dir=tmp_path))
 
 
 @pytest.mark.parametrize(("host", "shown"), [("127.0.0.1", "http://127.0.0.1:"), ("::1", "http://[::1]:")])
 def test_links_name_the_address_that_is_really_listened_on(host: str, shown: str) -> None:
     with bind(host, 0) as listener:
-        links = console_links(Settings(host=host), listener, ACCESS)
-        assert links.console == f"{shown}{listener.getsockname()[1]}"
-        assert links.operator.startswith(f"{links.console}/#token=")
-        assert ACCESS.verify(links.operator.partition("=")[2]).role == "operator"
-        assert ACCESS.verify(links.observer.partition("=")[2]).role == "observer"
-        assert links.robot == "tcp://127.0.0.1:5600"
+        assert listening_url(Settings(host=host), listener) == f"{shown}{listener.getsockname()[1]}"
 
 
 def test_a_console_on_all_interfaces_names_one_that_others_can_reach() -> None:
     with bind("0.0.0.0", 0) as listener:
-        assert "0.0.0.0" not in console_links(Settings(host="0.0.0.0"), listener, ACCESS).console
+        assert "0.0.0.0" not in listening_url(Settings(host="0.0.0.0"), listener)
 
 
-def test_people_get_both_links_and_are_told_what_they_are_for() -> None:
+def test_a_public_address_is_shown_instead() -> None:
     with bind("127.0.0.1", 0) as listener:
-        links = console_links(Settings(), listener, ACCESS)
+        assert listening_url(Settings(public_url="https://robot.example/"), listener) == "https://robot.example"
+
+
+def test_there_is_one_link_for_each_role(state: ConsoleState) -> None:
+    links = console_links(Settings(), "http://here", state)
+    assert (links.console, links.robot) == ("http://here", "tcp://127.0.0.1:5600")
+    for role in ("operator", "observer", "supervisor"):
+        link = getattr(links, role)
+        assert link.startswith("http://here/#token=")
+        assert state.access.verify(link.partition("=")[2]).role == role
+
+
+def test_the_next_start_prints_the_same_links_until_one_is_revoked(state: ConsoleState) -> None:
+    links = console_links(Settings(), "http://here", state)
+    assert console_links(Settings(), "http://here", state) == links
+    identity = state.access.verify(links.observer.partition("=")[2])
+    state.invitations.update(lambda known: known.revoke(None, identity.token_id, time.time()))
+    again = console_links(Settings(), "http://here", state)
+    assert again.observer != links.observer
+    assert again.operator == links.operator
+
+
+def test_people_get_the_links_and_are_told_what_they_are_for(state: ConsoleState) -> None:
+    links = console_links(Settings(), "http://here", state)
     text = links.for_people()
     assert f"To drive, open:   {links.operator}" in text
     assert f"To watch, open:   {links.observer}" in text
+    assert f"To supervise:     {links.supervisor}" in text
 
 
 def test_a_port_or_address_that_cannot_be_had_is_named() -> None:

@@ -12,8 +12,11 @@ def test_the_environment_sets_and_flags_override(monkeypatch: pytest.MonkeyPatch
     assert Settings(port=0).port == 0
 
 
-def test_two_consoles_do_not_share_a_secret() -> None:
-    assert Settings().secret.get_secret_value() != Settings().secret.get_secret_value()
+def test_an_empty_variable_is_an_unset_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("SECRET", "STATE_DIR", "PUBLIC_URL"):
+        monkeypatch.setenv(f"LOCKSTEP_{name}", "")
+    settings = Settings()
+    assert (settings.secret, settings.state_dir, settings.public_url) == (None, None, "")
 
 
 @pytest.mark.parametrize(
@@ -23,6 +26,7 @@ def test_two_consoles_do_not_share_a_secret() -> None:
         {"robot": "tcp://127.0.0.1"},
         {"robot": "tcp://127.0.0.1:99999"},
         {"secret": "short"},
+        {"public_url": "robot.example.org"},
         {"ice_hosts": ("example.org",)},
         {"port": 65536},
         {"observer_feedback_hz": 0},

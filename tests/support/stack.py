@@ -26,6 +26,7 @@ class Stack:
         console: "http://127.0.0.1:PORT"
         operator: the operator's link, token in the fragment
         observer: the observers' link
+        supervisor: the supervisors' link
         robot: "tcp://127.0.0.1:PORT"
         event_log: the bridge's own record, JSON lines
     """
@@ -34,6 +35,7 @@ class Stack:
     console: str
     operator: str
     observer: str
+    supervisor: str
     robot: str
     event_log: Path
     output: list[str] = field(default_factory=list)  # its last lines on standard error
@@ -86,7 +88,7 @@ async def running_stack(
     reader = asyncio.create_task(_keep_last_lines(process, output))
     try:
         links = await _ready_line(process, output)
-        yield Stack(process, links["console"], links["operator"], links["observer"], links["robot"], event_log, output)
+        yield Stack(process=process, event_log=event_log, output=output, **links)
     finally:
         await _end(process)
         await reader

@@ -1,0 +1,149 @@
+"""The HTTP API of invitations and of the audit (docs/console-api.md)."""
+
+import asyncio
+import time
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Depends, Query, Request, Response
+
+from robot_bridge.protocol.console import Role
+from server.access import Identity, require_role
+from server.audit import Actor, AuditRecord
+from server.body import read_json
+from server.errors import NotAllowed
+from server.invitations import Invitation, may_invite
+from server.links import console_link
+from server.services import Services, authorized, services
+
+__all__ = ["AuditPage", "InvitationInfo", "InvitationList", "InvitationRequest", "NewInvitation", "router"]
+
+router = APIRouter()
+Caller = Annotated[Identity, Depends(authorized)]
+
+DEFAULT_SECONDS = 8 * 3600.0
+MAX_RECORDS = 500  # of the audit in one answer
+
+
+class InvitationRequest(msgspec.Struct, frozen=True, kw_only=True):
+    """Body of POST /api/invitations."""
+
+    role: Role = "observer"
+    name: Annotated[str, msgspec.Meta(max_length=60)] = ""
+    seconds: float = DEFAULT_SECONDS
+
+
+class InvitationInfo(msgspec.Struct, frozen=True, kw_only=True):
+    id: str
+    role: Role
+    name: str
+    by: str  # who invited; "" when it was made on the command line or at start
+    created: float  # s since 1970
+    expires: float
+    revoked: bool
+    connected: int  # peers that are here with it now
+
+
+class InvitationList(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /api/invitations."""
+
+    invitations: list[InvitationInfo]
+    may_invite: list[Role]
+
+
+class NewInvitation(InvitationInfo, frozen=True, kw_only=True):
+    """Answer of POST /api/invitations: the only time that the link is told."""
+
+    link: str
+
+
+class AuditPage(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /api/audit."""
+
+    records: list[AuditRecord]
+    last: int  # number of the newest record there is; 0 for none
+    trouble: str  # why the log cannot be written at present; "" when it can
+
+
+@router.get("/api/invitations")
+async def invitations(request: Request, caller: Caller) -> Response:
+    here = services(request)
+    _require_inviter(caller)
+    found = here.state.invitations.known.visible(caller)
+    return _json(
+        InvitationList(
+            invitations=[_info(here, each) for each in found],
+            may_invite=list(may_invite(caller.role)),
+        )
+    )
+
+
+@router.post("/api/invitations")
+async def invite(request: Request, caller: Caller) -> Response:
+    here = services(request)
+    wanted = await read_json(request, InvitationRequest)
+    _require_inviter(caller)
+    now = time.time()
+    made = await asyncio.to_thread(
+        here.state.invitations.update,
+        lambda known: known.invite(caller, wanted.role, wanted.name, wanted.seconds, now),
+    )
+    here.console.audit.record("invitation", caller.actor, made.role, f"{made.name} ({made.id})")
+    base = here.settings.public_url or str(request.base_url).rstrip("/")
+    link = console_link(base, here.access.sign(made.identity, made.created))
+    return _json(NewInvitation(link=link, **msgspec.structs.asdict(_info(here, made))), 201)
+
+
+@router.delete("/api/invitations/{invitation_id}")
+async def revoke(request: Request, caller: Caller, invitation_id: str) -> Response:
+    """It, and all that was invited with it, ends at once; so do the peers that are here with them."""
+    here = services(request)
+    _require_inviter(caller)
+    now = time.time()
+    revoked = await asyncio.to_thread(
+        here.state.invitations.update, lambda known: known.revoke(caller, invitation_id, now)
+    )
+    note_revocations(here, caller.actor, revoked)
+    here.warden.enforce()
+    return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
+
+
+@router.get("/api/audit")
+async def audit(
+    request: Request,
+    caller: Caller,
+    after: int = 0,
+    limit: Annotated[int, Query(ge=1, le=MAX_RECORDS)] = 100,
+) -> Response:
+    """Records behind number `after`; the newest ones for -1."""
+    require_role(caller, "supervisor")
+    log = services(request).audit
+    return _json(AuditPage(records=log.tail.after(after, limit), last=log.next_number - 1, trouble=log.trouble))
+
+
+def note_revocations(here: Services, by: Actor, revoked: list[Invitation]) -> None:
+    for each in revoked:
+        here.console.audit.record("revocation", by, each.role, f"{each.name} ({each.id})")
+
+
+def _require_inviter(caller: Identity) -> None:
+    if not may_invite(caller.role):
+        raise NotAllowed("observers invite nobody")
+
+
+def _info(here: Services, invitation: Invitation) -> InvitationInfo:
+    return InvitationInfo(
+        id=invitation.id,
+        role=invitation.role,
+        name=invitation.name,
+        by=invitation.by,
+        created=invitation.created,
+        expires=invitation.expires,
+        revoked=invitation.revoked_at is not None,
+        connected=sum(peer.identity.token_id == invitation.id for peer in here.console.peers),
+    )
+
+
+def _json(answer: msgspec.Struct, status: int = 200) -> Response:
+    body = msgspec.json.encode(answer)
+    return Response(body, status, media_type="application/json", headers={"Cache-Control": "no-store"})

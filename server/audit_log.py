@@ -1,0 +1,89 @@
+"""The audit log of one console: its file and its thread, its last records in memory, and how it fares."""
+
+import asyncio
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import structlog
+
+from server.audit import AuditRecord
+from server.audit_file import AuditFile, last_records
+from server.audit_tail import AuditTail
+from server.audit_writer import AuditWriter
+from server.settings import Settings
+from server.state_dir import StateDir
+
+__all__ = ["AuditLog", "open_audit_log"]
+
+log = structlog.get_logger(__name__)
+
+
+class AuditLog:
+    """`append` from the loop.
+
+    Attributes:
+        tail: the last records, those of earlier runs included
+        trouble: why it cannot be written at present, "" when it can
+        on_trouble: called on the loop whenever `trouble` changes
+    """
+
+    def __init__(self, file: AuditFile, earlier: list[AuditRecord]) -> None:
+        self.tail = AuditTail(earlier)
+        self.trouble = ""
+        self.on_trouble: Callable[[str], None] = _ignore
+        self._loop = asyncio.get_running_loop()
+        self._writer = AuditWriter(file, self._changed)
+        self._writer.start()
+
+    @property
+    def lost(self) -> int:
+        return self._writer.lost
+
+    @property
+    def failures(self) -> int:
+        return self._writer.failures
+
+    @property
+    def next_number(self) -> int:
+        return self.tail.next_number
+
+    def __iter__(self) -> Iterator[AuditRecord]:
+        return iter(self.tail)
+
+    def append(self, record: AuditRecord) -> None:
+        self.tail.append(record)
+        self._writer.append(record)
+
+    def close(self) -> None:
+        self.on_trouble = _ignore
+        self._writer.close()
+
+    def _changed(self, trouble: str) -> None:
+        """In the writer's thread."""
+        try:
+            self._loop.call_soon_threadsafe(self._tell, trouble)
+        except RuntimeError:
+            return  # the loop is closed: there is nobody left to tell
+
+    def _tell(self, trouble: str) -> None:
+        self.trouble = trouble
+        if trouble:
+            log.error("the audit log cannot be written", error="audit_unwritable", detail=trouble)
+        else:
+            log.info("the audit log is written again", lost=self.lost)
+        self.on_trouble(trouble)
+
+
+@contextmanager
+def open_audit_log(directory: StateDir, settings: Settings) -> Iterator[AuditLog]:
+    """Continues the numbers of the last run."""
+    with directory.own_log("audit") as path:
+        found = AuditLog(AuditFile(path, settings.audit_bytes, settings.audit_files), last_records(path))
+        try:
+            yield found
+        finally:
+            found.close()
+
+
+def _ignore(trouble: str) -> None:
+    pass

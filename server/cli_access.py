@@ -1,0 +1,181 @@
+"""The commands `invite`, `invitations`, `revoke` and `audit`, which work beside a running console.
+
+They read and change its state directory, which the console watches.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterable
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from robot_bridge.protocol.console import Role
+from server.audit import AuditRecord
+from server.audit_file import last_records, stored_records
+from server.console_address import read_address
+from server.durations import duration_words, parse_duration
+from server.errors import ConsoleError
+from server.invitations import Invitation
+from server.links import console_link
+from server.settings import Settings
+from server.state import ConsoleState, open_state, state_path
+from server.state_dir import StateDirUnusable
+
+__all__ = ["add_access_commands"]
+
+EXIT_USAGE = 2
+FOLLOW_SECONDS = 0.5  # between two looks at the log
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+StateDirOption = Annotated[Path | None, typer.Option(help="The console's state directory.")]
+MakeSettings = Callable[..., Settings]
+
+
+def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
+    """`make_settings` turns flags into settings, as for the other commands."""
+
+    @app.command()
+    def invite(
+        role: Annotated[str, typer.Option(help="observer, operator or supervisor.")] = "observer",
+        expires: Annotated[str, typer.Option(help="How long the link is good: 30m, 8h, 2d.")] = "8h",
+        name: Annotated[str, typer.Option(help="The name that others see, unless its holder sets another.")] = "",
+        url: Annotated[str, typer.Option(help="How the console is reached, https://robot.example.org.")] = "",
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Make a link that ends after a while, and print it."""
+        settings = make_settings(state_dir=state_dir)
+        with_state = _state(settings)
+        now = time.time()
+        try:
+            wanted = msgspec.convert(role, Role)
+            seconds = parse_duration(expires)
+            made = with_state.invitations.update(lambda known: known.invite(None, wanted, name, seconds, now))
+        except msgspec.ValidationError as error:
+            raise _usage("--role is observer, operator or supervisor") from error
+        except ValueError as error:
+            raise _usage(str(error)) from error
+        except ConsoleError as error:
+            raise _usage(error.detail) from error
+        base = url.rstrip("/") or settings.public_url or read_address(with_state.directory) or _settings_url(settings)
+        link = console_link(base, with_state.access.sign(made.identity, made.created))
+        if as_json:
+            _print_json({**_described(made, now), "link": link})
+        else:
+            sys.stdout.write(f"{link}\n")
+            _say(f"{made.role} {made.name!r}, good for {expires}; end it with: lockstep revoke {made.id}")
+
+    @app.command()
+    def invitations(state_dir: StateDirOption = None, as_json: Json = False) -> None:
+        """List the links that were given."""
+        now = time.time()
+        found = _state(make_settings(state_dir=state_dir)).invitations.known.visible(None)
+        if as_json:
+            _print_json([_described(each, now) for each in found])
+            return
+        for each in found:
+            by = "at start" if each.at_start else f"by {each.by or 'the command line'}"
+            sys.stdout.write(f"{each.id}  {each.role:10}  {_state_words(each, now):14}  {by}  {each.name}\n")
+
+    @app.command()
+    def revoke(
+        invitation_id: Annotated[str, typer.Argument(help="As `lockstep invitations` shows it.")],
+        state_dir: StateDirOption = None,
+    ) -> None:
+        """End a link, those that were invited with it, and everything that is connected with them."""
+        now = time.time()
+        state = _state(make_settings(state_dir=state_dir))
+        try:
+            ended = state.invitations.update(lambda known: known.revoke(None, invitation_id, now))
+        except ConsoleError as error:
+            raise _usage(error.detail) from error
+        for each in ended:
+            sys.stdout.write(f"revoked {each.id}  {each.role}  {each.name}\n")
+        if not ended:
+            _say("it was revoked before")
+
+    @app.command()
+    def audit(
+        follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what happens from now on.")] = False,
+        after: Annotated[int, typer.Option(help="Only records behind this number.")] = 0,
+        file: Annotated[Path | None, typer.Option(help="Another log than the state directory's audit.jsonl.")] = None,
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Show who drove when, stops, refusals, hand-overs, people and notes, with their event references."""
+        path = file or state_path(make_settings(state_dir=state_dir)) / "audit.jsonl"
+        if not follow and not path.exists():
+            raise _usage(f"there is no audit log at {path}")
+        last = after
+        records: Iterable[AuditRecord] = stored_records(path)
+        try:
+            while True:
+                for record in records:
+                    if record.n > last:
+                        last = record.n
+                        sys.stdout.write(_line(record, as_json) + "\n")
+                sys.stdout.flush()
+                if not follow:
+                    return
+                time.sleep(FOLLOW_SECONDS)
+                records = last_records(path)
+        except KeyboardInterrupt:
+            return
+        except OSError as error:
+            raise _usage(f"{path}: {error.strerror}") from error
+
+
+def _state(settings: Settings) -> ConsoleState:
+    try:
+        return open_state(settings)
+    except StateDirUnusable as error:
+        raise _usage(str(error)) from error
+
+
+def _usage(text: str) -> typer.Exit:
+    _say(text)
+    return typer.Exit(EXIT_USAGE)
+
+
+def _settings_url(settings: Settings) -> str:
+    return f"http://{settings.host}:{settings.port}"
+
+
+def _described(invitation: Invitation, now: float) -> dict[str, object]:
+    return {
+        "id": invitation.id,
+        "role": invitation.role,
+        "name": invitation.name,
+        "expires": invitation.expires,
+        "revoked": invitation.revoked_at is not None,
+        "good": invitation.is_good(now),
+    }
+
+
+def _state_words(invitation: Invitation, now: float) -> str:
+    if invitation.revoked_at is not None:
+        return "revoked"
+    return f"{duration_words(invitation.expires - now)} left" if now < invitation.expires else "expired"
+
+
+def _line(record: AuditRecord, as_json: bool) -> str:
+    if as_json:
+        return msgspec.json.encode(record).decode()
+    when = datetime.fromtimestamp(record.time).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    who = f"{record.who} ({record.role})" if record.role else record.who
+    words = "  ".join(each for each in (who, record.what, record.detail) if each)
+    times = f"  x{record.count}" if record.count > 1 else ""
+    return f"{record.n:6}  {when}  s={record.event:<7} {record.kind:10}  {words}{times}"
+
+
+def _print_json(answer: object) -> None:
+    sys.stdout.write(json.dumps(answer) + "\n")
+
+
+def _say(text: str) -> None:
+    typer.echo(f"lockstep: {text}", err=True)

@@ -1,0 +1,143 @@
+"""Invitations: links that somebody was given, and who may give or revoke them. No I/O, no clock.
+
+| role | may invite | sees and revokes |
+|---|---|---|
+| observer | – | – |
+| operator | observers, operators | what it invited |
+| supervisor | anyone | everything |
+
+An invitation ends no later than the link it was made with, and is revoked with it.
+"""
+
+import secrets
+from typing import Annotated
+
+import msgspec
+
+from robot_bridge.protocol.console import Role
+from server.access import Identity
+from server.errors import BadParameter, NotAllowed, NotFound, TooManyInvitations
+from server.names import clean_name
+
+__all__ = ["MAX_SECONDS", "Invitation", "Invitations", "may_invite"]
+
+MAX_LIVE = 500
+MIN_SECONDS = 60.0
+MAX_SECONDS = 366 * 24 * 3600.0
+SHOWN_AFTER_END = 24 * 3600.0  # s that an ended one stays in the list
+
+_MAY_INVITE: dict[Role, tuple[Role, ...]] = {
+    "observer": (),
+    "operator": ("observer", "operator"),
+    "supervisor": ("observer", "operator", "supervisor"),
+}
+
+
+class Invitation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What is kept of a link: never the token, which the key makes again from this."""
+
+    id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]  # the token's jti
+    role: Role
+    name: str
+    created: float  # s since 1970, as all times here
+    expires: float
+    by: str = ""  # name of who invited; "" from the command line or made at start
+    by_link: str = ""  # id of the link that it was made with
+    at_start: bool = False  # printed by every start of the console
+    revoked_at: float | None = None
+
+    @property
+    def identity(self) -> Identity:
+        return Identity(self.role, self.name, self.id, self.expires)
+
+    def is_good(self, now: float) -> bool:
+        return self.revoked_at is None and now < self.expires
+
+
+def may_invite(role: Role) -> tuple[Role, ...]:
+    return _MAY_INVITE[role]
+
+
+class Invitations:
+    """All of them; `now` is seconds since 1970. `by` is None on the command line, which may do everything."""
+
+    def __init__(self, known: list[Invitation]) -> None:
+        self._known = {invitation.id: invitation for invitation in known}
+
+    @property
+    def all(self) -> list[Invitation]:
+        return list(self._known.values())
+
+    def revoked(self) -> frozenset[str]:
+        return frozenset(each.id for each in self._known.values() if each.revoked_at is not None)
+
+    def invite(self, by: Identity | None, role: Role, name: str, seconds: float, now: float) -> Invitation:
+        """A new invitation.
+
+        Raises:
+            NotAllowed: the role of `by` may not invite `role`.
+            BadParameter: the time is not within bounds.
+            TooManyInvitations: revoke some first.
+        """
+        if by is not None and role not in may_invite(by.role):
+            raise NotAllowed(f"{'an' if by.role != 'supervisor' else 'a'} {by.role} may not invite a person as {role}")
+        if not MIN_SECONDS <= seconds <= MAX_SECONDS:
+            raise BadParameter(f"a link is good for {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
+        if sum(each.is_good(now) for each in self._known.values()) >= MAX_LIVE:
+            raise TooManyInvitations(f"there are {MAX_LIVE} already; revoke some first")
+        expires = now + seconds if by is None else min(now + seconds, by.expires)
+        return self._add(
+            Invitation(
+                id=secrets.token_hex(8),
+                role=role,
+                name=clean_name(name, role),
+                created=now,
+                expires=expires,
+                by="" if by is None else by.name,
+                by_link="" if by is None else by.token_id,
+            )
+        )
+
+    def for_start(self, role: Role, seconds: float, now: float) -> Invitation:
+        """The link that the console prints: the same one at every start until half of its time is over."""
+        for each in self._known.values():
+            if each.at_start and each.role == role and each.is_good(now) and each.expires - now >= seconds / 2:
+                return each
+        fresh = Invitation(
+            id=secrets.token_hex(8), role=role, name=role, created=now, expires=now + seconds, at_start=True
+        )
+        return self._add(fresh)
+
+    def revoke(self, by: Identity | None, invitation_id: str, now: float) -> list[Invitation]:
+        """Revoke it and all that was invited with it; those that were good until now.
+
+        Raises:
+            NotFound: there is no such invitation that `by` may revoke.
+        """
+        if all(each.id != invitation_id for each in self.visible(by)):
+            raise NotFound("no such invitation")
+        ended = {invitation_id}
+        while more := {each.id for each in self._known.values() if each.by_link in ended} - ended:
+            ended |= more
+        revoked = []
+        for each in [self._known[found] for found in ended]:
+            if each.revoked_at is None:
+                self._known[each.id] = msgspec.structs.replace(each, revoked_at=now)
+                revoked.append(self._known[each.id])
+        return revoked
+
+    def visible(self, by: Identity | None) -> list[Invitation]:
+        """Those that `by` may see, newest first."""
+        everything = by is None or by.role == "supervisor"
+        found = [
+            each for each in self._known.values() if everything or (by is not None and each.by_link == by.token_id)
+        ]
+        return sorted(found, key=lambda each: each.created, reverse=True)
+
+    def prune(self, now: float) -> None:
+        """Forget those that expired long ago. A revoked one is kept until it would have expired."""
+        self._known = {key: each for key, each in self._known.items() if now < each.expires + SHOWN_AFTER_END}
+
+    def _add(self, invitation: Invitation) -> Invitation:
+        self._known[invitation.id] = invitation
+        return invitation

@@ -1,0 +1,56 @@
+"""What a console remembers between its runs, opened: the signing key, the invitations, and the access they give."""
+
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import structlog
+
+from server.access import Access
+from server.invitation_store import InvitationStore
+from server.settings import Settings
+from server.state_dir import StateDamaged, StateDir, StateDirUnusable, default_state_dir
+
+__all__ = ["ConsoleState", "open_state", "state_path"]
+
+log = structlog.get_logger(__name__)
+
+
+class ConsoleState(NamedTuple):
+    directory: StateDir
+    invitations: InvitationStore
+    access: Access
+
+
+def state_path(settings: Settings) -> Path:
+    return settings.state_dir or default_state_dir()
+
+
+def open_state(settings: Settings, *, fall_back: bool = False) -> ConsoleState:
+    """The state directory that the settings name.
+
+    Args:
+        fall_back: when that cannot be made or written, use a new one that nobody finds again
+
+    Raises:
+        StateDirUnusable: it cannot be used.
+        StateDamaged: what is in it cannot be understood; that is never passed over.
+    """
+    path = state_path(settings)
+    try:
+        return _open(settings, path)
+    except StateDamaged:
+        raise
+    except StateDirUnusable as error:
+        if not fall_back:
+            raise
+        log.error("nothing is remembered: links and the audit log end with this console", detail=str(error))
+    return _open(settings, Path(tempfile.mkdtemp(prefix="lockstep-")))
+
+
+def _open(settings: Settings, path: Path) -> ConsoleState:
+    directory = StateDir(path)
+    secret = settings.secret.get_secret_value() if settings.secret is not None else directory.signing_key()
+    invitations = InvitationStore(directory)
+    access = Access(secret, settings.token_seconds, settings.scene_ticket_seconds, invitations.is_revoked)
+    return ConsoleState(directory, invitations, access)
