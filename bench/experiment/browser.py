@@ -12,15 +12,15 @@ from typing import Any
 import httpx
 import msgspec
 
+from bench.browsers.chromium import open_page, running_chromium
+from bench.browsers.console_page import RB, ConsolePage
+from bench.browsers.sound_card import running_sound_card
 from bench.experiment.choices import Choices
 from bench.experiment.observation import Look, Observation
 from bench.experiment.operator_script import OperatorScript
 from bench.experiment.record import Arrival, ClientRecord, Rendered
 from bench.page_clock import PageClock, read_page_clock
 from robot_bridge.protocol.description import Axis, ControlLayer, RobotDescription
-from tests.e2e.console_page import RB, ConsolePage
-from tests.support.chromium import open_page, running_chromium
-from tests.support.sound_card import running_sound_card
 
 __all__ = ["BrowserClient", "browser_client", "pad_axes"]
 

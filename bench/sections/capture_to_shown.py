@@ -20,6 +20,8 @@ from typing import Any, NamedTuple
 from playwright.async_api import Page
 
 from bench.browser import DRAW_PROBE, open_probed_page
+from bench.browsers.chromium import PAD, running_chromium
+from bench.browsers.console_page import LEFT_Y, RB, ConsolePage
 from bench.context import Context
 from bench.event_log import capture_times
 from bench.media_join import join_pictures
@@ -28,8 +30,6 @@ from bench.processes import running_process
 from bench.results import Result
 from bench.samples import median, quantile
 from bench.stack import Bridge, Stack, running_stack
-from tests.e2e.console_page import LEFT_Y, RB, ConsolePage
-from tests.support.chromium import PAD, running_chromium
 
 __all__ = ["run"]
 

@@ -7,12 +7,12 @@ was drawn. The baseline is a bare page on a plain aiortc server: one inline scri
 import sys
 
 from bench.browser import open_probed_page
+from bench.browsers.chromium import running_chromium
 from bench.context import Context
 from bench.processes import running_process
 from bench.results import Result
 from bench.samples import median
 from bench.stack import running_stack
-from tests.support.chromium import running_chromium
 
 __all__ = ["run"]
 

@@ -13,12 +13,12 @@ from tempfile import TemporaryDirectory
 from playwright.async_api import Browser
 
 from bench.browser import open_probed_page
+from bench.browsers.chromium import running_chromium
 from bench.context import Context
 from bench.processes import running_process
 from bench.results import Result
 from bench.samples import median
 from bench.stack import running_bridge
-from tests.support.chromium import running_chromium
 
 __all__ = ["run"]
 

@@ -13,6 +13,7 @@ from typing import Any
 import httpx
 
 from bench.browser import open_probed_page
+from bench.browsers.chromium import PAD, running_chromium
 from bench.emulator import Network, load_profile
 from bench.soak.crowd import Crowd, Intruder
 from bench.soak.judge import Judge
@@ -21,7 +22,6 @@ from bench.soak.pages import OperatorPage, WatchedPage
 from bench.soak.schedule import Action, schedule
 from bench.soak.world import World
 from bench.stack import Metrics
-from tests.support.chromium import PAD, running_chromium
 
 __all__ = ["OBSERVERS", "soak"]
 

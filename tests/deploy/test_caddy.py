@@ -11,8 +11,8 @@ import httpx
 import pytest
 from playwright.async_api import Browser
 
-from tests.e2e.console_page import ConsolePage
-from tests.support.chromium import running_chromium
+from bench.browsers.chromium import running_chromium
+from bench.browsers.console_page import ConsolePage
 from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from tests.support.chromium import running_chromium
+from bench.browsers.chromium import running_chromium
+from bench.browsers.sound_card import SoundCard, running_sound_card
 from tests.support.firefox import Firefox, running_firefox
-from tests.support.sound_card import SoundCard, running_sound_card
 from tests.support.stack import Stack, running_stack
 
 

@@ -3,7 +3,7 @@
 import pytest
 from playwright.async_api import Browser
 
-from tests.e2e.console_page import open_console
+from bench.browsers.console_page import open_console
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
@@ -48,7 +48,7 @@ async def test_a_second_operator_is_told_who_drives_and_gets_the_seat_when_it_is
         await second.until("s.connected && s.seat && s.seat.holder !== '' && !s.seat.mine")
         await first_page.__aexit__(None, None, None)
         await second.until("s.seat && s.seat.holder === ''")
-        await second.page.get_by_role("button", name="Take control").first.click()
+        await second.page.get_by_role("button", name="Request control").click()
         await second.until("s.seat && s.seat.mine")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from tests.e2e.console_page import LEFT_Y, RB, open_console
+from bench.browsers.console_page import LEFT_Y, RB, open_console
 from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]

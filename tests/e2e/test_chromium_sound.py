@@ -3,8 +3,8 @@
 import pytest
 from playwright.async_api import Browser
 
-from tests.e2e.console_page import open_console
-from tests.support.sound_card import SoundCard, tone_level
+from bench.browsers.console_page import open_console
+from bench.browsers.sound_card import SoundCard, tone_level
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]

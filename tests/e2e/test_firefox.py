@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from bench.browsers.sound_card import SoundCard
 from tests.support.firefox import Firefox
-from tests.support.sound_card import SoundCard
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]

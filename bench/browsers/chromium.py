@@ -1,0 +1,58 @@
+"""Chromium for a test, through Playwright; always the system's own browser with a profile of its own."""
+
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from playwright.async_api import Browser, BrowserContext, Page, async_playwright
+
+__all__ = ["PAD", "open_page", "running_chromium"]
+
+PAD = Path(__file__).with_name("test_pad.js")
+FLAGS = [
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--autoplay-policy=no-user-gesture-required",
+]
+
+
+@asynccontextmanager
+async def running_chromium(environment: dict[str, str] | None = None) -> AsyncIterator[Browser]:
+    """A headless Chromium, closed on leaving. It makes sound, which Playwright would otherwise mute."""
+    executable = shutil.which("chromium") or shutil.which("google-chrome")
+    if executable is None:
+        raise RuntimeError("Chromium is not installed: make test installs Debian's chromium")
+    async with async_playwright() as playwright:
+        browser = await playwright.chromium.launch(
+            executable_path=executable,
+            args=FLAGS,
+            ignore_default_args=["--mute-audio"],
+            env=dict(environment) if environment else None,
+        )
+        try:
+            yield browser
+        finally:
+            await browser.close()
+
+
+@asynccontextmanager
+async def open_page(
+    browser: Browser, link: str, *, width: int = 1280, height: int = 800, pad: bool = False, touch: bool = False
+) -> AsyncIterator[Page]:
+    """A page of its own context on `link`; uncaught errors of the page fail the test on leaving."""
+    context: BrowserContext = await browser.new_context(viewport={"width": width, "height": height}, has_touch=touch)
+    try:
+        if pad:
+            await context.add_init_script(path=PAD)
+        page = await context.new_page()
+        errors: list[str] = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        await page.goto(link)
+        yield page
+        if errors:
+            raise AssertionError("the page threw: " + "; ".join(errors))
+    finally:
+        await context.close()

@@ -1,0 +1,112 @@
+"""The page as its user handles it, and what it says of itself, for tests in Chromium."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from playwright.async_api import Browser, Page
+
+from bench.browsers.chromium import open_page
+
+__all__ = ["LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
+
+START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
+LEFT_X, LEFT_Y = 0, 1
+
+# The true event, read out of the strip that the planar robot draws into its pictures (robots/planar/event_strip.py),
+# together with the stamp that the page believes it has. One expression: no picture is drawn in between.
+READ_STRIP = """(name) => {
+  const canvas = document.querySelector(`canvas[data-stream="${name}"]`);
+  const rendered = window.lockstep.rendered(name).at(-1);
+  if (!canvas || !rendered || canvas.width === 0) return null;
+  const rows = Math.floor(canvas.height / 20);
+  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, rows).data;
+  let event = 0, parity = 0, last = 0;
+  for (let cell = 0; cell < 32; cell++) {
+    const left = Math.floor(cell * canvas.width / 32), right = Math.floor((cell + 1) * canvas.width / 32);
+    const quarter = Math.floor((right - left) / 4), edge = Math.floor(rows / 4);
+    let sum = 0, count = 0;
+    for (let y = edge; y < rows - edge; y++) for (let x = left + quarter; x < right - quarter; x++) {
+      const at = 4 * (y * canvas.width + x);
+      sum += 0.299 * pixels[at] + 0.587 * pixels[at + 1] + 0.114 * pixels[at + 2];
+      count++;
+    }
+    const mean = sum / count;
+    if (mean >= 90 && mean <= 160) return { stamp: rendered.stamp, event: null };
+    const bit = mean > 160 ? 1 : 0;
+    if (cell < 31) { event = event * 2 + bit; parity ^= bit; } else last = bit;
+  }
+  return { stamp: rendered.stamp, event: parity === last ? event : null };
+}"""
+
+
+class ConsolePage:
+    """One open page. Waiting is always for something the page says, never for time to pass."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+
+    async def stats(self) -> dict[str, Any]:
+        """`window.lockstep.stats()`."""
+        statistics: dict[str, Any] = await self.page.evaluate("window.lockstep.stats()")
+        return statistics
+
+    async def until(self, condition: str, seconds: float = 20.0) -> None:
+        """Until `condition`, an expression over `s`, the page's statistics, is true."""
+        holds = f"const s = window.lockstep?.stats(); return Boolean(s && ({condition}));"
+        # The condition is part of the script: the page's content security policy forbids evaluating strings.
+        waiting = """(limit) => new Promise((resolve) => {
+          const holds = () => { %s };
+          const end = performance.now() + limit;
+          const look = () => {
+            if (holds()) resolve(null);
+            else if (performance.now() > end) resolve(JSON.stringify(window.lockstep?.stats() ?? null));
+            else setTimeout(look, 20);
+          };
+          look();
+        })"""
+        missed = await self.page.evaluate(waiting % holds, seconds * 1000)
+        if missed is not None:
+            raise AssertionError(f"never came true: {condition}\nthe page's statistics: {missed}")
+
+    async def until_live(self) -> None:
+        """Connected, and every picture stream was drawn a few times."""
+        videos = "Object.values(s.streams).filter((x) => x.kind === 'video')"
+        await self.until(f"s.connected && {videos}.length > 0 && {videos}.every((x) => x.rendered > 3)")
+
+    async def press(self, button: int, pressed: bool = True) -> None:
+        """As a finger does it: no shorter than the page's sampling can see."""
+        await self.page.evaluate(
+            "([button, pressed]) => { window.testPad.press(button, pressed);"
+            " return new Promise((resolve) => setTimeout(resolve, 60)); }",
+            [button, pressed],
+        )
+
+    async def tilt(self, axis: int, value: float) -> None:
+        await self.page.evaluate("([axis, value]) => window.testPad.tilt(axis, value)", [axis, value])
+
+    async def arm(self) -> None:
+        """With the pad's START, as an operator does."""
+        await self.until("s.seat && s.seat.mine")
+        await self.press(START)
+        await self.until("s.armed", 5)
+        await self.press(START, False)
+
+    async def drive_forward(self) -> None:
+        """Hold the deadman and push the left stick forward."""
+        await self.press(RB)
+        await self.tilt(LEFT_Y, -1)
+        await self.until("s.driving && s.at_rest === false")
+
+    async def strip(self, stream: str) -> tuple[int, int | None] | None:
+        """The stamp the page believes its picture has, and the event that is drawn into it; None before the first."""
+        found = await self.page.evaluate(READ_STRIP, stream)
+        return None if found is None else (found["stamp"], found["event"])
+
+
+@asynccontextmanager
+async def open_console(
+    browser: Browser, link: str, *, width: int = 1280, height: int = 800, pad: bool = True, touch: bool = False
+) -> AsyncIterator[ConsolePage]:
+    async with open_page(browser, link, width=width, height=height, pad=pad, touch=touch) as page:
+        yield ConsolePage(page)

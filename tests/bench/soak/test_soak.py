@@ -1,0 +1,27 @@
+"""Two minutes of the soak, as its user runs it."""
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
+
+
+async def test_two_minutes_of_trouble_break_no_promise() -> None:
+    command = (str(Path(sys.executable).with_name("lockstep")), "soak", "--minutes", "2", "--seed", "1", "--json", "-")
+    process = await asyncio.create_subprocess_exec(
+        *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+    )
+    out, said = await process.communicate()
+    assert process.returncode == 0, said.decode()[-3000:]
+    verdict = json.loads(out)
+    broken = ("executed_twice", "executed_late", "moved_without_seat", "moved_while_stopped", "reloads_needed")
+    assert {name: verdict[name] for name in broken} == dict.fromkeys(broken, 0)
+    assert verdict["violations"] == 0
+    assert isinstance(verdict["memory_growth"], float)
+    assert verdict["executed"] > 100, "the operator drove"
+    assert verdict["epochs"] == 2, "the bridge was killed and came back"
+    assert verdict["refused"]["no_seat"] > 0, "the intruders tried"
