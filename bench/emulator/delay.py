@@ -90,7 +90,7 @@ class Lognormal:
         self.max = max
         self._sigma = _sigma((max - min) / (mean - min))
         self._mu = self._fit(mean - min, math.log(max - min))
-        self._inside = STANDARD.cdf((math.log(max - min) - self._mu) / self._sigma)
+        self._inside = _below((math.log(max - min) - self._mu) / self._sigma)
 
     def _fit(self, mean: float, log_max: float) -> float:
         """The parameter with which the part below the cut has this mean."""
@@ -115,10 +115,15 @@ def _sigma(ratio: float) -> float:
 def _cut_mean(mu: float, sigma: float, log_max: float) -> float:
     """Mean of a lognormal's part below exp(log_max)."""
     cut = (log_max - mu) / sigma
-    inside = STANDARD.cdf(cut)
+    inside = _below(cut)
     if inside < 1e-300:
         return math.exp(log_max)
-    return math.exp(mu + sigma * sigma / 2) * STANDARD.cdf(cut - sigma) / inside
+    return math.exp(mu + sigma * sigma / 2) * _below(cut - sigma) / inside
+
+
+def _below(value: float) -> float:
+    """The standard normal distribution; exact far below the mean, where `NormalDist.cdf` is 0."""
+    return math.erfc(-value / math.sqrt(2)) / 2
 
 
 class Pareto:

@@ -29,7 +29,8 @@ class Outages:
     def __init__(self, planned: tuple[PlannedOutage, ...] = ()) -> None:
         self._planned = planned
         self._started: float | None = None
-        self._demanded: Silence | None = None
+        self._demanded = Silence(0.0, False)
+        self._demanded_at = 0.0
 
     @property
     def started(self) -> bool:
@@ -42,10 +43,11 @@ class Outages:
     def demand(self, now: float, seconds: float, *, hold: bool = False) -> None:
         """One more from now on; it takes the place of the one demanded before."""
         self._demanded = Silence(now + seconds, hold)
+        self._demanded_at = now
 
     def at(self, now: float) -> Silence | None:
         """The outage that holds at `now`; of several the one that lasts longest."""
-        found = self._demanded if self._demanded is not None and now < self._demanded.until else None
+        found = self._demanded if self._demanded_at <= now < self._demanded.until else None
         if self._started is not None:
             for planned in self._planned:
                 silence = _holding(planned, now - self._started, self._started)
