@@ -6,7 +6,7 @@ Why each is needed:
 - aiortc neither offers nor reads foreign header extensions, and gives no packet to its user;
 - its receiver decodes in a thread that is no daemon, into queues without bound, and gives out a frame only when
   the next one begins;
-- aioice never gathers loopback;
+- aioice never gathers loopback, and takes its STUN and TURN servers before anybody could ask the console for them;
 - its SCTP waits at least one second before it repeats a lost message, three while it connects, and then sends one
   packet at a time;
 - its DTLS takes one record from OpenSSL for each datagram that comes in. A record that waits there, as one that
@@ -19,8 +19,10 @@ from collections.abc import Callable, Sequence
 from types import MethodType
 from typing import Any, Protocol
 
-from aiortc import RTCPeerConnection, RTCRtpReceiver
+from aioice.ice import TransportPolicy
+from aiortc import RTCIceServer, RTCPeerConnection, RTCRtpReceiver
 from aiortc.rtcdtlstransport import RTCDtlsTransport
+from aiortc.rtcicetransport import connection_kwargs
 from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH
 from aiortc.rtp import HeaderExtensions, HeaderExtensionsMap, RtpPacket
 from OpenSSL import SSL
@@ -38,6 +40,7 @@ __all__ = [
     "take_packets",
     "take_raw_rtp",
     "transport_of",
+    "use_ice_servers",
 ]
 
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
@@ -80,6 +83,15 @@ def gather_here(connection: Any, addresses: Sequence[str]) -> None:
         return await gather(component=component, addresses=chosen)
 
     connection.get_component_candidates = gather_chosen
+
+
+def use_ice_servers(pc: RTCPeerConnection, servers: list[RTCIceServer], *, relay_only: bool) -> None:
+    """Ask these for addresses too; `relay_only`: use no other. Call before setLocalDescription."""
+    connection: Any = transport_of(pc).transport.iceGatherer._connection
+    for name, value in connection_kwargs(servers).items():
+        setattr(connection, name, value)
+    if relay_only:
+        connection._transport_policy = TransportPolicy.RELAY
 
 
 class _StampMap(HeaderExtensionsMap):

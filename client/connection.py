@@ -4,6 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from client.command_gate import CommandGate, Pacing
 from client.driving import Driver
@@ -61,6 +62,8 @@ class ConnectionOptions:
     connect_seconds: float
     silence_seconds: float
     route: Route | None
+    tls_ca: Path | None = None
+    relay_only: bool = False
 
 
 class Connection:
@@ -94,6 +97,8 @@ class Connection:
             audio=options.audio,
             codec=options.codec,
             route=options.route,
+            tls_ca=options.tls_ca,
+            relay_only=options.relay_only,
             on_message=self._received,
         )
 

@@ -3,6 +3,7 @@
 import asyncio
 import math
 from collections.abc import AsyncGenerator, Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -45,6 +46,8 @@ class Console:
         name: what other participants see
         connect_seconds: allowed for connecting, waiting for the robot included
         silence_seconds: without any message from the console after which it counts as lost
+        tls_ca: file with a certificate to trust instead of the system's, as a console's own (tls-cert.pem)
+        relay_only: through the console's TURN server or not at all
         route: passes the connection through a relay; for measurements
     """
 
@@ -66,6 +69,8 @@ class Console:
         connect_seconds: float = 15.0,
         silence_seconds: float = 5.0,
         route: Route | None = None,
+        tls_ca: str | Path | None = None,
+        relay_only: bool = False,
     ) -> None:
         if pacing == "media" and not (decode and video):
             raise ValueError("pacing by media needs decoded pictures")
@@ -86,6 +91,8 @@ class Console:
             connect_seconds=connect_seconds,
             silence_seconds=silence_seconds,
             route=route,
+            tls_ca=None if tls_ca is None else Path(tls_ca),
+            relay_only=relay_only,
         )
         self._connection: Connection | None = None
 

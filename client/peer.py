@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from pathlib import Path
 from typing import Literal, Protocol
 
 from aiortc import (
@@ -9,13 +10,23 @@ from aiortc import (
     RTCConfiguration,
     RTCDataChannel,
     RTCIceGatherer,
+    RTCIceServer,
+    RTCIceTransportPolicy,
     RTCPeerConnection,
     RTCSessionDescription,
 )
 from aiortc.rtcrtpparameters import RTCRtpCodecCapability
 from aiortc.rtcrtpreceiver import RTCRtpReceiver
 
-from client.aiortc_private import PacketSink, drain_dtls, gather_only_on, hasten_sctp, take_packets, take_raw_rtp
+from client.aiortc_private import (
+    PacketSink,
+    drain_dtls,
+    gather_only_on,
+    hasten_sctp,
+    take_packets,
+    take_raw_rtp,
+    use_ice_servers,
+)
 from client.errors import ConnectFailed, ConsoleError
 from client.ice_restart_private import IceRestart
 from client.link import ConsoleLink
@@ -64,6 +75,8 @@ class Peer:
         audio: bool,
         codec: str | None,
         route: Route | None,
+        tls_ca: Path | None,
+        relay_only: bool,
         on_message: Callable[[str | bytes], None],
     ) -> None:
         self.ended = asyncio.Event()
@@ -73,7 +86,9 @@ class Peer:
         self._carrier = carrier
         self._route = route
         self._on_message = on_message
-        self._whep = Whep(link)
+        self._relay_only = relay_only
+        self._ice_servers: list[RTCIceServer] = []
+        self._whep = Whep(link, tls_ca)
         self._resource = ""
         self._closing = False
         self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
@@ -86,6 +101,11 @@ class Peer:
             self._pc.addTransceiver("audio", direction="recvonly")
         self._channels = {name: self._create_channel(name) for name in CHANNELS}
         self._pc.on("connectionstatechange", self._state_changed)
+
+    @property
+    def _gather_on(self) -> list[str] | None:
+        """aioice never looks at loopback by itself; None: where it does look."""
+        return ["127.0.0.1"] if self._link.loopback and not self._relay_only else None
 
     def _create_channel(self, name: ChannelName) -> RTCDataChannel:
         if name == "control":
@@ -114,8 +134,10 @@ class Peer:
         Raises:
             SignallingRefused, ConnectFailed: as `Whep.offer`.
         """
-        if self._link.loopback:
-            gather_only_on(self._pc, ["127.0.0.1"])
+        self._ice_servers = await self._whep.ice_servers()
+        use_ice_servers(self._pc, self._ice_servers, relay_only=self._relay_only)
+        if self._gather_on is not None:
+            gather_only_on(self._pc, self._gather_on)
         hasten_sctp(self._pc)
         drain_dtls(self._pc)
         offer = await self._pc.createOffer()
@@ -180,8 +202,8 @@ class Peer:
             ConnectFailed: no other path within `seconds`; the old one is as it was.
         """
         first = read_sections(self._answer)[0]
-        addresses = ["127.0.0.1"] if self._link.loopback else None
-        restart = IceRestart(self._pc, RTCIceGatherer(iceServers=[]), addresses)
+        policy = RTCIceTransportPolicy.RELAY if self._relay_only else RTCIceTransportPolicy.ALL
+        restart = IceRestart(self._pc, RTCIceGatherer(self._ice_servers, policy), self._gather_on)
         try:
             async with asyncio.timeout(seconds):
                 await restart.gather()

@@ -1,11 +1,14 @@
 """WHEP signalling and the console's few HTTP calls, over httpx."""
 
+import ssl
+from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 from urllib.parse import urljoin, urlsplit
 
 import httpx
 import msgspec
+from aiortc import RTCIceServer
 
 from client.errors import ConnectFailed, SignallingRefused
 from client.link import ConsoleLink
@@ -20,6 +23,16 @@ class Answer(NamedTuple):
     resource: str  # URL that ends the session
 
 
+class _IceServer(msgspec.Struct):
+    urls: list[str]
+    username: str | None = None
+    credential: str | None = None
+
+
+class _IceServers(msgspec.Struct):
+    ice_servers: list[_IceServer]
+
+
 class _Problem(msgspec.Struct):
     error: str = ""
     detail: str = ""
@@ -28,13 +41,15 @@ class _Problem(msgspec.Struct):
 class Whep:
     """The HTTP side of one connection."""
 
-    def __init__(self, link: ConsoleLink) -> None:
+    def __init__(self, link: ConsoleLink, tls_ca: Path | None = None) -> None:
+        """`tls_ca`: a certificate in PEM to trust instead of the system's, as a console's self-signed one."""
         self._base = link.base
         self._client = httpx.AsyncClient(
             headers={"Authorization": f"Bearer {link.token}"},
             timeout=TIMEOUT,
             trust_env=not link.loopback,  # a proxy cannot reach this machine's loopback
-            verify=link.secure,  # without TLS, spares the loading of certificates
+            # Without TLS, spares the loading of certificates.
+            verify=ssl.create_default_context(cafile=tls_ca) if link.secure and tls_ca is not None else link.secure,
         )
 
     async def __aenter__(self) -> Self:
@@ -47,6 +62,15 @@ class Whep:
 
     async def aclose(self) -> None:
         await self._client.aclose()
+
+    async def ice_servers(self) -> list[RTCIceServer]:
+        """STUN and TURN servers with credentials that are good now; raises as `offer`."""
+        response = await self._request("GET", self._base + "/api/ice")
+        try:
+            found = msgspec.json.decode(response.content, type=_IceServers).ice_servers
+        except msgspec.DecodeError as error:
+            raise SignallingRefused(response.status_code, "", "not a list of ICE servers") from error
+        return [RTCIceServer(each.urls, each.username, each.credential) for each in found]
 
     async def offer(self, sdp: str, *, trailer: bool) -> Answer:
         """Offer, and get the answer.

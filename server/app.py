@@ -57,9 +57,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         console = Console(settings, metrics, media, scene, audit)
         audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
         warden = LinkWarden(opened.invitations, console.peers, metrics)
-        app.state.services = Services(
-            settings, metrics, console, media, opened, audit, warden, Guard(settings), scene
-        )
+        app.state.services = Services(settings, metrics, console, media, opened, audit, warden, Guard(settings), scene)
         try:
             async with asyncio.TaskGroup() as tasks:
                 running = [

@@ -5,8 +5,8 @@ What is used and why:
 - `RTCSctpTransport._receive_data_chunk`, `._receive_forward_tsn_chunk`, `._inbound_streams`, `._sack_misordered`,
   `._advertised_rwnd`: aiortc announces a receive window (RFC 9260 6.2) and does not insist on it; a message that never
   ends, holes in the numbering and 65,536 streams would each be kept without bound
-- `aioice.Connection.check_incoming`, `._remote_candidates`: every address that an authenticated check comes from becomes
-  a candidate, and every candidate a check of ours
+- `aioice.Connection.check_incoming`, `._remote_candidates`: every address that an authenticated check comes from
+  becomes a candidate, and every candidate a check of ours
 """
 
 from collections.abc import Callable

@@ -1,0 +1,59 @@
+"""The headless client through a real TURN server, with credentials that the console minted."""
+
+import time
+from pathlib import Path
+
+import pytest
+from aiortc import RTCIceServer
+
+from client import Console
+from client.aiortc_private import transport_of
+from client.errors import ConnectFailed
+from server.ice_servers import turn_credential
+from tests.server.rig import running_rig
+from tests.support.turn_server import TURN_SECRET, running_turn_server
+
+
+async def test_with_only_a_relay_the_robot_is_driven_seen_and_moved_to_another_relay(tmp_path: Path) -> None:
+    async with (
+        running_turn_server(tmp_path) as turn,
+        running_rig(turn=turn.uri, turn_secret=TURN_SECRET, ice_hosts="127.0.0.1") as rig,
+        Console(f"{rig.url}/#token={rig.access.issue('operator', 'operator')}", relay_only=True) as console,
+    ):
+        await console.take_seat()
+        rest, forward = ([value] * len(console.description.axes) for value in (0.0, 0.1))
+        first = await console.drive(rest)
+        await console.drive(forward)
+        async for picture in console.pictures():
+            assert picture.stamp is None or picture.stamp >= first.event - 4
+            break
+        pc = console._live()._peer._pc
+        pair = transport_of(pc).transport._connection._nominated[1]
+        assert pair.local_candidate.type == "relay"
+        await console.restart_ice()
+        moved = transport_of(pc).transport._connection._nominated[1]
+        assert moved.local_candidate.type == "relay"
+        assert moved.local_candidate.port != pair.local_candidate.port
+        assert (await console.drive(forward)).event > first.event
+        await console.rest()
+
+
+async def test_expired_and_forged_credentials_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with (
+        running_turn_server(tmp_path) as turn,
+        running_rig(turn=turn.uri, turn_secret=TURN_SECRET, ice_hosts="127.0.0.1") as rig,
+    ):
+        link = f"{rig.url}/#token={rig.access.issue('operator', 'operator')}"
+        for secret, expires in ((TURN_SECRET, time.time() - 60), ("somebody else's secret", time.time() + 3600)):
+            username, credential = turn_credential(secret, "ann", int(expires))
+
+            async def spoilt(
+                whep: object, username: str = username, credential: str = credential
+            ) -> list[RTCIceServer]:
+                return [RTCIceServer([turn.uri], username, credential)]
+
+            monkeypatch.setattr("client.whep.Whep.ice_servers", spoilt)
+            with pytest.raises(ConnectFailed):
+                async with Console(link, relay_only=True, connect_seconds=1.5):
+                    pass
+        assert turn.says("401"), "and it was the credential that it refused"

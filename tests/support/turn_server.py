@@ -1,0 +1,81 @@
+"""A real coturn for a test: on loopback, on free ports, with time-limited credentials."""
+
+import asyncio
+import shutil
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["TURN_SECRET", "TurnServer", "running_turn_server"]
+
+TURN_SECRET = "only for tests, only on loopback"
+START_SECONDS = 15.0
+STOP_SECONDS = 5.0
+
+
+@dataclass
+class TurnServer:
+    uri: str  # "turn:127.0.0.1:PORT?transport=udp"
+    log: Path
+
+    def says(self, text: str) -> bool:
+        """Whether its log has `text`."""
+        return text in self.log.read_text(errors="replace")
+
+
+@asynccontextmanager
+async def running_turn_server(directory: Path) -> AsyncIterator[TurnServer]:
+    """Started, answering on UDP and TCP, ended on leaving."""
+    executable = shutil.which("turnserver")
+    if executable is None:
+        raise RuntimeError("coturn is not installed: make test installs Debian's coturn")
+    port, log = _free_port(), directory / "turn.log"
+    command = [
+        *(executable, "-n", "--listening-ip=127.0.0.1", "--relay-ip=127.0.0.1", f"--listening-port={port}"),
+        *("--use-auth-secret", f"--static-auth-secret={TURN_SECRET}", "--realm=lockstep.test", "--fingerprint"),
+        *("--allow-loopback-peers", "--no-tls", "--no-dtls", "--no-cli", "--verbose"),
+        *(f"--log-file={log}", "--simple-log", f"--pidfile={directory / 'turn.pid'}", f"--userdb={directory / 'db'}"),
+    ]
+    with (directory / "turn.out").open("wb") as output:
+        process = await asyncio.create_subprocess_exec(*command, stdout=output, stderr=output)
+    try:
+        await _answers(port, process)
+        yield TurnServer(f"turn:127.0.0.1:{port}?transport=udp", log)
+    finally:
+        if process.returncode is None:
+            process.terminate()
+        try:
+            async with asyncio.timeout(STOP_SECONDS):
+                await process.wait()
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+
+
+def _free_port() -> int:
+    """Free for UDP and TCP just now."""
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_STREAM) as tcp,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
+    ):
+        tcp.bind(("127.0.0.1", 0))
+        port: int = tcp.getsockname()[1]
+        udp.bind(("127.0.0.1", port))
+        return port
+
+
+async def _answers(port: int, process: asyncio.subprocess.Process) -> None:
+    async with asyncio.timeout(START_SECONDS):
+        while True:
+            if process.returncode is not None:
+                raise RuntimeError(f"coturn ended with {process.returncode}")
+            try:
+                _, writer = await asyncio.open_connection("127.0.0.1", port)
+            except OSError:
+                await asyncio.sleep(0.05)
+                continue
+            writer.close()
+            await writer.wait_closed()
+            return
