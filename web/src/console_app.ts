@@ -12,8 +12,8 @@ import {
   robotIsUp,
 } from "./core/console_state";
 import { forceOf, speedShare } from "./core/contact";
+import { STALE_MS } from "./core/freshness";
 import { notePicture } from "./core/latency";
-import { createPingLedger, lostPings, pingAnswered, sendPing } from "./core/ping_ledger";
 import { noteShown } from "./core/command_gate";
 import { createRateMeter, noteHappening, quantile, rateOf } from "./core/samples";
 import { parseServerMessage } from "./core/wire_parser";
@@ -25,9 +25,10 @@ import { AudioDesk } from "./media/audio_desk";
 import { MediaRoom } from "./media_room";
 import type { VideoStream } from "./media/video_stream";
 import { ContactFeeling } from "./contact_feeling";
+import { Pulse } from "./pulse";
 import { Connection, type LinkState } from "./rtc/connection";
 import type { ConsoleApi } from "./rtc/console_api";
-import type { ChannelName, Peer } from "./rtc/peer";
+import type { ChannelName, Peer, PeerOptions } from "./rtc/peer";
 import { StampReader } from "./rtc/stamp_reader";
 import { SessionDesk } from "./session_desk";
 import { reportOf } from "./statistics";
@@ -35,11 +36,6 @@ import { StopSender } from "./stop_sender";
 import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, Welcome } from "./wire";
 
 const STALL_MS = 300; // without a tick, which comes every 10 ms
-const BEAT_MS = 500; // reports and pings
-const EARLY_PINGS = 5; // to know the path before the first command
-const EARLY_PING_MS = 50; // between them
-const SILENT_MS = 1500; // the other side counts as gone for driving
-const DEAD_BEATS = 10; // and for the connection; counted, so that a page that was held up is not taken for it
 
 export interface ConsoleAppEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;
@@ -71,18 +67,19 @@ export class ConsoleApp {
   private readonly feeling = new ContactFeeling(this.audio);
   private readonly disposal = new Disposal();
   private peer: Peer | null = null;
+  measuredMs: number | null = null; // when the newest feedback came
   private heardMs = 0;
-  private silentBeats = 0;
   private readonly stalls = createRateMeter(6000);
   private tickMs = Infinity;
-  private beatMs = 0;
-  private readonly pings = createPingLedger();
-  private earlyPings = 0; // still to send
-  private earlyPingMs = 0;
+  private readonly pulse = new Pulse({
+    tell: (message) => this.tell("control", message),
+    report: () => reportOf(this),
+    lost: (now) => this.driver !== null && driver.driverLoss(this.driver, now),
+  });
 
   constructor(
     api: ConsoleApi,
-    trailer: boolean,
+    options: PeerOptions,
     name: string | null,
     sticks: TouchSticks,
     readonly page: ConsoleAppEvents,
@@ -91,7 +88,7 @@ export class ConsoleApp {
       canvas: (info) => page.canvas(info),
       drawn: (stream, stamp, at) => this.drawn(stream, stamp, at),
     });
-    this.connection = new Connection(api, this.reader, trailer, {
+    this.connection = new Connection(api, this.reader, options, {
       state: (link) => this.linkChanged(link),
       message: (channel, data) => this.received(channel, data),
       opened: (peer) => (this.peer = peer),
@@ -124,7 +121,12 @@ export class ConsoleApp {
 
   /** Whether the console is connected and speaks. */
   hears(now: number): boolean {
-    return this.state.welcome !== null && now - this.heardMs < SILENT_MS;
+    return this.state.welcome !== null && this.silentMs(now) < STALE_MS;
+  }
+
+  /** Since the console's last message. */
+  silentMs(now: number): number {
+    return now - this.heardMs;
   }
 
   conditions(now = performance.now()): arming.ArmConditions {
@@ -214,7 +216,7 @@ export class ConsoleApp {
     this.disposal.listen(window, "pageshow", (event) => {
       if (event.persisted) location.reload();
     });
-    this.disposal.listen(window, "online", () => this.connection.retryNow());
+    this.disposal.listen(window, "online", () => this.connection.alarm());
     const visibility = (): void => {
       if (document.hidden) this.disarm("hidden");
       this.room.listen();
@@ -238,9 +240,9 @@ export class ConsoleApp {
     this.peer = null;
     this.driver = null;
     this.room.close();
-    this.pings.out.clear();
-    this.earlyPings = 0;
+    this.pulse.end();
     forgetConnection(this.state);
+    this.measuredMs = null;
   }
 
   private received(channel: ChannelName, data: unknown): void {
@@ -273,12 +275,14 @@ export class ConsoleApp {
   /** Whoever drives next has to arm, and nothing of the one before is executed. */
   private handedOver(): void {
     this.disarm("seat_lost");
+    if (this.state.handOver?.fromMe === true) this.session.lostSeat();
     if (holdsSeat(this.state)) arming.startAfresh(this.arming);
     else if (this.driver !== null) driver.driverSilence(this.driver);
   }
 
   private tookFeedback(feedback: Feedback, before: Feedback | null, now: number): void {
     if (before?.event !== feedback.event) noteHappening(this.events, now);
+    this.measuredMs = now;
     this.force = forceOf(feedback.wrench);
     if (this.driver !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
     this.drive(now);
@@ -287,7 +291,7 @@ export class ConsoleApp {
   }
 
   private tookPong(id: number, now: number): void {
-    const roundTripMs = pingAnswered(this.pings, id, now);
+    const roundTripMs = this.pulse.answered(id, now);
     if (roundTripMs === null) return;
     this.state.roundTripMs = roundTripMs;
     if (this.driver !== null) driver.driverPingAnswered(this.driver, roundTripMs);
@@ -295,7 +299,6 @@ export class ConsoleApp {
 
   private welcomed(welcome: Welcome): void {
     this.link = { kind: "connected" };
-    this.silentBeats = 0;
     if (this.peer !== null) this.room.open(this.peer, welcome.streams, this.heardMs);
     this.session.welcomed(welcome);
   }
@@ -308,7 +311,7 @@ export class ConsoleApp {
     const interval = 1000 / description.max_event_rate;
     const neutral = restValues(description.axes);
     this.driver = driver.createDriver(settings.pacing, settings.tolerance.video, interval, neutral);
-    this.earlyPings = EARLY_PINGS;
+    this.pulse.begin();
     this.layer = Math.min(this.layer, Math.max(0, description.layers.length - 1));
     if (feedback !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
   }
@@ -334,8 +337,8 @@ export class ConsoleApp {
     this.stopping.step(this.state.stop.stopped, now);
     this.charts.step(now);
     if (this.feeling.isDue(now)) this.feel(now);
-    if (now >= this.beatMs) this.beat(now);
-    else if (this.earlyPings > 0 && now >= this.earlyPingMs) this.earlyBeat(now);
+    if (this.state.welcome !== null) this.pulse.step(now);
+    this.connection.step(now);
   }
 
   private takeValues(sample: ControlSample): void {
@@ -358,31 +361,6 @@ export class ConsoleApp {
 
   private tell(channel: ChannelName, message: ClientMessage): boolean {
     return this.connection.send(channel, JSON.stringify(message));
-  }
-
-  private beat(now: number): void {
-    this.beatMs = now + BEAT_MS;
-    if (this.state.welcome === null) return;
-    this.silentBeats = now - this.heardMs > BEAT_MS ? this.silentBeats + 1 : 0;
-    if (this.silentBeats > DEAD_BEATS) {
-      this.connection.drop("the console fell silent");
-      return;
-    }
-    this.ping(now);
-    this.tell("control", reportOf(this));
-  }
-
-  private earlyBeat(now: number): void {
-    if (this.state.welcome === null) return;
-    this.earlyPingMs = now + EARLY_PING_MS;
-    this.earlyPings -= 1;
-    this.ping(now);
-  }
-
-  private ping(now: number): void {
-    if (lostPings(this.pings, now) > 0 && this.driver !== null) driver.driverLoss(this.driver, now);
-    const id = sendPing(this.pings, now);
-    if (!this.tell("control", { type: "ping", id })) this.pings.out.delete(id); // did not leave: is not lost
   }
 
   /** Force is felt only while driving is possible. */

@@ -7,13 +7,14 @@ import "./style/session.css";
 import "./style/sheets.css";
 import "./style/small_screens.css";
 import "./style/charts.css";
+import "./style/staleness.css";
 import { readFragment } from "./core/fragment";
 import { installHook } from "./lockstep_hook";
 import { Page } from "./page";
 import { ConsoleApi } from "./rtc/console_api";
 
 const link = readFragment(location.hash);
-const page = new Page(new ConsoleApi(link.token ?? ""), link.trailer, link.name);
+const page = new Page(new ConsoleApi(link.token ?? ""), link, link.name);
 installHook(page);
 if (link.token === null) page.app.link = { kind: "no_token" };
 else void page.app.connection.run();

@@ -2,11 +2,13 @@ import { ChartsDrawer } from "./charts/charts_drawer";
 import { ConsoleApp } from "./console_app";
 import { holdsSeat, isOperator } from "./core/console_state";
 import type { PageAction } from "./core/page_keys";
+import { staleAge } from "./core/freshness";
 import { countUnread, createUnread, markRead } from "./core/unread";
 import { FIELDS } from "./input/keyboard";
 import { TouchSticks } from "./input/touch_sticks";
 import { watchPageKeys } from "./page_keys";
 import type { ConsoleApi } from "./rtc/console_api";
+import type { PeerOptions } from "./rtc/peer";
 import { SessionApi } from "./rtc/session_api";
 import { createAnnouncer } from "./ui/announcer";
 import { createArmPanel } from "./ui/arm_panel";
@@ -53,11 +55,11 @@ export class Page {
   private readonly panels: Panel[];
   private drawnMs = 0;
 
-  constructor(api: ConsoleApi, trailer: boolean, name: string | null) {
+  constructor(api: ConsoleApi, options: PeerOptions, name: string | null) {
     const left = h("div", "stick left", { "aria-label": "Left stick" });
     const right = h("div", "stick right", { "aria-label": "Right stick" });
     this.board = new ViewBoard(new SceneView(api, (event) => this.app.controls.keyboard.foreign(event)));
-    this.app = new ConsoleApp(api, trailer, name, new TouchSticks(left, right), {
+    this.app = new ConsoleApp(api, options, name, new TouchSticks(left, right), {
       canvas: (info) => this.board.canvas(info),
       mainStream: () => this.board.mainStream(),
       isOccupied: () => this.isOccupied(),
@@ -205,6 +207,7 @@ export class Page {
     setData(root, "armed", app.arming.state);
     setData(root, "role", app.state.welcome === null ? "" : this.drives() ? "operator" : "observer");
     setData(root, "link", app.link.kind);
+    setData(root, "stale", String(staleAge(app.measuredMs, now) !== null));
     setData(root, "stopped", String(app.state.stop.stopped));
     setData(root, "gate", app.state.settings.gate === "event" ? "on" : "off");
     root.classList.toggle("has-overlay", overlayWords(app, now) !== null);

@@ -26,6 +26,13 @@ export class SessionDesk {
     if (welcome.role === "operator") this.tell({ type: "seat_request", only_if_free: true });
   }
 
+  /** A network that failed took the seat, not a person: back again, it is asked for unless somebody else has it. */
+  lostSeat(): void {
+    const { seat } = this.state;
+    if (seat?.holder === "" && seat.why === "heartbeat lost")
+      this.tell({ type: "seat_request", only_if_free: true });
+  }
+
   requestSeat(): void {
     this.tell({ type: "seat_request" });
   }

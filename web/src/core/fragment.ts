@@ -2,6 +2,7 @@
 export interface PageLink {
   readonly token: string | null;
   readonly trailer: boolean; // `stamp=trailer` forces the trailer carrier
+  readonly relayOnly: boolean; // `relay=only`: media and data through TURN or not at all
   readonly name: string | null; // what others see
 }
 
@@ -10,6 +11,7 @@ export function readFragment(hash: string): PageLink {
   return {
     token: fields.get("token") || null,
     trailer: fields.get("stamp") === "trailer",
+    relayOnly: fields.get("relay") === "only",
     name: fields.get("name") || null,
   };
 }

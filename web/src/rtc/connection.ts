@@ -1,6 +1,16 @@
 import { createBackoff, nextWait, noteLifetime } from "../core/backoff";
+import {
+  createResume,
+  resumeAlarm,
+  resumeAsked,
+  resumeHeard,
+  resumeRestarted,
+  resumeStep,
+  type ResumeAction,
+} from "../core/resume";
+import { troubleOf, type LinkEnd, type LinkTrouble } from "../core/trouble";
 import { ConsoleError, type ConsoleApi } from "./console_api";
-import { Peer, type ChannelName } from "./peer";
+import { Peer, PeerEnd, type ChannelName, type PeerOptions } from "./peer";
 import type { StampReader } from "./stamp_reader";
 
 /** How the page stands with the console. */
@@ -16,10 +26,6 @@ export type LinkState =
       readonly retryAtMs: number;
     };
 
-export type LinkEnd = "link_revoked" | "link_expired";
-
-export type LinkTrouble = "console_unreachable" | "robot_unreachable" | "token_refused" | "refused" | "lost";
-
 export interface ConnectionEvents {
   state(state: LinkState): void;
   message(channel: ChannelName, data: unknown): void;
@@ -29,6 +35,7 @@ export interface ConnectionEvents {
 
 /** Keeps one peer connected: the only layer that tries again. */
 export class Connection {
+  resume = createResume(); // of the present peer
   private readonly backoff = createBackoff();
   private peer: Peer | null = null;
   private wake: (() => void) | null = null;
@@ -37,7 +44,7 @@ export class Connection {
   constructor(
     private readonly api: ConsoleApi,
     private readonly reader: StampReader | null,
-    private readonly trailer: boolean,
+    private readonly options: PeerOptions,
     private readonly events: ConnectionEvents,
   ) {}
 
@@ -61,8 +68,16 @@ export class Connection {
     return this.peer?.send(channel, text) ?? false;
   }
 
-  /** Ends the present peer as lost, when its silence shows what WebRTC has not noticed yet. */
-  drop: (why: string) => void = () => undefined;
+  /** To be called many times a second: notices silence, which WebRTC takes seconds to notice. */
+  step(now: number): void {
+    if (this.peer?.isConnected === true) this.act(this.peer, resumeStep(this.resume, now));
+  }
+
+  /** The network changed. */
+  alarm(): void {
+    resumeAlarm(this.resume, performance.now());
+    this.retryNow();
+  }
 
   /** Tries now instead of at the end of the wait. */
   retryNow(): void {
@@ -72,7 +87,7 @@ export class Connection {
   close(): void {
     this.isClosed = true;
     this.peer?.close();
-    this.drop("closed");
+    this.end(new PeerEnd("lost", "closed"));
     this.wake?.();
   }
 
@@ -80,35 +95,61 @@ export class Connection {
     return this.isClosed;
   }
 
+  /** Ends the present connection. */
+  private end: (end: PeerEnd) => void = () => undefined;
+
   /** One connection from its first request to its end; says what ended it. */
   private async live(): Promise<Trouble> {
     this.events.state({ kind: "connecting" });
     const started = performance.now();
-    const ending = Promise.withResolvers<string>();
-    const peer = new Peer(
-      this.api,
-      this.reader,
-      {
-        message: (channel, data) => this.events.message(channel, data),
-        ended: (why) => ending.resolve(why),
+    const ending = Promise.withResolvers<PeerEnd>();
+    const peer = new Peer(this.api, this.reader, this.options, {
+      message: (channel, data) => {
+        resumeHeard(this.resume, performance.now());
+        this.events.message(channel, data);
       },
-      this.trailer,
-    );
+      troubled: () => resumeAlarm(this.resume, performance.now()),
+      ended: (end) => ending.resolve(end),
+    });
     this.peer = peer;
-    this.drop = (why) => ending.resolve(why);
+    this.resume = createResume();
+    this.end = (end) => ending.resolve(end);
     this.events.opened(peer);
     try {
       await peer.connect();
-      const detail = await ending.promise;
-      noteLifetime(this.backoff, performance.now() - started);
-      return { why: "lost", detail, retryAfterMs: null };
+      const end = await ending.promise;
+      if (peer.isConnected) noteLifetime(this.backoff, performance.now() - started);
+      return { why: end.why, detail: end.detail, retryAfterMs: null };
     } catch (error) {
-      return troubleOf(error);
+      return describe(error);
     } finally {
       this.peer = null;
       peer.close();
       this.events.closed();
     }
+  }
+
+  private act(peer: Peer, action: ResumeAction | null): void {
+    if (action === "ask") void this.ask(peer);
+    else if (action === "restart") void this.restart(peer);
+    else if (action === "reconnect") this.end(new PeerEnd("silent", ""));
+  }
+
+  /** Whether the console can be reached; its answer also brings TURN credentials that are good now. */
+  private async ask(peer: Peer): Promise<void> {
+    const reached = await peer.refresh().then(
+      () => true,
+      (error: unknown) => error instanceof ConsoleError && error.status !== 0 && error.status < 500,
+    );
+    if (peer === this.peer) resumeAsked(this.resume, reached, performance.now());
+  }
+
+  private async restart(peer: Peer): Promise<void> {
+    const outcome = await peer.restart().then(
+      () => "accepted" as const,
+      (error: unknown) => (error instanceof ConsoleError && error.status === 0 ? "unanswered" : "refused"),
+    );
+    if (peer === this.peer) this.act(peer, resumeRestarted(this.resume, outcome, performance.now()));
   }
 
   private async sleep(waitMs: number): Promise<void> {
@@ -130,15 +171,17 @@ interface Trouble {
   readonly end?: LinkEnd; // trying again is no use
 }
 
-function troubleOf(error: unknown): Trouble {
-  if (!(error instanceof ConsoleError)) {
+const REFUSED_MS = 5000; // a token that was refused is not refused less a moment later
+
+function describe(error: unknown): Trouble {
+  if (error instanceof PeerEnd) return { why: error.why, detail: error.detail, retryAfterMs: null };
+  if (!(error instanceof ConsoleError))
     return { why: "refused", detail: error instanceof Error ? error.message : "", retryAfterMs: null };
-  }
-  const { status, detail, retryAfterMs } = error;
-  if (status === 0) return { why: "console_unreachable", detail: "", retryAfterMs };
-  if (error.error === "robot_unreachable") return { why: "robot_unreachable", detail, retryAfterMs };
+  const { status, retryAfterMs } = error;
+  const why = troubleOf(status, error.error);
   if (error.error === "link_revoked" || error.error === "link_expired")
-    return { why: "token_refused", detail, retryAfterMs, end: error.error };
-  if (status === 401 || status === 403) return { why: "token_refused", detail, retryAfterMs: 5000 };
-  return { why: "refused", detail: error.message, retryAfterMs };
+    return { why, detail: "", retryAfterMs, end: error.error };
+  if (why === "token_refused") return { why, detail: "", retryAfterMs: REFUSED_MS };
+  const detail = why === "refused" ? error.message : why === "robot_unreachable" ? error.detail : "";
+  return { why, detail, retryAfterMs };
 }

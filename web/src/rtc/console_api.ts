@@ -1,3 +1,4 @@
+import { parseIceServers, type IceServer } from "../core/ice_servers";
 import { isRecord } from "../core/schema_check";
 
 /** What the console said instead of doing what it was asked. */
@@ -15,8 +16,17 @@ export class ConsoleError extends Error {
 export interface WhepAnswer {
   readonly sdp: string;
   readonly location: string; // of the session, to end it
-  readonly tag: string; // entity tag of its ICE session
+  readonly tag: string; // entity tag of its ICE session (RFC 9725 4.3.1)
 }
+
+/** The answer to an ICE restart. */
+export interface RestartAnswer {
+  readonly fragment: string;
+  readonly tag: string;
+}
+
+const FRAGMENT = "application/trickle-ice-sdpfrag";
+const RESTART_LIMIT_MS = 5000;
 
 /** The console's HTTP interface (docs/console-api.md), for the holder of one token. */
 export class ConsoleApi {
@@ -34,13 +44,29 @@ export class ConsoleApi {
     const path = trailer ? "/whep?stamp=trailer" : "/whep";
     const response = await this.fetch("POST", path, { "Content-Type": "application/sdp" }, sdp, signal);
     const { headers } = response;
-    return { sdp: await response.text(), location: headers.get("Location") ?? "", tag: headers.get("ETag") ?? "" };
+    return {
+      sdp: await response.text(),
+      location: headers.get("Location") ?? "",
+      tag: headers.get("ETag") ?? "",
+    };
+  }
+
+  /** STUN and TURN servers with credentials that are good for a while. */
+  async iceServers(signal: AbortSignal): Promise<IceServer[]> {
+    return parseIceServers(await this.json("GET", "/api/ice", undefined, signal));
   }
 
   /** Candidates found after the offer was sent. */
   async trickle(location: string, tag: string, fragment: string): Promise<void> {
-    const headers = { "Content-Type": "application/trickle-ice-sdpfrag", "If-Match": tag };
-    await this.fetch("PATCH", location, headers, fragment, undefined);
+    await this.fetch("PATCH", location, { "Content-Type": FRAGMENT, "If-Match": tag }, fragment, undefined);
+  }
+
+  /** Asks for an ICE restart (RFC 9725 4.3.3). */
+  async restart(location: string, fragment: string): Promise<RestartAnswer> {
+    const headers = { "Content-Type": FRAGMENT, "If-Match": "*" };
+    const limit = AbortSignal.timeout(RESTART_LIMIT_MS);
+    const response = await this.fetch("PATCH", location, headers, fragment, limit);
+    return { fragment: await response.text(), tag: response.headers.get("ETag") ?? "" };
   }
 
   /** Ends a WHEP session; also while the page is being left. */

@@ -1,3 +1,6 @@
+import { iceCandidates, iceFragment, restartedAnswer } from "../core/ice_fragment";
+import { hasRelay, type IceServer } from "../core/ice_servers";
+import type { LinkTrouble } from "../core/trouble";
 import { ConsoleError, type ConsoleApi } from "./console_api";
 import { askForCaptureTime } from "./header_extensions";
 import type { ReceiverStamps, StampReader } from "./stamp_reader";
@@ -11,34 +14,53 @@ export interface Section {
   readonly stamps: ReceiverStamps | null; // null where the browser has no transforms
 }
 
+/** What the page's link asks of connections. */
+export interface PeerOptions {
+  readonly trailer: boolean; // the event reference travels in trailers
+  readonly relayOnly: boolean; // through TURN or not at all
+}
+
+/** How a connection ended. */
+export class PeerEnd extends Error {
+  constructor(
+    readonly why: LinkTrouble,
+    readonly detail: string,
+  ) {
+    super(detail);
+  }
+}
+
 export interface PeerEvents {
   message(channel: ChannelName, data: unknown): void;
-  ended(why: string): void; // once, unless closed from here
+  troubled(): void; // WebRTC misses the other side
+  ended(end: PeerEnd): void; // once, unless closed from here
 }
 
 /** Offered before the robot's number of cameras is known; sections too many are answered inactive. */
 const USUAL_CAMERAS = 2;
-const CLOSED_BY_CONSOLE = "the console closed the connection";
 const CONNECT_LIMIT_MS = 10_000;
-const DISCONNECTED_LIMIT_MS = 4000;
+const REQUEST_LIMIT_MS = 5000;
 
 /** One WebRTC connection to the console. It ends once; connecting again makes a new one. */
 export class Peer {
   readonly sections: Section[] = [];
-  private readonly connection = new RTCPeerConnection({ bundlePolicy: "max-bundle" });
+  isConnected = false; // once it was
+  private readonly connection: RTCPeerConnection;
   private readonly channels: Record<ChannelName, RTCDataChannel>;
   private readonly abort = new AbortController();
   private location = "";
-  private tag = "";
+  private servers: readonly IceServer[] = [];
+  private tag = ""; // of the ICE session
   private timer: ReturnType<typeof setTimeout> | undefined;
   private isOver = false;
 
   constructor(
     private readonly api: ConsoleApi,
     private readonly reader: StampReader | null,
+    private readonly options: PeerOptions,
     private readonly events: PeerEvents,
-    private readonly trailerWanted: boolean,
   ) {
+    this.connection = new RTCPeerConnection(this.configuration());
     this.channels = {
       control: this.openChannel("control", { ordered: false, maxRetransmits: 0 }),
       session: this.openChannel("session", {}),
@@ -50,22 +72,44 @@ export class Peer {
   /** Returns when the answer is set; the channels open shortly after. Raises ConsoleError. */
   async connect(): Promise<void> {
     const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(CONNECT_LIMIT_MS)]);
-    const media = this.api.media(signal);
+    const media = this.api.media(AbortSignal.any([signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]));
+    // Without these servers there may still be a direct path.
+    const servers = this.refresh().catch(() => undefined);
     let trailer = this.addSections(USUAL_CAMERAS, 1);
     // The first offer makes the browser look for its codecs, which takes as long as the console's answer.
-    const [{ cameras }, usual] = await Promise.all([media, this.connection.createOffer()]);
+    const [{ cameras }, usual] = await Promise.all([media, this.connection.createOffer(), servers]);
     const more = cameras > USUAL_CAMERAS;
     if (more) trailer = this.addSections(cameras - USUAL_CAMERAS, 0) || trailer;
     await this.connection.setLocalDescription(more ? await this.connection.createOffer() : usual);
-    const offer = this.connection.localDescription?.sdp ?? "";
-    const answer = await this.api.offer(offer, trailer, signal);
+    const answer = await this.api.offer(this.localSdp(), trailer, signal);
     this.location = answer.location;
     this.tag = answer.tag;
     if (this.isOver) throw new ConsoleError(0, "closed", "closed while connecting", null);
     await this.connection.setRemoteDescription({ type: "answer", sdp: answer.sdp });
-    if (this.connection.iceGatheringState === "complete") this.sendCandidates();
-    else this.connection.onicegatheringstatechange = () => this.gatheringChanged();
-    this.endAfter(CONNECT_LIMIT_MS, "no connection: is UDP blocked?");
+    this.connection.onicegatheringstatechange = () => this.sendCandidates();
+    this.sendCandidates();
+    this.endAfter(CONNECT_LIMIT_MS);
+  }
+
+  /** Takes the console's STUN and TURN servers, for what is gathered from now on. Raises ConsoleError. */
+  async refresh(): Promise<void> {
+    const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]);
+    this.servers = await this.api.iceServers(signal);
+    if (!this.isOver) this.connection.setConfiguration(this.configuration());
+  }
+
+  /** Moves to another path by an ICE restart; everything else lives on. Raises ConsoleError when it is refused. */
+  async restart(): Promise<void> {
+    const offer = await this.connection.createOffer({ iceRestart: true });
+    await this.connection.setLocalDescription(offer);
+    const answer = await this.api.restart(this.location, iceFragment(this.localSdp(), false));
+    const before = this.connection.remoteDescription?.sdp ?? "";
+    const sdp = restartedAnswer(before, answer.fragment);
+    if (sdp === null)
+      throw new ConsoleError(200, "malformed", "the console's answer has no credentials", null);
+    this.tag = answer.tag;
+    await this.connection.setRemoteDescription({ type: "answer", sdp });
+    this.sendCandidates();
   }
 
   /** Says whether it could be sent. What cannot go out now is not kept: newer follows. */
@@ -95,7 +139,7 @@ export class Peer {
     const offered = transceivers.map((transceiver, index) =>
       askForCaptureTime(transceiver, kinds[index] ?? "video"),
     );
-    const trailer = this.trailerWanted || offered.includes(false);
+    const trailer = this.options.trailer || offered.includes(false);
     for (const [index, transceiver] of transceivers.entries()) {
       const kind = kinds[index] ?? "video";
       const stamps = this.reader?.attach(transceiver.receiver, kind, trailer) ?? null;
@@ -107,47 +151,58 @@ export class Peer {
   private openChannel(name: ChannelName, options: RTCDataChannelInit): RTCDataChannel {
     const channel = this.connection.createDataChannel(name, options);
     channel.onmessage = (event: MessageEvent<unknown>) => this.events.message(name, event.data);
-    channel.onclose = () => this.finish(CLOSED_BY_CONSOLE);
+    channel.onclose = () => this.finish(new PeerEnd("lost", "the console closed the connection"), true);
     return channel;
   }
 
   private connectionChanged(): void {
     const state = this.connection.connectionState;
     clearTimeout(this.timer);
-    if (state === "failed") this.finish("the connection failed");
-    else if (state === "closed") this.finish("the connection was closed");
-    else if (state === "disconnected") this.endAfter(DISCONNECTED_LIMIT_MS, "the connection was lost");
-    else if (state !== "connected") this.endAfter(CONNECT_LIMIT_MS, "no connection: is UDP blocked?");
+    if (state === "connected") this.isConnected = true;
+    else if (state === "closed") this.finish(new PeerEnd("lost", "the connection was closed"));
+    else if (this.isConnected) this.events.troubled();
+    else if (state === "failed") this.finish(this.noPath());
+    else this.endAfter(CONNECT_LIMIT_MS);
   }
 
-  private gatheringChanged(): void {
-    if (this.connection.iceGatheringState === "complete" && !this.isOver) this.sendCandidates();
-  }
-
-  private endAfter(limitMs: number, why: string): void {
+  /** Ends it unless it is connected by then. */
+  private endAfter(limitMs: number): void {
     clearTimeout(this.timer);
-    if (this.connection.connectionState === "connected") return;
-    this.timer = setTimeout(() => this.finish(why), limitMs);
+    if (!this.isConnected) this.timer = setTimeout(() => this.finish(this.noPath()), limitMs);
+  }
+
+  private noPath(): PeerEnd {
+    if (this.options.relayOnly) return new PeerEnd("no_relay", "");
+    return new PeerEnd(
+      "no_path",
+      hasRelay(this.servers) ? "The console's TURN server did not help either" : "",
+    );
+  }
+
+  private configuration(): RTCConfiguration {
+    const iceServers = this.servers.map((server) => ({ ...server, urls: [...server.urls] }));
+    const iceTransportPolicy = this.options.relayOnly ? "relay" : "all";
+    return { bundlePolicy: "max-bundle", iceServers, iceTransportPolicy };
+  }
+
+  private localSdp(): string {
+    return this.connection.localDescription?.sdp ?? "";
   }
 
   /**
-   * The console learns our address from our own checks (RFC 8445 7.3.1.3), so the offer does not wait for candidates.
-   * Those that say more than an mDNS name follow in one fragment (RFC 8840).
+   * The console learns our address from our own checks (RFC 8445 7.3.1.3), so no offer waits for candidates. Those that
+   * say more than an mDNS name follow in one fragment (RFC 8840).
    */
   private sendCandidates(): void {
-    const offer = this.connection.localDescription?.sdp ?? "";
-    const lines = offer.split(/\r?\n/);
-    const candidates = lines.filter((line) => line.startsWith("a=candidate:") && !line.includes(".local "));
-    if (this.location === "" || candidates.length === 0) return;
-    const head = ["a=ice-ufrag:", "a=ice-pwd:", "a=mid:"].map(
-      (name) => lines.find((line) => line.startsWith(name)) ?? "",
-    );
-    const fragment = [...head, ...new Set(candidates), "a=end-of-candidates", ""].join("\r\n");
+    if (this.isOver || this.location === "" || this.connection.iceGatheringState !== "complete") return;
+    const sdp = this.localSdp();
+    if (iceCandidates(sdp).length === 0) return;
     // Only a help: without them the connection is still found.
-    this.api.trickle(this.location, this.tag, fragment).catch(() => undefined);
+    this.api.trickle(this.location, this.tag, iceFragment(sdp, true)).catch(() => undefined);
   }
 
-  private finish(why: string | null): void {
+  /** `gone`: the console has ended the session already. */
+  private finish(end: PeerEnd | null, gone = false): void {
     if (this.isOver) return;
     this.isOver = true;
     clearTimeout(this.timer);
@@ -155,7 +210,7 @@ export class Peer {
     for (const { stamps } of this.sections) if (stamps !== null) this.reader?.detach(stamps);
     this.connection.close();
     // The console notices a lost peer by itself; asking it to end the session only makes that quicker.
-    if (why !== CLOSED_BY_CONSOLE) this.api.end(this.location).catch(() => undefined);
-    if (why !== null) this.events.ended(why);
+    if (!gone) this.api.end(this.location).catch(() => undefined);
+    if (end !== null) this.events.ended(end);
   }
 }

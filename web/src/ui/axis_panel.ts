@@ -2,6 +2,7 @@ import { holdsSeat, isOperator } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
 import type { Axis, RobotDescription } from "../wire";
 import { button, h, setHidden, setPressed, setText, type Panel } from "./dom";
+import { createStaleMark } from "./stale_mark";
 
 interface AxisBar {
   readonly axis: Axis;
@@ -13,19 +14,21 @@ interface AxisBar {
 export function createAxisPanel(app: ConsoleApp): Panel {
   const layers = h("div", "segments layers", { role: "group", "aria-label": "Control layer" });
   const bars = h("div", "axes");
-  const element = h("section", "axis-panel", { "aria-label": "Axes" }, layers, bars);
+  const stale = createStaleMark(app);
+  const element = h("section", "axis-panel", { "aria-label": "Axes" }, layers, bars, stale.element);
   let description: RobotDescription | null = null;
   let shown: AxisBar[] = [];
   return {
     element,
-    update() {
-      const now = app.state.robot?.description ?? null;
-      if (now !== null && now !== description) {
-        description = now;
-        shown = now.axes.map(createBar);
+    update(now) {
+      stale.update(now);
+      const found = app.state.robot?.description ?? null;
+      if (found !== null && found !== description) {
+        description = found;
+        shown = found.axes.map(createBar);
         bars.replaceChildren(...shown.map((bar) => bar.element));
         layers.replaceChildren(
-          ...now.layers.map((layer, index) => button("segment", layer.label, () => app.selectLayer(index))),
+          ...found.layers.map((layer, index) => button("segment", layer.label, () => app.selectLayer(index))),
         );
       }
       setHidden(layers, (!isOperator(app.state) && !holdsSeat(app.state)) || layers.childElementCount < 2);

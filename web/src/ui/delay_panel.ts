@@ -16,7 +16,7 @@ export function createDelayPanel(app: ConsoleApp, mainStream: () => string | nul
       const main = app.room.videos.get(mainStream() ?? "");
       picture.show(milliseconds(latency === undefined ? null : quantile(latency.toPicture, 0.5)));
       feedback.show(milliseconds(latency === undefined ? null : quantile(latency.toFeedback, 0.5)));
-      trip.show(milliseconds(app.state.roundTripMs));
+      trip.show(milliseconds(app.hears(now) ? app.state.roundTripMs : null));
       frames.show(main === undefined ? "–" : rateOf(main.frames, now).toFixed(0));
     },
   };

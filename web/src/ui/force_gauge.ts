@@ -1,6 +1,7 @@
 import { contactStrength, forceOf } from "../core/contact";
 import type { ConsoleApp } from "../console_app";
 import { h, setData, setHidden, setText, svg, type Panel } from "./dom";
+import { createStaleMark } from "./stale_mark";
 
 const REACH = 44; // of the arrow, in the drawing's units
 
@@ -19,6 +20,7 @@ export function createForceGauge(app: ConsoleApp, onContact: boolean): Panel {
     svg("circle", { r: "4", class: "gauge-hub" }),
   );
   const value = h("span", "gauge-value");
+  const stale = createStaleMark(app);
   const fill = h("span", "meter-fill");
   const threshold = h("span", "meter-mark");
   const meter = h("span", "meter", { "aria-hidden": "true" }, fill, threshold);
@@ -29,11 +31,13 @@ export function createForceGauge(app: ConsoleApp, onContact: boolean): Panel {
     h("span", "gauge-name", {}, "Force"),
     drawing,
     value,
+    stale.element,
     meter,
   );
   return {
     element,
-    update() {
+    update(now) {
+      stale.update(now);
       const sensor = app.state.robot?.description.wrench ?? null;
       const wrench = app.state.feedback?.wrench ?? [];
       const force = forceOf(wrench);

@@ -1,6 +1,8 @@
 import { mayDrive, robotIsUp } from "../core/console_state";
+import { ageWords, resumeWords } from "../core/freshness";
+import { END_WORDS, TROUBLE_WORDS } from "../core/trouble";
 import type { ConsoleApp } from "../console_app";
-import type { LinkEnd, LinkState, LinkTrouble } from "../rtc/connection";
+import type { LinkState } from "../rtc/connection";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
 import { holdButton } from "./hold_button";
 
@@ -10,28 +12,6 @@ export interface OverlayWords {
   readonly title: string;
   readonly text: string;
 }
-
-const TROUBLE: Readonly<Record<LinkTrouble, readonly [title: string, text: string]>> = {
-  console_unreachable: ["Console unreachable", "The console does not answer."],
-  robot_unreachable: ["Robot unreachable", "The console has no link to the robot yet."],
-  token_refused: [
-    "This link is not valid",
-    "The console does not accept it. Open the newest link it printed.",
-  ],
-  refused: ["The console refused the connection", ""],
-  lost: ["Connection lost", "The robot comes to rest by itself."],
-};
-
-const ENDED: Readonly<Record<LinkEnd, readonly [title: string, text: string]>> = {
-  link_revoked: [
-    "This link was revoked",
-    "Whoever invited you has called it back, so this page is closed. Ask for a new link to come back.",
-  ],
-  link_expired: [
-    "This link has expired",
-    "It was good for a limited time, so this page is closed. Ask for a new link to come back.",
-  ],
-};
 
 /** Says over the large view what is wrong, and offers the way out. */
 export function createOverlay(app: ConsoleApp): Panel {
@@ -59,6 +39,7 @@ export function createOverlay(app: ConsoleApp): Panel {
 
 export function overlayWords(app: ConsoleApp, now: number): OverlayWords | null {
   if (app.link.kind !== "connected") return linkWords(app.link, now);
+  if (!app.hears(now)) return silentWords(app, now);
   if (app.state.robot !== null && !robotIsUp(app.state)) {
     const { detail } = app.state.robot;
     return {
@@ -81,18 +62,24 @@ function linkWords(link: LinkState, now: number): OverlayWords {
     case "connecting":
       return { tone: "calm", title: "Connecting…", text: "" };
     case "waiting": {
-      const [title, text] = TROUBLE[link.why];
+      const { title, text } = TROUBLE_WORDS[link.why];
       const seconds = Math.max(0, Math.ceil((link.retryAtMs - now) / 1000));
       const detail = link.detail === "" ? "" : ` ${sentence(link.detail)}`;
       return { tone: "bad", title, text: `${text}${detail} Trying again in ${seconds} s.`.trim() };
     }
-    case "ended": {
-      const [title, text] = ENDED[link.why];
-      return { tone: "calm", title, text };
-    }
+    case "ended":
+      return { tone: "calm", ...END_WORDS[link.why] };
     case "connected":
       return { tone: "calm", title: "Connected", text: "" };
   }
+}
+
+/** A robot that is stopped stays so, whatever becomes of the connection. */
+function silentWords(app: ConsoleApp, now: number): OverlayWords {
+  const since = ageWords(app.silentMs(now));
+  const stopped = app.state.stop.stopped ? " The robot was stopped when it was last heard." : "";
+  const text = `Nothing was heard for ${since}. ${resumeWords(app.connection.resume.phase)}${stopped}`;
+  return { tone: "bad", title: "Console silent", text };
 }
 
 function stopWords(app: ConsoleApp): OverlayWords {

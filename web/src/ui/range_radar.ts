@@ -1,6 +1,7 @@
 import type { ConsoleApp } from "../console_app";
 import type { RangeRing } from "../wire";
 import { h, setHidden, setText, svg, type Panel } from "./dom";
+import { createStaleMark } from "./stale_mark";
 
 const RADIUS = 52;
 
@@ -15,6 +16,7 @@ export function createRangeRadar(app: ConsoleApp): Panel {
     svg("path", { d: "M0-7L5 6L0 3L-5 6Z", class: "gauge-hub" }),
   );
   const value = h("span", "gauge-value");
+  const stale = createStaleMark(app);
   const element = h(
     "div",
     "gauge radar",
@@ -22,10 +24,12 @@ export function createRangeRadar(app: ConsoleApp): Panel {
     h("span", "gauge-name", {}, "Nearest"),
     drawing,
     value,
+    stale.element,
   );
   return {
     element,
-    update() {
+    update(now) {
+      stale.update(now);
       const ring = app.state.robot?.description.ranges ?? null;
       const ranges = app.state.feedback?.ranges ?? [];
       setHidden(element, ring === null || ranges.length === 0);

@@ -32,10 +32,10 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
   );
   return {
     element,
-    update() {
+    update(now) {
       setText(robotName, app.state.robot?.description.label ?? "");
-      consoleChip.show(...consoleWords(app));
-      robotChip.show(...robotWords(app));
+      consoleChip.show(...consoleWords(app, now));
+      robotChip.show(...robotWords(app, now));
       setHidden(badge, news() === 0);
       setText(badge, `${news()}`);
       const audible = app.room.isAudible();
@@ -68,14 +68,15 @@ function createChip(label: string): Chip {
   };
 }
 
-function consoleWords(app: ConsoleApp): [Tone, string] {
-  if (app.link.kind === "connected") return ["good", "connected"];
+function consoleWords(app: ConsoleApp, now: number): [Tone, string] {
+  if (app.link.kind === "connected") return app.hears(now) ? ["good", "connected"] : ["bad", "silent"];
   if (app.link.kind === "no_token") return ["off", "no link"];
   if (app.link.kind === "ended") return ["off", "closed"];
   return app.link.kind === "connecting" ? ["wait", "connecting"] : ["bad", "not connected"];
 }
 
-function robotWords(app: ConsoleApp): [Tone, string] {
-  if (app.state.robot === null) return ["off", "unknown"];
+/** Only the console can say how the robot is. */
+function robotWords(app: ConsoleApp, now: number): [Tone, string] {
+  if (app.state.robot === null || !app.hears(now)) return ["off", "unknown"];
   return robotIsUp(app.state) ? ["good", "connected"] : ["bad", "unreachable"];
 }

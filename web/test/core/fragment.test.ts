@@ -5,10 +5,16 @@ it("reads the token, the carrier and the name", () => {
   expect(readFragment("#token=a.b-c_d&stamp=trailer&name=Ada")).toEqual({
     token: "a.b-c_d",
     trailer: true,
+    relayOnly: false,
     name: "Ada",
   });
 });
 
 it.each(["", "#", "#token=", "#stamp=native"])("%j has no token and no trailer", (hash) => {
-  expect(readFragment(hash)).toEqual({ token: null, trailer: false, name: null });
+  expect(readFragment(hash)).toEqual({ token: null, trailer: false, relayOnly: false, name: null });
+});
+
+it("relay=only, and nothing else, keeps media off direct paths", () => {
+  expect(readFragment("#token=a&relay=only").relayOnly).toBe(true);
+  expect(readFragment("#token=a&relay=yes").relayOnly).toBe(false);
 });

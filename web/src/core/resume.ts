@@ -1,0 +1,105 @@
+/**
+ * What a page does when its console falls silent: it asks whether the console can be reached at all, gives the old path
+ * a moment to come back, then moves to another path by an ICE restart, and connects anew when that fails too.
+ *
+ * live → asking → hoping → restarting → moving → over; every message leads back to live.
+ */
+export type ResumePhase = "live" | "asking" | "hoping" | "restarting" | "moving" | "over";
+
+/** What the shell has to do now. */
+export type ResumeAction = "ask" | "restart" | "reconnect";
+
+export interface Resume {
+  phase: ResumePhase;
+  sinceMs: number; // when the phase began
+  silentMs: number; // without a message, counted in steps: a page that was held up counts nothing
+  stepMs: number | null; // the last step; null before the first
+  askedMs: number; // the last question
+  alarmedUntilMs: number; // the network changed: silence counts sooner
+}
+
+const SILENT_MS = 1500; // pongs come twice a second
+const ALARMED_MS = 700; // after a change of the network
+const ALARM_MS = 5000;
+const STEP_LIMIT_MS = 100; // a longer step is a page that was held up
+const ASK_MS = 1000; // questions overlap: the first answer counts
+const HOPE_MS = 400; // for the old path, once the console can be reached
+const MOVE_MS = 3000; // for the new path
+
+export function createResume(): Resume {
+  return {
+    phase: "live",
+    sinceMs: -Infinity,
+    silentMs: 0,
+    stepMs: null,
+    askedMs: -Infinity,
+    alarmedUntilMs: -Infinity,
+  };
+}
+
+/** A message came. A restart that was asked for is carried to its end. */
+export function resumeHeard(resume: Resume, now: number): void {
+  resume.silentMs = 0;
+  if (resume.phase !== "over" && resume.phase !== "restarting") enter(resume, "live", now);
+}
+
+/** The network changed, or WebRTC misses the other side. */
+export function resumeAlarm(resume: Resume, now: number): void {
+  resume.alarmedUntilMs = now + ALARM_MS;
+}
+
+/** To be called many times a second. */
+export function resumeStep(resume: Resume, now: number): ResumeAction | null {
+  resume.silentMs += Math.min(STEP_LIMIT_MS, now - (resume.stepMs ?? now));
+  resume.stepMs = now;
+  const spent = now - resume.sinceMs;
+  switch (resume.phase) {
+    case "live":
+      if (resume.silentMs < (now < resume.alarmedUntilMs ? ALARMED_MS : SILENT_MS)) return null;
+      enter(resume, "asking", now);
+      return ask(resume, now);
+    case "asking":
+      return now - resume.askedMs < ASK_MS ? null : ask(resume, now);
+    case "hoping":
+      if (spent < HOPE_MS) return null;
+      enter(resume, "restarting", now);
+      return "restart";
+    case "moving":
+      return spent < MOVE_MS ? null : giveUp(resume, now);
+    case "restarting":
+    case "over":
+      return null;
+  }
+}
+
+/** The console answered a question, or something else did in its place. */
+export function resumeAsked(resume: Resume, reached: boolean, now: number): void {
+  if (resume.phase === "asking" && reached) enter(resume, "hoping", now);
+}
+
+/** How the restart was answered. One that got no answer is asked for again, when the console can be reached. */
+export function resumeRestarted(
+  resume: Resume,
+  outcome: "accepted" | "refused" | "unanswered",
+  now: number,
+): ResumeAction | null {
+  if (resume.phase !== "restarting") return null;
+  if (outcome === "refused") return giveUp(resume, now);
+  enter(resume, outcome === "accepted" ? "moving" : "asking", now);
+  return null;
+}
+
+function ask(resume: Resume, now: number): ResumeAction {
+  resume.askedMs = now;
+  return "ask";
+}
+
+function giveUp(resume: Resume, now: number): ResumeAction {
+  enter(resume, "over", now);
+  return "reconnect";
+}
+
+function enter(resume: Resume, phase: ResumePhase, now: number): void {
+  resume.phase = phase;
+  resume.sinceMs = now;
+}

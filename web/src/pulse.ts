@@ -1,0 +1,54 @@
+import { createPingLedger, lostPings, pingAnswered, sendPing } from "./core/ping_ledger";
+import type { ClientMessage, Report } from "./wire";
+
+const BEAT_MS = 500; // reports and pings
+const EARLY_PINGS = 5; // to know the path before the first command
+const EARLY_PING_MS = 50; // between them
+
+export interface PulseEvents {
+  tell(message: ClientMessage): boolean;
+  report(): Report;
+  lost(now: number): void; // pings were not answered in time
+}
+
+/** What one connection says on its own: reports and pings, twice a second, and a few pings at its beginning. */
+export class Pulse {
+  private readonly pings = createPingLedger();
+  private early = 0; // pings still to send
+  private earlyMs = 0;
+  private beatMs = 0;
+
+  constructor(private readonly events: PulseEvents) {}
+
+  begin(): void {
+    this.early = EARLY_PINGS;
+  }
+
+  end(): void {
+    this.early = 0;
+    this.pings.out.clear();
+  }
+
+  step(now: number): void {
+    if (now >= this.beatMs) {
+      this.beatMs = now + BEAT_MS;
+      this.ping(now);
+      this.events.tell(this.events.report());
+    } else if (this.early > 0 && now >= this.earlyMs) {
+      this.earlyMs = now + EARLY_PING_MS;
+      this.early -= 1;
+      this.ping(now);
+    }
+  }
+
+  /** The round trip, null when the ping is not known any more. */
+  answered(id: number, now: number): number | null {
+    return pingAnswered(this.pings, id, now);
+  }
+
+  private ping(now: number): void {
+    if (lostPings(this.pings, now) > 0) this.events.lost(now);
+    const id = sendPing(this.pings, now);
+    if (!this.events.tell({ type: "ping", id })) this.pings.out.delete(id); // did not leave: is not lost
+  }
+}

@@ -1,0 +1,16 @@
+import { staleAge } from "../core/freshness";
+import type { ConsoleApp } from "../console_app";
+import { h, setHidden, setText, type Panel } from "./dom";
+
+/** Stands beside measured values, and says how old they are when they are not the present ones. */
+export function createStaleMark(app: ConsoleApp): Panel {
+  const element = h("span", "stale-mark");
+  return {
+    element,
+    update(now) {
+      const age = staleAge(app.measuredMs, now);
+      setHidden(element, age === null);
+      setText(element, age === null ? "" : `${age} old`);
+    },
+  };
+}

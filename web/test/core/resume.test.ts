@@ -1,0 +1,136 @@
+import { describe, expect, it } from "vitest";
+import {
+  createResume,
+  resumeAlarm,
+  resumeAsked,
+  resumeHeard,
+  resumeRestarted,
+  resumeStep,
+  type Resume,
+  type ResumeAction,
+} from "../../src/core/resume";
+
+const STEP = 10;
+
+/** Steps until `until`, and what had to be done when. */
+function run(resume: Resume, from: number, until: number): [at: number, action: ResumeAction][] {
+  const done: [number, ResumeAction][] = [];
+  for (let now = from; now <= until; now += STEP) {
+    const action = resumeStep(resume, now);
+    if (action !== null) done.push([now, action]);
+  }
+  return done;
+}
+
+/** Silent long enough to be asking. */
+function asking(): Resume {
+  const resume = createResume();
+  run(resume, 0, 1500);
+  return resume;
+}
+
+describe("resuming a connection", () => {
+  it("leaves a console that speaks alone", () => {
+    const resume = createResume();
+    for (let now = 0; now < 5000; now += 500) {
+      resumeHeard(resume, now);
+      expect(run(resume, now, now + 490)).toEqual([]);
+    }
+  });
+
+  it("asks once a second from 1.5 s of silence on", () => {
+    expect(run(createResume(), 0, 4000)).toEqual([
+      [1500, "ask"],
+      [2500, "ask"],
+      [3500, "ask"],
+    ]);
+  });
+
+  it("asks sooner when the network changed, for a while", () => {
+    const resume = createResume();
+    resumeAlarm(resume, 0);
+    expect(run(resume, 0, 1000)).toEqual([[700, "ask"]]);
+    const later = createResume();
+    resumeAlarm(later, -6000);
+    expect(run(later, 0, 1000)).toEqual([]);
+  });
+
+  it("does not take a page that was held up for a console that is silent", () => {
+    const resume = createResume();
+    resumeStep(resume, 0);
+    expect(resumeStep(resume, 10_000)).toBeNull();
+    expect(resume.phase).toBe("live");
+  });
+
+  it("is live again with the first message, while it asks and while it hopes", () => {
+    const resume = asking();
+    expect(resume.phase).toBe("asking");
+    resumeHeard(resume, 1600);
+    expect(resume.phase).toBe("live");
+    run(resume, 1600, 3200);
+    resumeAsked(resume, true, 3200);
+    expect(resume.phase).toBe("hoping");
+    resumeHeard(resume, 3300);
+    expect(run(resume, 3300, 4500)).toEqual([]);
+  });
+
+  it("restarts ICE when the console can be reached and its connection stays silent", () => {
+    const resume = asking();
+    resumeAsked(resume, false, 1600);
+    expect(resume.phase).toBe("asking");
+    resumeAsked(resume, true, 1700);
+    expect(run(resume, 1710, 2300)).toEqual([[2100, "restart"]]);
+  });
+
+  it("connects anew when the restart is refused", () => {
+    const resume = asking();
+    resumeAsked(resume, true, 1600);
+    run(resume, 1610, 2100);
+    expect(resumeRestarted(resume, "refused", 2200)).toBe("reconnect");
+    expect(run(resume, 2210, 9000)).toEqual([]);
+    resumeHeard(resume, 9100);
+    expect(resume.phase).toBe("over");
+  });
+
+  it("connects anew when the new path brings nothing within 3 s", () => {
+    const resume = asking();
+    resumeAsked(resume, true, 1600);
+    run(resume, 1610, 2100);
+    expect(resumeRestarted(resume, "accepted", 2200)).toBeNull();
+    expect(run(resume, 2210, 9000)).toEqual([[5200, "reconnect"]]);
+  });
+
+  it("is live again when the new path brings a message", () => {
+    const resume = asking();
+    resumeAsked(resume, true, 1600);
+    run(resume, 1610, 2100);
+    resumeRestarted(resume, "accepted", 2200);
+    resumeHeard(resume, 2500);
+    expect([resume.phase, run(resume, 2500, 3700)]).toEqual(["live", []]);
+  });
+
+  it("asks again when the restart got no answer", () => {
+    const resume = asking();
+    resumeAsked(resume, true, 1600);
+    run(resume, 1610, 2100);
+    expect(resumeRestarted(resume, "unanswered", 7000)).toBeNull();
+    expect(run(resume, 7010, 7500)).toEqual([[7010, "ask"]]);
+  });
+
+  it("carries a restart that was asked for to its end, also when the old path is back", () => {
+    const resume = asking();
+    resumeAsked(resume, true, 1600);
+    run(resume, 1610, 2100);
+    resumeHeard(resume, 2150);
+    expect(resume.phase).toBe("restarting");
+    resumeRestarted(resume, "accepted", 2200);
+    expect(resume.phase).toBe("moving");
+  });
+
+  it("ignores answers that come when nobody waits for them", () => {
+    const resume = createResume();
+    resumeAsked(resume, true, 0);
+    expect(resumeRestarted(resume, "refused", 0)).toBeNull();
+    expect(resume.phase).toBe("live");
+  });
+});
