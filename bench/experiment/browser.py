@@ -22,7 +22,7 @@ from bench.experiment.record import Arrival, ClientRecord, Rendered
 from bench.page_clock import PageClock, read_page_clock
 from robot_bridge.protocol.description import Axis, ControlLayer, RobotDescription
 
-__all__ = ["BrowserClient", "browser_client", "pad_axes"]
+__all__ = ["BrowserClient", "browser_client", "pad_axes", "robot_description"]
 
 PAD_AXES = {"left_x": 0, "left_y": 1, "right_x": 2, "right_y": 3}
 PAD_STEP = 0.05  # s between two looks at the script
@@ -152,11 +152,11 @@ async def browser_client(link: str, choices: Choices) -> AsyncIterator[BrowserCl
             {"gate": choices.gate, "pacing": choices.pacing, "tolerance": tolerance},
         )
         record = ClientRecord("operator", "chromium", choices.gate, choices.pacing, True, choices.tolerance)
-        description = await _description(link)
+        description = await robot_description(link)
         yield BrowserClient(console, record, description, await read_page_clock(page), choices.robot == "planar")
 
 
-async def _description(link: str) -> RobotDescription:
+async def robot_description(link: str) -> RobotDescription:
     url, _, token = link.partition("/#token=")
     async with httpx.AsyncClient(trust_env=False, timeout=CONNECT_SECONDS) as http:
         session = await http.get(f"{url}/api/session", headers={"Authorization": f"Bearer {token}"})

@@ -11,6 +11,7 @@ import uvloop
 from bench.emulator.errors import ProfileError
 from bench.emulator.profile import Profile, load_profile
 from bench.experiment.choices import PROFILES, Choices, Mode, media_of
+from bench.experiment.outage import run_outages
 from bench.experiment.results import Result, result_of
 from bench.experiment.run import run_experiment
 from bench.experiment.table import render_table
@@ -47,6 +48,9 @@ def experiment_command(
     report: Annotated[Path | None, typer.Option(help="Write a page with the figures into this folder.")] = None,
 ) -> None:
     """Drive a robot over an emulated network and say what was rendered, and how far behind the robot it was."""
+    if profile == "outage":
+        _outage(Choices(profile, mode, seconds, 0, seed, robot, browser), json_to)
+        return
     try:
         found = load_profile(profile)
     except ProfileError as error:
@@ -77,6 +81,19 @@ def _run(choices: Choices, profile: Profile) -> Result:
     return result_of(choices, media_of(profile), run, round_trip(profile))
 
 
+def _outage(choices: Choices, json_to: str) -> None:
+    try:
+        found = uvloop.run(run_outages(choices, _say))
+    except* (ProcessFailed, ConsoleError, TimeoutError) as errors:
+        _say(f"outage: {errors.exceptions[0]}")
+        raise typer.Exit(EXIT_FAILED) from errors
+    for each in found["outages"]:
+        _say(", ".join(f"{name} {value}" for name, value in each.items()))
+    _write(found, json_to)
+    if False in found["verdicts"].values():
+        raise typer.Exit(EXIT_BROKEN)
+
+
 def round_trip(profile: Profile) -> float:
     """Mean time of a command to the robot and its feedback back, in s, without what the programs take."""
     paths = (profile.control, profile.robot_control)
@@ -85,6 +102,10 @@ def round_trip(profile: Profile) -> float:
 
 def _publish(found: Any, results: list[Result], json_to: str) -> None:
     print(render_table(results), file=sys.stderr if json_to == "-" else sys.stdout)
+    _write(found, json_to)
+
+
+def _write(found: Any, json_to: str) -> None:
     if json_to == "-":
         sys.stdout.write(json.dumps(found, ensure_ascii=False) + "\n")
     elif json_to:
