@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from robot_bridge.protocol.console import Role
 from server.access import Identity, require_role
-from server.audit import Actor, AuditRecord
+from server.audit import AuditRecord
 from server.body import read_json
 from server.errors import NotAllowed
 from server.invitations import Invitation, may_invite
@@ -88,7 +88,7 @@ async def invite(request: Request, caller: Caller) -> Response:
         here.state.invitations.update,
         lambda known: known.invite(caller, wanted.role, wanted.name, wanted.seconds, now),
     )
-    here.console.audit.record("invitation", caller.actor, made.role, f"{made.name} ({made.id})")
+    here.warden.enforce([made], caller.actor)
     base = here.settings.public_url or str(request.base_url).rstrip("/")
     link = console_link(base, here.access.sign(made.identity, made.created))
     return _json(NewInvitation(link=link, **msgspec.structs.asdict(_info(here, made))), 201)
@@ -103,8 +103,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     revoked = await asyncio.to_thread(
         here.state.invitations.update, lambda known: known.revoke(caller, invitation_id, now)
     )
-    note_revocations(here, caller.actor, revoked)
-    here.warden.enforce()
+    here.warden.enforce(revoked, caller.actor)
     return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
 
 
@@ -119,11 +118,6 @@ async def audit(
     require_role(caller, "supervisor")
     log = services(request).audit
     return _json(AuditPage(records=log.tail.after(after, limit), last=log.next_number - 1, trouble=log.trouble))
-
-
-def note_revocations(here: Services, by: Actor, revoked: list[Invitation]) -> None:
-    for each in revoked:
-        here.console.audit.record("revocation", by, each.role, f"{each.name} ({each.id})")
 
 
 def _require_inviter(caller: Identity) -> None:

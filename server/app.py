@@ -20,6 +20,7 @@ from server.errors import AccessError, ConsoleError, TooManyRequests, http_error
 from server.front_door import FrontDoor, HostNames
 from server.guard import Guard
 from server.link_warden import LinkWarden
+from server.log_context import LogContext, follow_clock
 from server.media.aiortc_private import own_addresses, restrict_ice_hosts
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
@@ -55,9 +56,12 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         media = MediaPlane(settings.media, metrics.registry)
         scene = await _start_scene(settings, metrics)
         console = Console(settings, metrics, media, scene, audit)
+        follow_clock(console.clock)
         audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
-        warden = LinkWarden(opened.invitations, console.peers, metrics)
-        app.state.services = Services(settings, metrics, console, media, opened, audit, warden, Guard(settings), scene)
+        warden = LinkWarden(opened.invitations, console.peers, console.audit, metrics)
+        app.state.services = Services(
+            settings, metrics, console, media, opened, audit, warden, Guard(settings), scene
+        )
         try:
             async with asyncio.TaskGroup() as tasks:
                 running = [
@@ -105,6 +109,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         requests=RateLimits(settings.max_request_rate, settings.max_request_burst),
         count=_count_refused,
     )
+    app.add_middleware(LogContext)
     app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None)
     return app
 

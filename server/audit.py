@@ -5,11 +5,12 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-__all__ = ["Actor", "AuditKind", "AuditRecord", "RefusalMerger"]
+__all__ = ["Actor", "AuditKind", "AuditMerger", "AuditRecord"]
 
 AuditKind = Literal[
     "start",  # the console, not the robot
     "joined",
+    "renamed",
     "left",
     "seat",  # another holder, or none
     "claim",  # the claims on the seat changed
@@ -25,7 +26,7 @@ AuditKind = Literal[
     "audit",  # records were lost before this one
 ]
 
-MAX_PENDING = 256  # different refusals within one interval; further ones are counted together
+MAX_PENDING = 256  # different keys within one interval; further ones are counted together
 
 
 class Actor(NamedTuple):
@@ -54,20 +55,20 @@ class AuditRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     count: int = 1
 
 
-class RefusalMerger:
-    """Counts refusals of the same kind to the same peer; a flood of them becomes one record a second."""
+class AuditMerger:
+    """Counts what the same peer did again; a flood of it becomes one record a second."""
 
     def __init__(self) -> None:
-        self._counts: dict[tuple[Actor, str], int] = {}
+        self._counts: dict[tuple[AuditKind, Actor, str], int] = {}
 
-    def add(self, actor: Actor, reason: str) -> None:
-        key = (actor, reason)
+    def add(self, kind: AuditKind, actor: Actor, what: str) -> None:
+        key = (kind, actor, what)
         if key not in self._counts and len(self._counts) >= MAX_PENDING:
-            key = (Actor(), "others")
+            key = (kind, Actor(), "others")
         self._counts[key] = self._counts.get(key, 0) + 1
 
-    def take(self) -> Iterator[tuple[Actor, str, int]]:
-        """What came since the last time: who, why, how often."""
+    def take(self) -> Iterator[tuple[AuditKind, Actor, str, int]]:
+        """What came since the last time: who, what, how often."""
         counts, self._counts = self._counts, {}
-        for (actor, reason), count in counts.items():
-            yield actor, reason, count
+        for (kind, actor, what), count in counts.items():
+            yield kind, actor, what, count

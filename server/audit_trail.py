@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from robot_bridge.protocol.console import Seat
-from server.audit import Actor, AuditKind, AuditRecord, RefusalMerger
+from server.audit import Actor, AuditKind, AuditMerger, AuditRecord
 from server.event_clock import EventClock
 
 __all__ = ["AuditTrail", "RecordKeeper"]
 
 NOBODY = Actor()
-MERGE_SECONDS = 1.0  # refusals of one kind become one record
+MERGE_SECONDS = 1.0  # repetitions become one record
 
 
 class RecordKeeper(Protocol):
@@ -32,7 +32,7 @@ class AuditTrail:
         self._clock = clock
         self._log = log
         self._next = log.next_number
-        self._refusals = RefusalMerger()
+        self._merger = AuditMerger()
         self._holder = Actor()
         self._claims: list[str] = []
 
@@ -69,18 +69,23 @@ class AuditTrail:
             self.record("claim", by, detail=", ".join(f"{each.name} ({each.peer})" for each in seat.claims) or "none")
             self._claims = claims
 
+    def again(self, kind: AuditKind, actor: Actor, what: str) -> None:
+        """As `record`, for what may come many times a second."""
+        self._merger.add(kind, actor, what)
+
     def refused(self, actor: Actor, reason: str) -> None:
-        self._refusals.add(actor, reason)
+        self.again("refusal", actor, reason)
 
     async def run(self) -> None:
         """Until cancelled."""
         try:
             while True:
                 await asyncio.sleep(MERGE_SECONDS)
-                self._write_refusals()
+                self.flush()
         finally:
-            self._write_refusals()
+            self.flush()
 
-    def _write_refusals(self) -> None:
-        for actor, reason, count in self._refusals.take():
-            self.record("refusal", actor, reason, count=count)
+    def flush(self) -> None:
+        """Write down what was merged until now."""
+        for kind, actor, what, count in self._merger.take():
+            self.record(kind, actor, what, count=count)

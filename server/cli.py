@@ -23,13 +23,13 @@ from robot_bridge.robots.registry import robot_names
 from server.app import create_app
 from server.bench_commands import add_bench_commands
 from server.bridge_process import BridgeFailed, BridgeProcess
-from server.cli_access import add_access_commands
-from server.cli_options import AllowedHosts, PublicUrl, Stun, Tls, TlsCert, TlsKey, Turn, TurnSecret
+from server.cli_access import StateDirOption, add_access_commands
+from server.cli_options import AllowedHosts, PublicUrl, SpeedCap, Stun, Tls, TlsCert, TlsKey, Turn, TurnSecret
 from server.console_address import write_address
 from server.guarded_http import guarded_by
 from server.link_access import link_access
 from server.links import ConsoleLinks, console_links, listening_url
-from server.logs import configure_logs
+from server.logs import LogFormat, configure_logs
 from server.media.aiortc_private import own_addresses
 from server.serve import PortTaken, bind, running, wait_for_signal
 from server.services import Services
@@ -67,6 +67,7 @@ IceHosts = Annotated[
 Quality = Annotated[
     Switch | None, typer.Option(help="Whether bitrate, rate and size of pictures follow the network; on unless set.")
 ]
+LogFormatOption = Annotated[LogFormat | None, typer.Option("--log-format", help="Log lines as text or as JSON.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings.")]
 
 
@@ -79,6 +80,7 @@ def up(
     port: Port = None,
     ice_host: IceHosts = None,
     quality: Quality = None,
+    speed_cap: SpeedCap = None,
     public_url: PublicUrl = None,
     allowed_host: AllowedHosts = None,
     tls: Tls = None,
@@ -89,10 +91,21 @@ def up(
     turn_secret: TurnSecret = None,
     as_json: Json = False,
     quiet: Quiet = False,
+    log_format: LogFormatOption = None,
+    state_dir: StateDirOption = None,
 ) -> None:
     """Run a simulated robot and the console, and print the links that open it."""
     network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
-    settings = _settings(host=host, port=port, ice_hosts=ice_host, media=_media(quality), **network)
+    settings = _settings(
+        host=host,
+        port=port,
+        ice_hosts=ice_host,
+        media=_media(quality),
+        speed_cap=speed_cap,
+        log_format=log_format,
+        state_dir=state_dir,
+        **network,
+    )
     options = [] if event_log is None else ["--event-log", str(event_log)]
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
@@ -115,6 +128,7 @@ def serve(
     port: Port = None,
     ice_host: IceHosts = None,
     quality: Quality = None,
+    speed_cap: SpeedCap = None,
     public_url: PublicUrl = None,
     allowed_host: AllowedHosts = None,
     tls: Tls = None,
@@ -125,6 +139,8 @@ def serve(
     turn_secret: TurnSecret = None,
     as_json: Json = False,
     quiet: Quiet = False,
+    log_format: LogFormatOption = None,
+    state_dir: StateDirOption = None,
 ) -> None:
     """Run the console for a robot bridge that runs elsewhere."""
     network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
@@ -138,6 +154,9 @@ def serve(
         port=port,
         ice_hosts=ice_host,
         media=_media(quality),
+        speed_cap=speed_cap,
+        log_format=log_format,
+        state_dir=state_dir,
         **network,
     )
     _run(settings, None, as_json, quiet)
@@ -174,7 +193,7 @@ def _settings(**flags: object) -> Settings:
 
 
 def _run(settings: Settings, bridge: BridgeProcess | None, as_json: bool, quiet: bool) -> None:
-    configure_logs(logging.WARNING if quiet else logging.INFO)
+    configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         _check_files(settings)

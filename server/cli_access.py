@@ -26,7 +26,7 @@ from server.settings import Settings
 from server.state import ConsoleState, open_state, state_path
 from server.state_dir import StateDirUnusable
 
-__all__ = ["add_access_commands"]
+__all__ = ["StateDirOption", "add_access_commands"]
 
 EXIT_USAGE = 2
 FOLLOW_SECONDS = 0.5  # between two looks at the log

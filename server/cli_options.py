@@ -1,11 +1,19 @@
 """Options of the command line that several commands share; each is a setting too (LOCKSTEP_…)."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-__all__ = ["AllowedHosts", "PublicUrl", "Stun", "Tls", "TlsCert", "TlsKey", "Turn", "TurnSecret"]
+__all__ = ["AllowedHosts", "PublicUrl", "SpeedCap", "Stun", "Tls", "TlsCert", "TlsKey", "Turn", "TurnSecret"]
+
+
+class SpeedCapChoice(StrEnum):
+    ON = "on"
+    OFF = "off"
+    OPERATOR = "operator"
+
 
 PublicUrl = Annotated[str | None, typer.Option(help="Where people find the console, as behind a proxy.")]
 AllowedHosts = Annotated[
@@ -20,3 +28,7 @@ Turn = Annotated[
     list[str] | None, typer.Option(help="turn:host[:port][?transport=udp|tcp]; may be given again.", metavar="URI")
 ]
 TurnSecret = Annotated[str | None, typer.Option(help="Secret shared with the TURN server. Better in the environment.")]
+SpeedCap = Annotated[
+    SpeedCapChoice | None,
+    typer.Option(help="Cap the speed by the delay of what the operator sees: always, never, or as the operator wants."),
+]

@@ -11,21 +11,32 @@ from robot_bridge.protocol.console import (
     ClientMessage,
     Note,
     Notice,
-    Participants,
     Rename,
+    Report,
     RobotState,
     SeatDecline,
     SeatGrant,
     SeatRelease,
     SeatRequest,
     SeatTake,
-    SharedNote,
     StopStateNotice,
     Welcome,
     encode_console_message,
 )
 from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Command, Feedback, Media, Ping, Pong, Refusal, Reset, Rest, Stop, StopState
+from robot_bridge.protocol.messages import (
+    Command,
+    Feedback,
+    Media,
+    Ping,
+    Pong,
+    Refusal,
+    RefusalReason,
+    Reset,
+    Rest,
+    Stop,
+    StopState,
+)
 from server.audit import Actor
 from server.audit_trail import AuditTrail, RecordKeeper
 from server.channels import ChannelName
@@ -34,19 +45,19 @@ from server.errors import ChannelError, Flood, LinkDown
 from server.event_clock import EventClock
 from server.feedback_fanout import FeedbackFanout
 from server.metrics import Metrics
-from server.notes import NoteBoard
 from server.peer import Peer
 from server.peers import Peers
+from server.people import People
 from server.robot_connection import RobotConnection
 from server.seat import SeatRefusal, SeatTimes
 from server.seat_keeper import SeatKeeper
 from server.settings import Settings
+from server.speed_cap import SpeedCap
 
 __all__ = ["Console", "FeedbackViewer", "MediaFeed"]
 
 log = structlog.get_logger(__name__)
 
-CROWD = 10  # peers; the list of participants goes out at most once a second, ten times more rarely to 100
 UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
 UNWRITTEN = "The audit log cannot be written ({}). The console goes on; what happens now may be missing from the log."
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
@@ -80,16 +91,16 @@ class Console:
         self.clock = EventClock()
         self.audit = AuditTrail(self.clock, audit_log)
         self.robot = RobotConnection(settings, self)
-        self.peers = Peers(settings, metrics)
+        self.peers = Peers(settings, metrics, lambda peer: self.people.joined(peer))
         times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
-        self.notes = NoteBoard(time.monotonic())
-        for record in audit_log:
-            self.notes.remember(record)
+        self.people = People(self.peers, self.clock, self.audit, self.seat.renamed, self._refuse_request)
+        self.people.remember(audit_log)
         self._metrics = metrics
         self._media = media
         self._viewer = viewer
-        self._desk = CommandDesk(self.clock, self.seat.rules)
+        self.speed_cap = SpeedCap(settings.speed_cap)
+        self._desk = CommandDesk(self.clock, self.seat.rules, self.speed_cap)
         self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.drivers, self.peers.observers)
         self._forwarded_at = 0.0  # when the command in flight left
         self._shown_stop = StopState()  # what everyone was told last
@@ -98,11 +109,12 @@ class Console:
 
     async def run(self) -> None:
         """Until cancelled. The peers end before the links: the last thing that leaves is the rest."""
+        self.audit.record("start")
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._guard("feedback", self._fanout.run))
             tasks.create_task(self._guard("seat", self.seat.watch))
             tasks.create_task(self._guard("audit", self.audit.run))
-            tasks.create_task(self._guard("participants", self._share_participants))
+            tasks.create_task(self._guard("participants", self.people.share))
             tasks.create_task(self._guard("robot", self.robot.run))
             try:
                 await asyncio.Event().wait()
@@ -131,7 +143,10 @@ class Console:
         delivered = self.robot.send_stop(stop)
         if not delivered:
             self.peers.tell("session", Notice(level="error", text=UNDELIVERED))
-        self.audit.record("stop", by, where if delivered else f"{where}, not delivered yet", reason)
+        if self.clock.stop.stopped:
+            self.audit.again("stop", by, f"{where}, again")
+        else:
+            self.audit.record("stop", by, where if delivered else f"{where}, not delivered yet", reason)
         log.warning("stop", by=by.name, where=where, reason=reason, delivered=delivered)
         return delivered
 
@@ -171,34 +186,39 @@ class Console:
             if self.robot.description is not None:
                 peer.send("session", self.state_of_robot(self.robot.description))
             peer.send("session", self.seat.message())
-            peer.send("session", self.peers.participants())
-            for note in self.notes:
-                peer.send("session", note)
+            peer.send("session", self.speed_cap.state(time.monotonic()))
+            self.people.welcome(peer)
             if self._audit_trouble:
                 peer.send("session", Notice(level="warning", text=UNWRITTEN.format(self._audit_trouble)))
 
     def message_received(self, peer: Peer, channel: ChannelName, message: ClientMessage) -> None:
+        now = time.monotonic()
         self.seat.heard(peer)
         match message:
             case Command():
-                self._settle(peer, "control", self._desk.command(peer.id, message), command=True)
+                self._settle(peer, "control", self._desk.command(peer.id, message, now), command=True)
             case Rest():
                 self._settle(peer, "control", self._desk.rest(peer.id, message))
             case Ping():
                 peer.send("control", Pong(id=message.id))
             case Stop():
                 self.stop(peer.actor, channel, message.reason)
+            case SeatRelease():
+                self.seat.handle(peer, message)
+            case Note():
+                self.people.write(peer, message.text)
+            case Reset() | SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | Rename() if not peer.asks.take(
+                now
+            ):
+                self._refuse_request(peer, "too_often")
             case Reset():
                 self._reset_by(peer)
-            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatRelease():
+            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake():
                 self.seat.handle(peer, message)
             case Rename():
-                peer.rename(message.name)
-                self._settle_names()
-            case Note():
-                self._write_note(peer, message.text)
-            case _:
-                pass  # a report: the peer keeps it
+                self.people.rename(peer, message.name)
+            case Report():  # the peer keeps it
+                self._report_speed(peer, message)
 
     def input_refused(self, peer: Peer, channel: str, error: ChannelError) -> None:
         self._metrics.bad_input.labels(channel, error.name).inc()
@@ -211,8 +231,7 @@ class Console:
 
     def peer_ended(self, peer: Peer) -> None:
         self.seat.gone(peer)
-        self.notes.forget(peer.id)
-        self.audit.record("left", peer.actor, peer.ended)
+        self.people.left(peer)
 
     # SeatHost
 
@@ -223,9 +242,7 @@ class Console:
             self._metrics.rests.labels(why).inc()
 
     def refuse(self, peer: Peer, refusal: SeatRefusal) -> None:
-        self._refuse(
-            peer, "session", Refusal(event=0, reason=refusal.reason, current=self.clock.event, detail=refusal.detail)
-        )
+        self._refuse_request(peer, refusal.reason, refusal.detail)
 
     # RobotHost
 
@@ -233,6 +250,7 @@ class Console:
         """References of different epochs are never compared: every peer starts anew."""
         self._desk.epoch_ends()
         self.clock.begin(epoch)
+        self.speed_cap.forget()
         self.audit.record("epoch", detail=description.label)
         self._shown_stop = StopState()
         self.peers.end_all("new epoch")
@@ -269,11 +287,14 @@ class Console:
         answered = self._desk.in_flight
         self._desk.feedback(feedback)
         self._fanout.publish(encode_console_message(feedback))
+        self.speed_cap.fed_back(feedback, now)
         if answered is not None and self._desk.in_flight is None:
             self._metrics.robot_turnaround.observe(now - self._forwarded_at)
         self._metrics.feedback.inc()
         self._metrics.event.set(feedback.event)
         self._metrics.stopped.set(feedback.stop.stopped)
+        for limit in feedback.limits:
+            self._metrics.limited.labels(limit).inc()
         if feedback.stop != self._shown_stop:
             self._shown_stop = feedback.stop
             self.peers.tell("stop", StopStateNotice(stop=feedback.stop, event=feedback.event))
@@ -307,6 +328,9 @@ class Console:
         if command:
             self._metrics.commands.labels(type(outcome).__name__.lower()).inc()
 
+    def _refuse_request(self, peer: Peer, reason: RefusalReason, detail: str = "") -> None:
+        self._refuse(peer, "session", Refusal(event=0, reason=reason, current=self.clock.event, detail=detail))
+
     def _refuse(self, peer: Peer, channel: ChannelName, refusal: Refusal) -> None:
         self._metrics.refusals.labels(refusal.reason).inc()
         self.audit.refused(peer.actor, refusal.reason)
@@ -320,6 +344,16 @@ class Console:
             self._forwarded_at = time.monotonic()
         return self.robot.send(message)
 
+    def _report_speed(self, peer: Peer, report: Report) -> None:
+        if not self.seat.rules.holds(peer.id):
+            return
+        now = time.monotonic()
+        self.speed_cap.reported(peer.id, report, now)
+        news = self.speed_cap.news(now)
+        if news is not None:
+            self._metrics.speed_share.set(news.share)
+            self.peers.tell("session", news)
+
     def _reset_by(self, peer: Peer) -> None:
         refusal = Refusal(event=0, reason="not_allowed", current=self.clock.event, detail="observers do not reset")
         if peer.role != "observer":
@@ -329,21 +363,6 @@ class Console:
             except LinkDown as error:
                 refusal = Refusal(event=0, reason="link_down", current=self.clock.event, detail=error.detail[:500])
         self._refuse(peer, "stop", refusal)
-
-    def _settle_names(self) -> None:
-        changed = self.peers.settle_names()
-        if any(self.seat.concerns(peer) for peer in changed):
-            self.peers.tell("session", self.seat.message())
-
-    def _write_note(self, peer: Peer, text: str) -> None:
-        note = self.notes.write(
-            peer.id, peer.name, peer.role, text, self.clock.epoch, self.clock.event, time.monotonic(), time.time()
-        )
-        if isinstance(note, SharedNote):
-            self.audit.record("note", peer.actor, detail=note.text)
-            self.peers.tell("session", note)
-        else:
-            self._refuse(peer, "session", Refusal(event=0, reason=note, current=self.clock.event, detail="note"))
 
     # background tasks
 
@@ -356,13 +375,3 @@ class Console:
                 self._metrics.internal_errors.labels(name).inc()
                 log.exception("background task failed", task=name)
             await asyncio.sleep(RESTART_AFTER)
-
-    async def _share_participants(self) -> None:
-        shown = Participants(participants=[])
-        while True:
-            await asyncio.sleep(max(1.0, len(self.peers) / CROWD))
-            self._settle_names()  # somebody may have left whose name others wanted
-            current = self.peers.participants()
-            if current != shown:
-                shown = current
-                self.peers.tell("session", current)

@@ -1,5 +1,6 @@
 """The invitations on disk. Several processes change them: consoles, and `lockstep invite` and `revoke` beside them."""
 
+import threading
 import time
 from collections.abc import Callable
 from typing import TypeVar
@@ -31,6 +32,7 @@ class InvitationStore:
 
     def __init__(self, directory: StateDir) -> None:
         self._directory = directory
+        self._busy = threading.Lock()
         self._version = directory.version(FILE)
         self._known = self._read()
         self._revoked = self._known.revoked()
@@ -45,7 +47,7 @@ class InvitationStore:
 
     def update(self, change: Callable[[Invitations], Result]) -> Result:
         """Applies `change` to what is on disk now and writes it back; nothing is written when it raises."""
-        with self._directory.locked():
+        with self._busy, self._directory.locked():
             known = self._read()
             result = change(known)
             known.prune(time.time())
@@ -54,18 +56,26 @@ class InvitationStore:
             self._take(known, self._directory.version(FILE))
         return result
 
-    def refresh(self) -> bool:
-        """Whether somebody changed the file. While it cannot be read, what is known stands."""
+    def refresh(self) -> list[Invitation]:
+        """What another process has added or revoked since. While the file cannot be read, what is known stands."""
+        if not self._busy.acquire(blocking=False):
+            return []  # our own change is under way in a thread
         try:
-            version = self._directory.version(FILE)
-            if version is None or version == self._version:
-                return False
-            self._version = version
-            self._take(self._read(), version)
+            return self._refresh()
         except StateDirUnusable as error:
             log.error("the invitations cannot be read; the known ones stand", detail=str(error))
-            return False
-        return True
+            return []
+        finally:
+            self._busy.release()
+
+    def _refresh(self) -> list[Invitation]:
+        version = self._directory.version(FILE)
+        if version is None or version == self._version:
+            return []
+        self._version = version
+        before = {(each.id, each.revoked_at) for each in self._known.all}
+        self._take(self._read(), version)
+        return [each for each in self._known.all if (each.id, each.revoked_at) not in before]
 
     def _take(self, known: Invitations, version: tuple[int, int] | None) -> None:
         self._version = version

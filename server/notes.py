@@ -8,6 +8,7 @@ from robot_bridge.protocol.messages import RefusalReason
 from robot_bridge.protocol.serial import FIRST_EVENT
 from server.audit import AuditRecord
 from server.names import printable
+from server.token_bucket import TokenBucket
 
 __all__ = ["NoteBoard"]
 
@@ -19,30 +20,14 @@ BOARD_BURST = 20.0  # of all peers together: every note goes to everyone
 BOARD_RATE = 4.0
 
 
-class _Bucket:
-    """Token bucket, full at first."""
-
-    def __init__(self, rate: float, burst: float, now: float) -> None:
-        self._rate, self._burst = rate, burst
-        self._level, self._at = burst, now
-
-    def level(self, now: float) -> float:
-        self._level = min(self._burst, self._level + (now - self._at) * self._rate)
-        self._at = now
-        return self._level
-
-    def spend(self) -> None:
-        self._level -= 1
-
-
 class NoteBoard:
     """`now` is monotonic seconds, `clock` seconds since 1970; both are handed in."""
 
     def __init__(self, now: float) -> None:
         self._kept: deque[SharedNote] = deque(maxlen=KEPT)
         self._next_id = 1
-        self._all = _Bucket(BOARD_RATE, BOARD_BURST, now)
-        self._peers: dict[str, _Bucket] = {}
+        self._all = TokenBucket(BOARD_RATE, BOARD_BURST, now)
+        self._peers: dict[str, TokenBucket] = {}
 
     def remember(self, record: AuditRecord) -> None:
         """A note of an earlier run, from the audit log."""
@@ -68,11 +53,10 @@ class NoteBoard:
         text = printable(text)
         if not text:
             return "malformed"
-        mine = self._peers.setdefault(peer, _Bucket(PEER_RATE, BURST, now))
-        if mine.level(now) < 1 or self._all.level(now) < 1:
+        mine = self._peers.setdefault(peer, TokenBucket(PEER_RATE, BURST, now))
+        if not mine.has(now) or not self._all.take(now):
             return "too_often"
-        mine.spend()
-        self._all.spend()
+        mine.take(now)
         return self._keep(peer, name, role, text, epoch, event, round(clock, 3))
 
     def _keep(self, peer: str, name: str, role: Role, text: str, epoch: str, event: int, clock: float) -> SharedNote:

@@ -28,11 +28,14 @@ from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
 from server.ice_restart_private import IceSession
 from server.names import clean_name
 from server.rate_limits import RateLimits
+from server.token_bucket import TokenBucket
 
 __all__ = ["Peer", "PeerHost", "PeerLimits", "PeerStreams"]
 
 log = structlog.get_logger(__name__)
 
+ASK_RATE = 2.0  # Hz, of requests that everyone is told of: seat, name, reset
+ASK_BURST = 10.0
 CLOSE_TIMEOUT = 5.0  # s; aiortc says goodbye to the remote, which may not answer
 FORGIVEN_RATE = 2.0  # Hz, of bad messages
 MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
@@ -113,6 +116,7 @@ class Peer:
         self._budget = MessageBudget(rate, self._loop.time())
         self._patience = RateLimits(FORGIVEN_RATE, limits.max_bad_messages)
         self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
+        self.asks = TokenBucket(ASK_RATE, ASK_BURST, self._loop.time())  # for what concerns everybody
         self._heard_at = self._loop.time()
         self._connected = asyncio.Event()
         self._end = asyncio.Event()
@@ -134,6 +138,7 @@ class Peer:
         return self._media.streams
 
     async def run(self) -> None:
+        structlog.contextvars.bind_contextvars(peer=self.id)
         try:
             await self._wait_until_connected()
             await self._wait_until_ended()

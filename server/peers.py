@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
@@ -38,8 +38,9 @@ class PeersLimits(Protocol):
 class Peers:
     """At most `max_peers` peers. Each runs in a task that this object owns; `close` waits for all of them."""
 
-    def __init__(self, limits: PeersLimits, metrics: Metrics) -> None:
+    def __init__(self, limits: PeersLimits, metrics: Metrics, joined: Callable[[Peer], None]) -> None:
         self._limits = limits
+        self._joined = joined
         self._metrics = metrics
         self._sessions: dict[Peer, asyncio.Task[None]] = {}
         self._reserved: Counter[str] = Counter()  # places of peers that are being negotiated, by token
@@ -106,6 +107,7 @@ class Peers:
         self._sessions[peer] = task
         self.settle_names()
         self._metrics.peers.labels(peer.role).inc()
+        self._joined(peer)
         log.info("peer joined", peer=peer.id, role=peer.role, name=peer.name)
 
     def by_id(self, peer_id: str) -> Peer | None:

@@ -58,10 +58,10 @@ async def stream(websocket: WebSocket, ticket: str) -> None:
     here = services(websocket)
     try:
         check_origin(websocket.headers, here.settings.allowed_origins)
-        here.access.verify_ticket(ticket)
+        link = here.access.verify_ticket(ticket)
         scene = here.scene_or_error()
         with scene.viewer():
-            await _join(websocket, scene, _subprotocols(websocket))
+            await _join(websocket, scene, link)
     except ConsoleError as error:
         here.metrics.bad_input.labels("scene", type(error).__name__).inc()
         await websocket.close(POLICY_VIOLATION)
@@ -86,7 +86,8 @@ def _subprotocols(websocket: WebSocket) -> list[Subprotocol]:
     return [Subprotocol(each) for each in offered if each.startswith("viser-v")][:1]
 
 
-async def _join(websocket: WebSocket, scene: SceneView, subprotocols: list[Subprotocol]) -> None:
+async def _join(websocket: WebSocket, scene: SceneView, link: str) -> None:
+    subprotocols = _subprotocols(websocket)
     try:
         upstream = await connect(
             f"ws://127.0.0.1:{scene.port}/",
@@ -106,12 +107,15 @@ async def _join(websocket: WebSocket, scene: SceneView, subprotocols: list[Subpr
         await websocket.accept(subprotocol=upstream.subprotocol)
         up = asyncio.create_task(_viewer_to_scene(websocket, upstream))
         down = asyncio.create_task(_scene_to_viewer(websocket, upstream))
+        revoked = asyncio.create_task(services(websocket).warden.revoked(link))
         try:
-            await asyncio.wait((up, down), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((up, down, revoked), return_when=asyncio.FIRST_COMPLETED)
+            if revoked.done():
+                await websocket.close(POLICY_VIOLATION)
         finally:
-            for task in (up, down):
+            for task in (up, down, revoked):
                 task.cancel()
-            await asyncio.gather(up, down, return_exceptions=True)
+            await asyncio.gather(up, down, revoked, return_exceptions=True)
 
 
 async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> None:

@@ -239,7 +239,7 @@ class ControlSeat:
     def _seat(self, peer: str, what: SeatInput, now: float) -> SeatOutcome:
         """`peer`, or nobody, holds the seat from now on."""
         rest = bool(self.holder)
-        self.holder, self.why = peer, what.value
+        self.holder, self.why = peer, (SeatInput.REQUEST if what is SeatInput.REQUEST_IF_FREE else what).value
         self._heard_at = self._moved_at = now
         self._counting = self._proven = False
         self._claims.pop(peer, None)

@@ -82,9 +82,10 @@ class SeatKeeper:
     def gone(self, peer: Peer) -> None:
         self._act(self.rules.gone(peer.id, time.monotonic()), peer)
 
-    def concerns(self, peer: Peer) -> bool:
-        """Whether the seat's message names `peer`."""
-        return self.rules.standing(peer.id) in (Standing.HOLDER, Standing.CLAIMANT)
+    def renamed(self, peers: list[Peer]) -> None:
+        """Tell everyone, if the seat's message names one of `peers`."""
+        if any(self.rules.standing(peer.id) in (Standing.HOLDER, Standing.CLAIMANT) for peer in peers):
+            self._peers.tell("session", self.message())
 
     async def watch(self) -> None:
         """Until cancelled."""

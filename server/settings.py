@@ -8,9 +8,11 @@ from urllib.parse import urlsplit
 from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import SettingsConfigDict
 
+from robot_bridge.protocol.console import SpeedCapMode
 from robot_bridge.protocol.errors import SecretError
 from server.limit_settings import LimitSettings
 from server.link_access import link_access
+from server.logs import LogFormat
 from server.media.settings import MediaSettings
 from server.network_settings import NameList, NetworkSettings
 
@@ -34,6 +36,7 @@ class Settings(NetworkSettings, LimitSettings):
     link_tls_ca: Path | None = None  # signed the bridge's certificate; None: one that this machine trusts
     ice_hosts: NameList = ()  # addresses offered to peers; empty: all interfaces, and loopback when bound to it
     allowed_origins: NameList = ()  # other origins whose pages may use the HTTP API, "https://example.org"
+    log_format: LogFormat = LogFormat.TEXT
     state_dir: Path | None = None  # signing key, invitations, audit log; None: ~/.local/state/lockstep
     secret: SecretStr | None = None  # signs the links; None: a key in the state directory
     token_seconds: Annotated[float, Field(gt=0)] = 7 * 24 * 3600.0
@@ -44,6 +47,7 @@ class Settings(NetworkSettings, LimitSettings):
     seat_timeout: Annotated[float, Field(gt=0)] = 3.0  # of silence, then the seat is free and the robot rests
     seat_idle_seconds: Annotated[float, Field(gt=0)] = 300.0  # without an intention to move, then the seat is free
     seat_claim_seconds: Annotated[float, Field(gt=0)] = 60.0  # until a claim on the seat counts as declined
+    speed_cap: SpeedCapMode = "operator"  # whether the speed is capped by the delay of what the operator sees
     peer_silence: Annotated[float, Field(gt=0)] = 20.0  # a peer with data channels that says nothing is closed
     peer_connect_timeout: Annotated[float, Field(gt=0)] = 15.0  # from the answer to the connection
     max_peers: Annotated[int, Field(ge=1)] = 200

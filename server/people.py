@@ -1,0 +1,95 @@
+"""The people on the console: who is here, what they are called, and what they write to each other."""
+
+import asyncio
+import time
+from collections.abc import Callable, Iterable
+
+from robot_bridge.protocol.console import Participants, SharedNote
+from robot_bridge.protocol.messages import RefusalReason
+from server.audit import AuditRecord
+from server.audit_trail import AuditTrail
+from server.event_clock import EventClock
+from server.notes import NoteBoard
+from server.peer import Peer
+from server.peers import Peers
+
+__all__ = ["People"]
+
+CROWD = 10  # peers; the list of participants goes out at most once a second, ten times more rarely to 100
+
+
+class People:
+    """Run `share` as a task. All else is called on the loop and returns at once.
+
+    Args:
+        renamed: called with those whose name is another one now
+        refuse: tells a peer that something was refused
+    """
+
+    def __init__(
+        self,
+        peers: Peers,
+        clock: EventClock,
+        audit: AuditTrail,
+        renamed: Callable[[list[Peer]], None],
+        refuse: Callable[[Peer, RefusalReason, str], None],
+    ) -> None:
+        self._peers = peers
+        self._clock = clock
+        self._audit = audit
+        self._renamed = renamed
+        self._refuse = refuse
+        self._board = NoteBoard(time.monotonic())
+
+    def remember(self, records: Iterable[AuditRecord]) -> None:
+        """The notes of earlier runs, from the audit log."""
+        for record in records:
+            self._board.remember(record)
+
+    def joined(self, peer: Peer) -> None:
+        self._audit.record("joined", peer.actor, ", ".join(sorted({stream.carrier for stream in peer.streams})))
+
+    def left(self, peer: Peer) -> None:
+        self._board.forget(peer.id)
+        self._audit.record("left", peer.actor, peer.ended)
+
+    def welcome(self, peer: Peer) -> None:
+        """Tell a newcomer who is here and what was written."""
+        peer.send("session", self._peers.participants())
+        for note in self._board:
+            peer.send("session", note)
+
+    def rename(self, peer: Peer, name: str) -> None:
+        before = peer.name
+        peer.rename(name)
+        self.settle_names()
+        if peer.name != before:
+            self._audit.record("renamed", peer.actor, detail=f"was {before}")
+
+    def settle_names(self) -> None:
+        """No two are called the same; who leaves makes room."""
+        changed = self._peers.settle_names()
+        if changed:
+            self._renamed(changed)
+
+    def write(self, peer: Peer, text: str) -> None:
+        """A note to everyone."""
+        note = self._board.write(
+            peer.id, peer.name, peer.role, text, self._clock.epoch, self._clock.event, time.monotonic(), time.time()
+        )
+        if isinstance(note, SharedNote):
+            self._audit.record("note", peer.actor, detail=note.text)
+            self._peers.tell("session", note)
+        else:
+            self._refuse(peer, note, "note")
+
+    async def share(self) -> None:
+        """Until cancelled: the list of participants, when it changed."""
+        shown = Participants(participants=[])
+        while True:
+            await asyncio.sleep(max(1.0, len(self._peers) / CROWD))
+            self.settle_names()
+            current = self._peers.participants()
+            if current != shown:
+                shown = current
+                self._peers.tell("session", current)

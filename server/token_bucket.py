@@ -1,0 +1,26 @@
+"""How often something may be done. No I/O, no clock."""
+
+__all__ = ["TokenBucket"]
+
+
+class TokenBucket:
+    """`burst` times at once, then `rate` times a second; full at first."""
+
+    def __init__(self, rate: float, burst: float, now: float) -> None:
+        self._rate = rate
+        self._burst = burst
+        self._level = burst
+        self._at = now
+
+    def has(self, now: float) -> bool:
+        """Whether `take` would succeed."""
+        self._level = min(self._burst, self._level + (now - self._at) * self._rate)
+        self._at = now
+        return self._level >= 1
+
+    def take(self, now: float) -> bool:
+        """Whether it may be done now; then it counts."""
+        if not self.has(now):
+            return False
+        self._level -= 1
+        return True
