@@ -50,12 +50,14 @@ class Stack:
     @contextmanager
     def frozen_bridge(self) -> Iterator[None]:
         """The bridge's process does not run inside the block."""
-        pid = self.bridge_pid()
-        os.kill(pid, signal.SIGSTOP)
-        try:
+        with _frozen(self.bridge_pid()):
             yield
-        finally:
-            os.kill(pid, signal.SIGCONT)
+
+    @contextmanager
+    def frozen_console(self) -> Iterator[None]:
+        """The console's process does not run inside the block."""
+        with _frozen(self.process.pid):
+            yield
 
     def events(self, kind: str) -> Iterator[dict[str, Any]]:
         """The bridge's records of one kind so far."""
@@ -63,6 +65,15 @@ class Stack:
             record = json.loads(line)
             if record["kind"] == kind:
                 yield record
+
+
+@contextmanager
+def _frozen(pid: int) -> Iterator[None]:
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
 
 
 @asynccontextmanager

@@ -1,0 +1,94 @@
+"""A connection that falls silent is shown as silent, and resumes without a reload; nothing is executed twice."""
+
+import re
+
+import pytest
+from playwright.async_api import Browser, expect
+
+from tests.e2e.console_page import LEFT_Y, RB, ConsolePage, open_console
+from tests.support.movable_path import movable_path
+from tests.support.stack import Stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+
+async def _let_go(console: ConsolePage) -> None:
+    await console.press(RB, False)
+    await console.tilt(LEFT_Y, 0)
+
+
+async def _drives_again(console: ConsolePage, stack: Stack) -> None:
+    """The seat is back by itself, and the operator arms and drives; the bridge's log has nothing twice."""
+    await _let_go(console)
+    await console.until("s.connected && s.at_rest === true && s.seat && s.seat.mine")
+    await console.arm()
+    await console.drive_forward()
+    event = (await console.stats())["event"]
+    await console.until(f"s.event > {event + 5}")
+    statistics = await console.stats()
+    assert all(stream["violations"] == 0 for stream in statistics["streams"].values())
+    assert await console.page.evaluate("window.notReloaded")
+    executed = [record["event"] for record in stack.events("executed")]
+    assert len(executed) == len(set(executed)), "an event was executed twice"
+    await _let_go(console)
+
+
+async def test_a_silent_console_is_called_silent_and_what_it_measured_last_is_shown_as_old(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        page = console.page
+        await console.until_live()
+        await page.evaluate("window.notReloaded = true")
+        await console.arm()
+        await console.drive_forward()
+        peer = (await console.stats())["peer"]
+        with stack.frozen_console():
+            await expect(page.locator(".bar .chip", has_text="Console")).to_contain_text("silent")
+            await expect(page.locator(".plate-title", has_text="Console silent")).to_be_visible()
+            await expect(page.locator(".console")).to_have_attribute("data-stale", "true")
+            await expect(page.locator(".axis-panel .stale-mark")).to_have_text(re.compile(r"[3-9] s old"))
+            assert await page.locator(".axes").evaluate("(axes) => Number(getComputedStyle(axes).opacity) < 0.6")
+        await expect(page.locator(".console")).to_have_attribute("data-stale", "false")
+        await expect(page.locator(".plate-title", has_text="Console silent")).to_be_hidden()
+        # The seat went with the silence; its loss and its return are still on their way.
+        await console.until("s.seat && s.seat.mine && s.at_rest === true")
+        assert (await console.stats())["peer"] == peer, "the same connection goes on"
+        await expect(page.locator(".seat")).to_contain_text("You have control")
+
+
+async def test_a_dead_path_is_left_by_an_ice_restart_and_the_same_connection_goes_on(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, "about:blank") as console, movable_path(console.page) as path:
+        await console.page.goto(stack.operator)
+        await console.until_live()
+        await console.page.evaluate("window.notReloaded = true")
+        await console.arm()
+        await console.drive_forward()
+        before = await console.stats()
+        path.cut()
+        await console.until("!s.armed")
+        await console.until(f"s.connected && s.streams.overview.stamp > {before['event']}")
+        assert path.restarts == [200]
+        after = await console.stats()
+        assert (after["peer"], after["epoch"]) == (before["peer"], before["epoch"])
+        await _drives_again(console, stack)
+
+
+async def test_a_restart_that_is_refused_becomes_a_new_connection_at_the_present_event(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, "about:blank") as console, movable_path(console.page) as path:
+        await console.page.goto(stack.operator)
+        await console.until_live()
+        await console.page.evaluate("window.notReloaded = true")
+        await console.arm()
+        await console.drive_forward()
+        before = await console.stats()
+        path.refuses_restarts = True
+        path.cut()
+        await console.until(f"s.connected && s.peer !== {before['peer']!r} && s.event >= {before['event']}")
+        assert path.restarts == [422]
+        assert (await console.stats())["epoch"] == before["epoch"]
+        await _drives_again(console, stack)
