@@ -300,12 +300,13 @@ class Connection:
         )
 
     def _report(self) -> Report:
-        pilot, delays, round_trip = self.driver.pilot, self.driver.picture_delay.samples, self._pings.round_trip
+        pilot, round_trip = self.driver.pilot, self._pings.round_trip
+        delay = self.driver.picture_delay.known(asyncio.get_running_loop().time())
         return Report(
             event=pilot.newest.event if pilot.newest is not None else 0,
             armed=pilot.armed,
             streams=[stream.report() for stream in self.media.statistics()],
-            picture_delay_ms=delays[-1] * 1000 if delays else None,
+            picture_delay_ms=delay * 1000 if delay is not None else None,
             round_trip_ms=round_trip * 1000 if round_trip is not None else None,
         )
 

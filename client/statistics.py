@@ -13,6 +13,7 @@ from robot_bridge.protocol.serial import event_gap
 __all__ = ["ConsoleStatistics", "EventRate", "Percentiles", "PictureDelay", "StreamStatistics", "percentiles"]
 
 RATE_WINDOW = 5.0  # s
+FORGOTTEN = 3.0  # s after which a picture says nothing about the delay of now
 
 
 class Percentiles(msgspec.Struct, frozen=True, kw_only=True):
@@ -125,6 +126,7 @@ class PictureDelay:
     def __init__(self) -> None:
         self.samples: deque[float] = deque(maxlen=1024)  # s
         self._waiting: deque[tuple[int, float]] = deque(maxlen=256)
+        self._shown_at = float("-inf")
 
     def sent(self, event: int, now: float) -> None:
         """Command `event` left for the first time."""
@@ -135,3 +137,11 @@ class PictureDelay:
         while self._waiting and event_gap(stamp, self._waiting[0][0]) >= 0:
             _, sent_at = self._waiting.popleft()
             self.samples.append(now - sent_at)
+            self._shown_at = now
+
+    def known(self, now: float) -> float | None:
+        """s, as it is now; None when nothing tells. The wait for a picture that does not come counts too."""
+        if now - self._shown_at > FORGOTTEN:
+            return None
+        waited = now - self._waiting[0][1] if self._waiting else 0.0
+        return max(self.samples[-1], waited)

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 import shutil
 import sys
 from collections.abc import Callable
@@ -33,11 +34,15 @@ class BridgeProcess:
     It keeps the port of its first run, so that the robot link finds it again.
     """
 
-    def __init__(self, robot: str, host: str, port: int, options: list[str], say: Callable[[str], None]) -> None:
+    def __init__(
+        self, robot: str, host: str, port: int, options: list[str], secret: str, say: Callable[[str], None]
+    ) -> None:
+        """`secret`: of the robot link; an environment variable takes it there, which other users cannot read."""
         self._robot = robot
         self._host = host
         self._port = port
         self._options = options
+        self._environment = {**os.environ, "LOCKSTEP_LINK_SECRET": secret}
         self._say = say
         self._process: asyncio.subprocess.Process | None = None
         self._backoff = Backoff(0.5, 10.0)
@@ -60,6 +65,7 @@ class BridgeProcess:
             stdout=asyncio.subprocess.PIPE,
             limit=MAX_LINE,
             start_new_session=True,
+            env=self._environment,
         )
         try:
             address = await self._read_address(self._process)

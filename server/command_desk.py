@@ -17,7 +17,7 @@ What happens to a command, in this order:
 | its event is the one in flight, and is the sender's own | absorbed |
 | not the next event, or something is in flight | refused `out_of_order` |
 | it moves, and the sender has sent no neutral command since it got the seat | refused `not_neutral` |
-| else | clamped, forwarded |
+| else | clamped to the axes' ranges and the speed cap, forwarded |
 
 A repeat of somebody else's event is not answered: after a hand-over the new holder would take the old one's
 execution for its own.
@@ -33,6 +33,7 @@ from robot_bridge.protocol.messages import Command, Feedback, Refusal, RefusalRe
 from robot_bridge.protocol.serial import event_after, is_newer
 from server.event_clock import EventClock
 from server.seat import ControlSeat
+from server.speed_cap import SpeedCap, within_share
 
 __all__ = ["Absorbed", "Answer", "CommandDesk", "Forward", "Outcome", "Refuse"]
 
@@ -67,9 +68,10 @@ Outcome = Forward | Answer | Refuse | Absorbed
 class CommandDesk:
     """Call `link_up` before anything is forwarded, `link_down` when the link ends, and show it all the bridge says."""
 
-    def __init__(self, clock: EventClock, seat: ControlSeat) -> None:
+    def __init__(self, clock: EventClock, seat: ControlSeat, speed_cap: SpeedCap | None = None) -> None:
         self._clock = clock
         self._seat = seat
+        self._speed_cap = speed_cap or SpeedCap("off")
         self._description: RobotDescription | None = None
         self._link_is_up = False
         self._in_flight: Command | None = None
@@ -101,7 +103,8 @@ class CommandDesk:
         self._link_is_up = False
         self._forget()
 
-    def command(self, peer: str, command: Command) -> Outcome:
+    def command(self, peer: str, command: Command, now: float = math.inf) -> Outcome:
+        """Without `now` nothing that was measured counts any more, and a speed cap in force is at its lowest."""
         description, feedback = self._description, self._clock.feedback
         if not self._seat.holds(peer):
             return self._refuse(command, "no_seat")
@@ -120,11 +123,12 @@ class CommandDesk:
             return Absorbed()
         if self._in_flight is not None or command.event != event_after(feedback.event):
             return self._refuse(command, "out_of_order")
+        self._speed_cap.answered(peer, feedback.event, command, now)
         if not self.moves(command):
             self._seat.neutral(peer)
         elif not self._seat.may_move(peer):
             return self._refuse(command, "not_neutral", "send a neutral command first")
-        self._in_flight = self._clamped(command, description)
+        self._in_flight = self._clamped(command, description, self._speed_cap.share(now))
         self._sender, self._sent_event = peer, command.event
         return Forward(self._in_flight)
 
@@ -190,10 +194,9 @@ class CommandDesk:
         self._resting = rest
         return Forward(rest)
 
-    def _clamped(self, command: Command, description: RobotDescription) -> Command:
+    def _clamped(self, command: Command, description: RobotDescription, share: float) -> Command:
         values = [
-            min(max(value, axis.minimum), axis.maximum)
-            for value, axis in zip(command.values, description.axes, strict=True)
+            within_share(axis, value, share) for value, axis in zip(command.values, description.axes, strict=True)
         ]
         return msgspec.structs.replace(command, values=values)
 

@@ -11,6 +11,7 @@ from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.errors import LinkError, LinkLost
 from robot_bridge.protocol.messages import LinkMessage, LinkRole
 from server.backoff import Backoff
+from server.link_access import LinkAccess
 
 __all__ = ["LinkKeeper", "LinkSink"]
 
@@ -28,7 +29,10 @@ class LinkSink(Protocol):
 
 
 class LinkKeeper:
-    def __init__(self, host: str, port: int, role: LinkRole, sink: LinkSink, backoff: Backoff) -> None:
+    def __init__(
+        self, host: str, port: int, role: LinkRole, sink: LinkSink, backoff: Backoff, access: LinkAccess
+    ) -> None:
+        self._access = access
         self._host = host
         self._port = port
         self._role: LinkRole = role
@@ -69,7 +73,8 @@ class LinkKeeper:
 
     async def _once(self) -> None:
         loop = asyncio.get_running_loop()
-        async with RobotLink(self._host, self._port, self._role, name="console") as link:
+        secret, tls = self._access
+        async with RobotLink(self._host, self._port, self._role, name="console", secret=secret, tls=tls) as link:
             hello, since = link.hello, loop.time()
             if hello.description is None:
                 raise LinkLost("the bridge sent no description")

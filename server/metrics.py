@@ -33,6 +33,14 @@ class Metrics:
         self.link_up = Gauge("lockstep_robot_link_up", "1 while the robot link is up", registry=registry)
         self.link_losses = Counter("lockstep_robot_link_losses", "Times the robot link went down", registry=registry)
         self.event = Gauge("lockstep_event", "Event reference", registry=registry)
+        self.speed_share = Gauge("lockstep_speed_share", "Share of full speed that the cap permits", registry=registry)
+        self.speed_share.set(1)
+        self.limited = Counter(
+            "lockstep_limited_feedback",
+            "Feedback in which a limit or geofence slowed the robot",
+            ["limit"],
+            registry=registry,
+        )
         self.stopped = Gauge("lockstep_stopped", "1 while the robot is stopped", registry=registry)
         self.audit_failing = Gauge("lockstep_audit_failing", "1 while the log cannot be written", registry=registry)
         self.audit_lost = Counter("lockstep_audit_lost", "Audit records that were never written", registry=registry)

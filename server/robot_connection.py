@@ -10,6 +10,7 @@ import structlog
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback, LinkMessage, LinkRole, Media, Refusal, Reset, Rest, Stop
 from server.backoff import Backoff
+from server.link_access import LinkSettings, link_access
 from server.link_keeper import LinkKeeper
 
 __all__ = ["RobotConnection", "RobotHost", "RobotSettings"]
@@ -19,7 +20,7 @@ log = structlog.get_logger(__name__)
 _ROLES: tuple[LinkRole, ...] = ("operator", "media")
 
 
-class RobotSettings(Protocol):
+class RobotSettings(LinkSettings, Protocol):
     @property
     def robot_host(self) -> str: ...
     @property
@@ -58,6 +59,7 @@ class RobotConnection:
         self.detail = "not connected yet"
         self._host = host
         self._epochs: dict[LinkRole, str] = {}  # of each link, open now or last
+        access = link_access(settings)
         self._keepers = {
             role: LinkKeeper(
                 settings.robot_host,
@@ -65,6 +67,7 @@ class RobotConnection:
                 role,
                 self,
                 Backoff(settings.link_backoff, settings.link_backoff_cap, random.Random()),
+                access,
             )
             for role in _ROLES
         }

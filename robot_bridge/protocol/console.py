@@ -8,7 +8,7 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 | control | unordered, 0 retransmits | client | command, rest, report, ping |
 | | | server | feedback, refusal, pong |
 | session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
-| | | server | welcome, robot, seat, participants, quality, note_shared, notice, refusal |
+| | | server | welcome, robot, seat, participants, quality, speed_cap, note_shared, notice, refusal |
 | stop | reliable | client | stop, reset |
 | | | server | stop_state, refusal |
 """
@@ -53,6 +53,8 @@ __all__ = [
     "SeatTake",
     "ServerMessage",
     "SharedNote",
+    "SpeedCapMode",
+    "SpeedCapState",
     "StopStateNotice",
     "StreamInfo",
     "StreamQuality",
@@ -65,6 +67,7 @@ __all__ = [
 ]
 
 Role = Literal["operator", "observer", "supervisor"]
+SpeedCapMode = Literal["on", "off", "operator"]  # the console's setting; "operator": as the holder of the seat wants
 Tier = Literal["operator", "high", "low"]  # of the encoded media: the operator's own, and the observers' two
 Name = Annotated[str, msgspec.Meta(max_length=60)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
@@ -92,8 +95,9 @@ class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="r
     event: Annotated[int, msgspec.Meta(ge=0)] = 0  # newest feedback; 0 before the first
     armed: bool = False
     streams: Annotated[list[StreamReport], msgspec.Meta(max_length=MAX_STREAMS)] = []
-    picture_delay_ms: float | None = None  # command to picture, on the client's own clock
+    picture_delay_ms: float | None = None  # command to picture, on the client's own clock; None: not known now
     round_trip_ms: float | None = None
+    speed_cap: bool = False  # whether the operator wants the speed capped by the delay
 
 
 class SeatRequest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_request"):
@@ -214,6 +218,16 @@ class Quality(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
     reason: str = ""  # "loss", "gap", "bandwidth", "round trip", "" when nothing limits
 
 
+class SpeedCapState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="speed_cap"):
+    """Whether and how far the console caps the speed for the delay; sent to newcomers and when it changes."""
+
+    mode: SpeedCapMode
+    holds: bool = False  # whether the cap is in force
+    share: float = 1.0  # of each axis' full speed that may be used
+    delay_ms: float | None = None  # that it goes by; None: not known, or the cap is not in force
+    why: Literal["", "delay", "unknown"] = ""  # why the share is below 1
+
+
 class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note_shared"):
     """A note that somebody wrote, with the event it belongs to. Newcomers get the last ones."""
 
@@ -269,6 +283,7 @@ ServerMessage = (
     | Seat
     | Participants
     | Quality
+    | SpeedCapState
     | SharedNote
     | Notice
     | StopStateNotice

@@ -69,3 +69,15 @@ def test_the_names_are_those_of_the_page() -> None:
     names = set(msgspec.to_builtins(ConsoleStatistics()))
     page = {"peer", "event", "epoch", "armed", "streams", "picture_delay_ms", "round_trip_ms", "event_rate"}
     assert page | {"command_to_feedback_ms", "bad_messages", "picture_delay_p50_ms", "picture_delay_p95_ms"} <= names
+
+
+def test_the_picture_delay_of_now_counts_the_wait_and_is_forgotten() -> None:
+    delay = PictureDelay()
+    assert delay.known(0.0) is None
+    delay.sent(2, 0.0)
+    delay.shown(2, 0.03)
+    assert delay.known(0.1) == pytest.approx(0.03)
+    delay.sent(3, 1.0)
+    assert delay.known(1.8) == pytest.approx(0.8)
+    assert delay.known(3.03) is not None
+    assert delay.known(3.04) is None

@@ -11,11 +11,12 @@ import {
   note,
   robotIsUp,
 } from "./core/console_state";
-import { forceOf, speedShare } from "./core/contact";
+import { forceOf } from "./core/contact";
+import { capHolds, cappedShare, viewDelay } from "./core/speed_cap";
 import { STALE_MS } from "./core/freshness";
 import { notePicture } from "./core/latency";
 import { noteShown } from "./core/command_gate";
-import { createRateMeter, noteHappening, quantile, rateOf } from "./core/samples";
+import { createRateMeter, noteHappening, rateOf } from "./core/samples";
 import { parseServerMessage } from "./core/wire_parser";
 import { ARM_REFUSAL_WORDS } from "./core/words";
 import { Controls, type ControlSample } from "./input/controls";
@@ -61,6 +62,8 @@ export class ConsoleApp {
   driver: driver.Driver | null = null;
   layer = 0;
   values: readonly number[] = []; // commanded now
+  viewDelayMs: number | null = null; // how late the pictures are now; null: not known
+  speedShare = 1; // of full speed that the cap leaves
   force = 0; // N
   firstPictureMs: number | null = null;
   private readonly reader = StampReader.isSupported() ? new StampReader() : null;
@@ -328,6 +331,7 @@ export class ConsoleApp {
     const lost = arming.lostCondition(this.conditions(now));
     if (lost !== null) this.disarm(lost);
     const change = arming.sampleDeadman(this.arming, sample.deadman, sample.signature, now);
+    this.capSpeed(now);
     this.takeValues(sample);
     if (this.driver !== null && change === "released") driver.driverRelease(this.driver, now);
     if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
@@ -346,10 +350,20 @@ export class ConsoleApp {
     if (description === undefined) this.values = [];
     else if (this.arming.state !== "driving") this.values = restValues(description.axes);
     else {
-      const delay = this.driver === null ? null : quantile(this.driver.latency.toPicture, 0.5);
-      const share = sample.slowShare * (this.state.settings.speedCap ? speedShare(delay) : 1);
+      const share = sample.slowShare * this.speedShare;
       this.values = axisValues(description.axes, description.layers[this.layer], sample.held, share);
     }
+  }
+
+  /** The console learns at once when the delay becomes known: until then it keeps the robot slow. */
+  private capSpeed(now: number): void {
+    const { state } = this;
+    const delay = this.driver === null ? null : viewDelay(this.driver.latency, now);
+    const wasKnown = this.viewDelayMs !== null;
+    this.viewDelayMs = delay;
+    this.speedShare = this.isArmed() ? cappedShare(state.speedCap, state.settings.speedCap, delay) : 1;
+    if (!wasKnown && delay !== null && capHolds(state.speedCap, state.settings.speedCap))
+      this.tell("control", reportOf(this));
   }
 
   private drive(now: number): void {

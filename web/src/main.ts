@@ -8,6 +8,7 @@ import "./style/sheets.css";
 import "./style/small_screens.css";
 import "./style/charts.css";
 import "./style/staleness.css";
+import "./style/limits.css";
 import { readFragment } from "./core/fragment";
 import { installHook } from "./lockstep_hook";
 import { Page } from "./page";

@@ -21,6 +21,7 @@ import { createEventPanel } from "./ui/event_panel";
 import { createForceGauge } from "./ui/force_gauge";
 import { createInviteSheet } from "./ui/invite_sheet";
 import { createKeysSheet } from "./ui/keys_sheet";
+import { createLimitsStrip } from "./ui/limits_strip";
 import { createLogPanel } from "./ui/log_panel";
 import { createNotesPanel } from "./ui/notes_panel";
 import { createOverlay, overlayWords } from "./ui/overlay";
@@ -98,6 +99,7 @@ export class Page {
     const contact = createForceGauge(app, true);
     const radar = createRangeRadar(app);
     const overlay = createOverlay(app);
+    const limits = createLimitsStrip(app);
     const seat = createSeatBar(app);
     const tools = createPageTools({ charts: () => this.act("charts"), keys: () => this.act("keys") });
     bar.element.append(tools.bar);
@@ -115,7 +117,7 @@ export class Page {
     const announcer = createAnnouncer(app);
     board.element.append(
       h("div", "gauges", {}, force.element, radar.element),
-      h("div", "stage", {}, contact.element, overlay.element),
+      h("div", "stage", {}, contact.element, limits.element, overlay.element),
     );
     const rail = h("aside", "rail", {}, event.element, tabs.element);
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
@@ -137,6 +139,7 @@ export class Page {
       contact,
       radar,
       overlay,
+      limits,
       tabs,
       charts,
       arm,

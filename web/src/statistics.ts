@@ -52,6 +52,8 @@ export interface Statistics {
   readonly command_to_feedback_ms: { readonly median: number | null; readonly p99: number | null };
   readonly command_to_picture_ms: Readonly<Record<"median" | "p95" | "p99" | "maximum", number | null>>;
   readonly event_rate: number;
+  readonly speed_share: number; // of full speed that the cap leaves
+  readonly limits: readonly string[]; // that slow the robot now
   readonly stop: { readonly stopped: boolean; readonly by: string; readonly reason: string };
   readonly stale: string | null; // why the large view must not be trusted
   readonly at_rest: boolean | null;
@@ -96,6 +98,8 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
       maximum: driver === null ? null : quantile(driver.latency.toPicture, 1),
     },
     event_rate: rateOf(app.events, now),
+    speed_share: app.speedShare,
+    limits: state.feedback?.limits ?? [],
     stop: { ...state.stop },
     stale: main === undefined ? null : stalenessOf(app, main, now),
     at_rest: state.feedback?.at_rest ?? null,
@@ -121,8 +125,9 @@ export function reportOf(app: ConsoleApp): Report {
       ...[...app.room.videos.values()].map((stream) => streamReport(stream, settings.tolerance.video)),
       ...[...app.room.sounds.values()].map((stream) => streamReport(stream, settings.tolerance.audio)),
     ],
-    picture_delay_ms: app.driver?.latency.pictureMs ?? null,
+    picture_delay_ms: app.viewDelayMs,
     round_trip_ms: app.state.roundTripMs,
+    speed_cap: settings.speedCap,
   };
 }
 

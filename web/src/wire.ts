@@ -227,6 +227,7 @@ export interface Report {
   readonly streams?: readonly (StreamReport)[];
   readonly picture_delay_ms?: number | null;
   readonly round_trip_ms?: number | null;
+  readonly speed_cap?: boolean;
 }
 
 /** Release the latched stop. Moves nothing. */
@@ -314,7 +315,7 @@ export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SharedNote | Notice | StopStateNotice;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | SharedNote | Notice | StopStateNotice;
 
 /** A note that somebody wrote, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {
@@ -327,6 +328,16 @@ export interface SharedNote {
   readonly epoch: string;
   readonly event: number;
   readonly time: number;
+}
+
+/** Whether and how far the console caps the speed for the delay; sent to newcomers and when it changes. */
+export interface SpeedCapState {
+  readonly type: "speed_cap";
+  readonly mode: "off" | "on" | "operator";
+  readonly holds: boolean;
+  readonly share: number;
+  readonly delay_ms: number | null;
+  readonly why: "" | "delay" | "unknown";
 }
 
 /** Latch the stop. */

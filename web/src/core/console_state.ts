@@ -7,6 +7,7 @@ import type {
   Seat,
   ServerMessage,
   SharedNote,
+  SpeedCapState,
   StopState,
   Welcome,
 } from "../wire";
@@ -45,6 +46,7 @@ export interface ConsoleState {
   seatNews: SeatNews | null; // what was last to be told about the seat, a new object each time
   participants: readonly Participant[];
   quality: Quality | null; // of this peer's pictures
+  speedCap: SpeedCapState | null; // the console's; null before it has said so
   notes: SharedNote[]; // oldest first
   feedback: Feedback | null; // newest
   stop: StopState;
@@ -74,6 +76,7 @@ export function createConsoleState(): ConsoleState {
     seatNews: null,
     participants: [],
     quality: null,
+    speedCap: null,
     notes: [],
     feedback: null,
     stop: NOT_STOPPED,
@@ -89,6 +92,7 @@ export function forgetConnection(state: ConsoleState): void {
   state.seat = null;
   state.participants = [];
   state.quality = null;
+  state.speedCap = null;
   state.notes = [];
   state.feedback = null;
   state.roundTripMs = null;
@@ -141,6 +145,9 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       return;
     case "quality":
       state.quality = message;
+      return;
+    case "speed_cap":
+      state.speedCap = message;
       return;
     case "note_shared":
       state.notes.push(message);

@@ -11,8 +11,3 @@ export function contactStrength(force: number, sensor: WrenchSensor): number {
   if (!(force > sensor.threshold_force) || !(span > 0)) return 0;
   return Math.min(1, (force - sensor.threshold_force) / span);
 }
-
-/** Speed cap of the German StVFernLV: no faster than the delay between command and picture permits. */
-export function speedShare(pictureDelayMs: number | null): number {
-  return pictureDelayMs === null || pictureDelayMs <= 200 ? 1 : 200 / pictureDelayMs;
-}

@@ -1,3 +1,4 @@
+import { capHolds, capIsChoice } from "../core/speed_cap";
 import type { Settings } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setPressed, setText, type Panel } from "./dom";
@@ -12,7 +13,7 @@ export function createSettingsPanel(app: ConsoleApp): Panel {
     createStepper(app, "Picture tolerance", "video"),
     createStepper(app, "Sound tolerance", "audio"),
     createPacing(app),
-    createFlag(app, "Slow down with delay", "speedCap", "Speed limited to 0.2 s ÷ delay"),
+    createCap(app),
     createFlag(app, "Contact tone", "contactTone", "A tone that rises with the force"),
     createGate(app),
   ];
@@ -68,7 +69,7 @@ function createPacing(app: ConsoleApp): Part {
   };
 }
 
-function createFlag(app: ConsoleApp, label: string, name: "contactTone" | "speedCap", about: string): Part {
+function createFlag(app: ConsoleApp, label: string, name: "contactTone", about: string): Part {
   const { settings } = app.state;
   return createSwitch(
     app,
@@ -77,6 +78,25 @@ function createFlag(app: ConsoleApp, label: string, name: "contactTone" | "speed
     () => settings[name],
     () => (settings[name] = !settings[name]),
   );
+}
+
+/** The console may have decided: then the switch shows it and cannot be turned. */
+function createCap(app: ConsoleApp): Part {
+  const { settings } = app.state;
+  const isOn = (): boolean => capHolds(app.state.speedCap, settings.speedCap);
+  const turn = (): void => void (settings.speedCap = !settings.speedCap);
+  const about = "Speed limited to 0.2 s ÷ delay of the pictures";
+  const part = createSwitch(app, "Slow down with delay", about, isOn, turn);
+  const control = part.element.querySelector("button");
+  return {
+    element: part.element,
+    update() {
+      part.update();
+      const isChoice = capIsChoice(app.state.speedCap);
+      if (control !== null) control.disabled = !isChoice;
+      part.element.title = isChoice ? about : `${about}. The console has set this.`;
+    },
+  };
 }
 
 function createGate(app: ConsoleApp): Part {

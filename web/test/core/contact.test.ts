@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { contactStrength, forceOf, speedShare } from "../../src/core/contact";
+import { contactStrength, forceOf } from "../../src/core/contact";
 
 const sensor = { name: "w", body: "b", threshold_force: 5, full_scale_force: 105, full_scale_torque: 1 };
 
@@ -15,8 +15,4 @@ it("a force is felt from the threshold to full scale", () => {
 it("nothing is felt of a force that is not a number, or of a sensor without a range", () => {
   expect(contactStrength(NaN, sensor)).toBe(0);
   expect(contactStrength(9, { ...sensor, full_scale_force: 5 })).toBe(0);
-});
-
-it("the speed falls with the delay beyond 0.2 s", () => {
-  expect([null, 50, 200, 400].map(speedShare)).toEqual([1, 1, 1, 0.5]);
 });
