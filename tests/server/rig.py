@@ -1,6 +1,7 @@
 """A real console on a real bridge with the planar robot, and peers to talk to it."""
 
 import asyncio
+import ssl
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -19,10 +20,12 @@ from robot_bridge.robots.registry import create_robot
 from robot_bridge.settings import BridgeSettings
 from server.access import Access
 from server.app import create_app
+from server.guarded_http import guarded_by
 from server.serve import bind, running
 from server.services import Services
 from server.settings import Settings
 from server.state import open_state
+from server.tls import Certificate
 
 __all__ = ["PATIENCE", "Rig", "TestPeer", "eventually", "running_bridge", "running_console", "running_rig"]
 
@@ -159,8 +162,10 @@ async def running_bridge(port: int = 0) -> AsyncIterator[Bridge]:
 
 
 @asynccontextmanager
-async def running_console(robot_port: int, **settings: Any) -> AsyncIterator[Rig]:
-    """A console on a free port; the scene only when asked for."""
+async def running_console(
+    robot_port: int, *, certificate: Certificate | None = None, **settings: Any
+) -> AsyncIterator[Rig]:
+    """A console on a free port; the scene only when asked for. With a certificate it speaks TLS."""
     with TemporaryDirectory() as directory:
         given: dict[str, Any] = {
             "robot": f"tcp://127.0.0.1:{robot_port}",
@@ -168,18 +173,22 @@ async def running_console(robot_port: int, **settings: Any) -> AsyncIterator[Rig
             "scene": False,
             "state_dir": directory,
         }
-        async with _console(Settings(**(given | settings))) as rig:
+        async with _console(Settings(**(given | settings)), certificate) as rig:
             yield rig
 
 
 @asynccontextmanager
-async def _console(wanted: Settings) -> AsyncIterator[Rig]:
+async def _console(wanted: Settings, certificate: Certificate | None) -> AsyncIterator[Rig]:
     state = open_state(wanted)
     app = create_app(wanted, state)
     listener = bind(wanted.host, wanted.port)
     try:
-        url = f"http://127.0.0.1:{listener.getsockname()[1]}"
-        async with running(app, listener), httpx.AsyncClient(base_url=url, trust_env=False) as http:
+        url = f"{'https' if certificate else 'http'}://127.0.0.1:{listener.getsockname()[1]}"
+        verify = ssl.create_default_context(cafile=certificate.chain) if certificate else False
+        async with (
+            running(app, listener, http=guarded_by(wanted, app), tls=certificate),
+            httpx.AsyncClient(base_url=url, trust_env=False, verify=verify) as http,
+        ):
             yield Rig(url, app, state.access, http)
     finally:
         listener.close()

@@ -1,0 +1,177 @@
+"""Pins what peer_guards_private.py relies on, and shows that each bound holds against a peer that does the thing."""
+
+import asyncio
+import os
+from typing import Any
+
+from aiortc.rtcsctptransport import DataChunk, ForwardTsnChunk, InboundStream
+
+from server.peer_guards_private import MAX_ADDRESSES, MAX_GAPS, MAX_STREAMS, RECEIVE_WINDOW, guard_ice
+from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_rig
+
+MOVED = "aiortc or aioice moved a private part: see server/peer_guards_private.py"
+
+
+async def _ends(rig: Rig, name: str) -> None:
+    async with asyncio.timeout(PATIENCE):
+        await rig.services.console.peers.all_gone()
+    assert rig.count("lockstep_bad_input_total", where="transport", reason=name) >= 1
+    assert rig.count("lockstep_peers_ended_total", why="too much") == 1
+    assert rig.count("lockstep_internal_errors_total", where="peer") == 0
+
+
+def _sctp(peer: TestPeer) -> Any:
+    return peer.pc.sctp
+
+
+async def test_the_private_parts_are_where_they_were() -> None:
+    async with running_rig() as rig, rig.peer("observer"):
+        sctp: Any = next(iter(rig.services.console.peers)).pc.sctp
+        assert sctp._receive_data_chunk.__name__ == "take_bounded", MOVED
+        assert sctp._receive_forward_tsn_chunk.__name__ == "forward_bounded", MOVED
+        assert 0 < sctp._advertised_rwnd <= RECEIVE_WINDOW, MOVED
+        assert all(isinstance(each, InboundStream) for each in sctp._inbound_streams.values()), MOVED
+        assert isinstance(sctp._sack_misordered, set), MOVED
+        connection = sctp.transport.transport._connection
+        assert connection.check_incoming.__name__ == "check_bounded", MOVED
+        assert connection._remote_candidates, MOVED
+
+
+async def test_a_message_that_never_ends_is_not_kept() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        sctp = _sctp(peer)
+        for number in range(RECEIVE_WINDOW // 1000 + 2):
+            chunk = DataChunk(flags=2 if number == 0 else 0)  # it begins, and goes on
+            chunk.tsn, chunk.stream_id, chunk.stream_seq, chunk.protocol = sctp._local_tsn, 1, 9, 51
+            chunk.user_data = b"x" * 1000
+            sctp._local_tsn = (sctp._local_tsn + 1) % 2**32
+            await sctp._send_chunk(chunk)
+            await asyncio.sleep(0)
+        await _ends(rig, "receive_window")
+
+
+async def test_holes_in_the_numbering_are_not_kept_without_bound() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        sctp = _sctp(peer)
+        for number in range(MAX_GAPS + 50):
+            chunk = DataChunk(flags=3)
+            chunk.tsn, chunk.stream_id = (sctp._local_tsn + 2 * number + 2) % 2**32, 1
+            chunk.stream_seq, chunk.protocol, chunk.user_data = 500, 51, b"x"
+            await sctp._send_chunk(chunk)
+            await asyncio.sleep(0)
+        await _ends(rig, "too_many_gaps")
+
+
+async def test_a_peer_has_only_so_many_streams() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        sctp = _sctp(peer)
+        for number in range(MAX_STREAMS + 3):
+            chunk = DataChunk(flags=3)
+            chunk.tsn, chunk.stream_id, chunk.stream_seq, chunk.protocol = sctp._local_tsn, 100 + number, 0, 51
+            chunk.user_data = b"{}"
+            sctp._local_tsn = (sctp._local_tsn + 1) % 2**32
+            await sctp._send_chunk(chunk)
+        await _ends(rig, "too_many_streams")
+
+
+async def test_streams_that_are_only_skipped_count_as_well() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        sctp = _sctp(peer)
+        chunk = ForwardTsnChunk()
+        chunk.cumulative_tsn = sctp._local_tsn
+        chunk.streams = [(number, 1) for number in range(MAX_STREAMS + 5)]
+        await sctp._send_chunk(chunk)
+        await _ends(rig, "too_many_streams")
+
+
+def test_checks_from_ever_new_addresses_are_not_answered_with_checks_of_ours() -> None:
+    class Candidate:
+        def __init__(self, port: int) -> None:
+            self.host, self.port = "192.0.2.1", port
+
+    class Connection:
+        def __init__(self) -> None:
+            self._remote_candidates: list[Candidate] = []
+
+        def check_incoming(self, message: object, address: tuple[str, int], protocol: object) -> None:
+            self._remote_candidates.append(Candidate(address[1]))
+
+    connection, refused = Connection(), list[str]()
+    guard_ice(connection, refused.append)
+    for port in range(MAX_ADDRESSES + 5):
+        connection.check_incoming(None, ("192.0.2.1", port), None)
+    assert len(connection._remote_candidates) == MAX_ADDRESSES
+    assert refused == ["too_many_addresses"] * 5
+    connection.check_incoming(None, ("192.0.2.1", 0), None)
+    assert len(refused) == 5, "one that is known is answered"
+
+
+async def test_a_peer_that_talks_nonsense_is_closed_and_nobody_else_is() -> None:
+    async with running_rig(max_bad_messages=5) as rig, rig.peer("operator") as other, rig.peer("observer") as peer:
+        for _ in range(30):
+            peer.send_raw("session", os.urandom(9).hex())
+        async with asyncio.timeout(PATIENCE):
+            await peer.closed.wait()
+        await other.feedback()
+        await eventually(lambda: rig.count("lockstep_peers_ended_total", why="bad messages") == 1)
+        assert 5 <= rig.count("lockstep_bad_input_total", where="session", reason="malformed") <= 30
+        assert not other.closed.is_set()
+
+
+async def test_an_observer_may_say_less_than_an_operator_but_always_stop() -> None:
+    async with running_rig(max_observer_rate=2, max_bad_messages=1000) as rig, rig.peer("observer") as peer:
+        for _ in range(20):
+            peer.send_raw("control", '{"type":"ping","id":1}')
+        peer.send_raw("control", '{"type":"stop","by":"","reason":"dog"}')
+        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        assert rig.count("lockstep_bad_input_total", where="control", reason="flood") >= 15
+
+
+async def test_peers_that_do_not_connect_take_no_more_than_their_places() -> None:
+    async with running_rig(max_unconnected=2, max_peers=5, reserved_places=2) as rig:
+        observer = rig.token("observer")
+        waiting = [TestPeer() for _ in range(4)]
+        try:
+            answers = []
+            for peer in waiting:
+                peer.pc.createDataChannel("control")
+                offer = await peer.offer()
+                headers = {**observer, "Content-Type": "application/sdp"}
+                answers.append(await rig.http.post("/whep", content=offer, headers=headers))
+            assert [each.status_code for each in answers] == [201, 201, 429, 429]
+            async with rig.peer("observer"):
+                pass  # another link is not disturbed
+            refused = await rig.http.post(
+                "/whep", content=offer, headers={**rig.token("observer"), **headers, **observer}
+            )
+            assert refused.status_code == 429
+        finally:
+            for peer in waiting:
+                await peer.close()
+
+
+async def test_the_last_places_are_not_for_observers() -> None:
+    async with running_rig(max_peers=2, reserved_places=1) as rig, rig.peer("observer"):
+        peer = TestPeer()
+        try:
+            peer.pc.createDataChannel("control")
+            headers = {**rig.token("observer"), "Content-Type": "application/sdp"}
+            answer = await rig.http.post("/whep", content=await peer.offer(), headers=headers)
+            assert (answer.status_code, answer.json()["error"]) == (503, "too_many_peers")
+        finally:
+            await peer.close()
+        async with rig.peer("operator"):
+            pass
+
+
+async def test_offers_of_one_link_are_limited() -> None:
+    async with running_rig(max_offer_burst=1, max_offer_rate=0.001) as rig:
+        headers = {**rig.token("observer"), "Content-Type": "application/sdp"}
+        peer = TestPeer()
+        try:
+            peer.pc.createDataChannel("control")
+            offer = await peer.offer()
+            answers = [await rig.http.post("/whep", content=offer, headers=headers) for _ in range(2)]
+            assert [each.status_code for each in answers] == [201, 429]
+        finally:
+            await peer.close()
