@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from bench.emulator.errors import BadDescription
 
-__all__ = ["Address", "candidates_replaced", "console_address", "ice_names", "without_candidates"]
+__all__ = ["Address", "candidates_replaced", "console_addresses", "ice_names", "reached_from", "without_candidates"]
 
 UFRAG = re.compile(r"^a=ice-ufrag:(\S+)", re.MULTILINE)
 HOST = re.compile(r"^a=candidate:\S+ 1 udp \d+ (\d+\.\d+\.\d+\.\d+) (\d+) typ host", re.MULTILINE | re.IGNORECASE)
@@ -23,16 +23,25 @@ def ice_names(sdp: str) -> set[str]:
     return set(UFRAG.findall(sdp))
 
 
-def console_address(sdp: str) -> Address:
-    """Where the console's answer says that it listens: loopback if it does, else its first IPv4 address.
+def console_addresses(sdp: str) -> list[Address]:
+    """Where the console's answer says that it listens, IPv4 only.
 
     Raises:
-        BadDescription: it names no address that a relay here can reach.
+        BadDescription: nowhere that a relay could reach.
     """
     found = [Address(host, int(port)) for host, port in HOST.findall(sdp)]
     if not found:
         raise BadDescription("the console's answer has no IPv4 host candidate; start it with --ice-host ADDRESS")
-    return next((each for each in found if each.host.startswith("127.")), found[0])
+    return found
+
+
+def reached_from(host: str, console: list[Address]) -> Address:
+    """The console's address for a client that finds the relay at `host`: the same if it has it, else the first.
+
+    A check's answer tells the client from where the relay's other side sent it (RFC 8445 7.2.5.3.1). Firefox goes no
+    further when that is a loopback address and its own is not.
+    """
+    return next((each for each in console if each.host == host), console[0])
 
 
 def without_candidates(sdp: str) -> str:

@@ -16,7 +16,14 @@ from bench.emulator.deliveries import Deliveries
 from bench.emulator.errors import BadDescription
 from bench.emulator.packets import kind_of, stun_username
 from bench.emulator.profile import Direction
-from bench.emulator.sdp import Address, candidates_replaced, console_address, ice_names, without_candidates
+from bench.emulator.sdp import (
+    Address,
+    candidates_replaced,
+    console_addresses,
+    ice_names,
+    reached_from,
+    without_candidates,
+)
 
 __all__ = ["LOOPBACK", "UdpRelay"]
 
@@ -85,12 +92,12 @@ class UdpRelay:
         Raises:
             BadDescription: it names no address of the console.
         """
-        console, names = console_address(sdp), ice_names(sdp)
+        console, names = console_addresses(sdp), ice_names(sdp)
         if len(self._doors) >= MAX_RESTARTS * len(self._hosts):
             raise BadDescription("too many ICE restarts")
         opened: list[_Door] = []
         for host in self._hosts:
-            door = _Door(host, console, names)
+            door = _Door(host, reached_from(host, console), names)
             self._doors.append(door)
             opened.append(door)
             self._loop.add_reader(door.socket, self._from_client, door)
