@@ -188,7 +188,7 @@ class MediaPlane:
             on_ready=ready,
             on_keyframe_request=lambda: stream.request_keyframe(codec, target, "pli"),
             on_stopped=peer.detach,
-            listener=quality if video else None,
+            listener=quality,
             pacer=quality.pacer if video and self._settings.quality else None,
             on_paced=lambda: self._fan_out.pace(target),
         )

@@ -18,5 +18,5 @@ class Cadence:
             return False
         interval = 1 / wanted_rate
         # A camera that paused does not catch up with a burst.
-        self._due = max(self._due, time - interval / 2) + interval
+        self._due = (self._due if time - self._due < interval else time) + interval
         return True

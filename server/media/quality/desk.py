@@ -27,6 +27,7 @@ from server.media.video_stream import VideoStream
 __all__ = ["QualityDesk"]
 
 TICK = 0.1  # s
+LATE = 0.03  # s by which a tick may be late
 OBSERVER_TICKS = 10  # an observer is looked at once in so many
 SHARE_AFTER = 5.0  # s of an operator's path without a limit
 LOW_FLOOR_BPS = 120_000
@@ -61,7 +62,11 @@ class QualityDesk:
     async def run(self) -> None:
         """Until cancelled."""
         while self._settings.quality:
+            due = self._clock() + TICK
             await asyncio.sleep(TICK)
+            if (now := self._clock()) > due + LATE:
+                for peer in self._peers:
+                    peer.path.late(now)
             if self._peers:
                 self.tick()
 

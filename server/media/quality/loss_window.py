@@ -6,6 +6,8 @@ __all__ = ["LossWindow"]
 
 WINDOW = 3.0  # s
 ENOUGH = 30  # packets; of fewer, one lost packet says nothing
+USUAL_SECONDS = 8.0  # over which the usual loss is taken
+UNUSUAL = 1.5  # times the usual loss
 
 
 class LossWindow:
@@ -13,20 +15,27 @@ class LossWindow:
 
     def __init__(self) -> None:
         self.known = False  # whether any report came
+        self.usual = 0.0  # 0 to 1
         self._reports: deque[tuple[float, int, int]] = deque()  # when, lost, expected
+        self._at: float | None = None
 
     def add(self, lost: int, expected: int, now: float) -> None:
         self.known = True
         if expected > 0:
             self._reports.append((now, lost, expected))
-        self._forget(now)
+        fraction = self.fraction(now)
+        if self._at is not None:
+            self.usual += (fraction - self.usual) * min(1.0, max(0.0, now - self._at) / USUAL_SECONDS)
+        self._at = now
 
     def fraction(self, now: float) -> float:
         """0 to 1; 0 while too little is known."""
-        self._forget(now)
+        while self._reports and now - self._reports[0][0] > WINDOW:
+            self._reports.popleft()
         expected = sum(report[2] for report in self._reports)
         return 0.0 if expected < ENOUGH else sum(report[1] for report in self._reports) / expected
 
-    def _forget(self, now: float) -> None:
-        while self._reports and now - self._reports[0][0] > WINDOW:
-            self._reports.popleft()
+    def unusual(self, now: float) -> float:
+        """The loss, if it is more than a path that loses packets by itself has shown lately; else 0."""
+        fraction = self.fraction(now)
+        return fraction if fraction > UNUSUAL * self.usual else 0.0

@@ -6,23 +6,23 @@ first needs to show: the round trip and half a second.
 | when | the rate becomes | reason |
 |---|---|---|
 | pictures leave and nothing was heard for 2 s and a round trip | 70 %, every second | no feedback |
-| round trips grew beyond their spread, twice, or once by far | 85 % of what it carries, after a pause | round trip |
+| round trips grew beyond their spread | 85 % of what it carries, after a pause | round trip |
 | the peer's estimate fell, and a queue, loss or the gap confirms it | the estimate | bandwidth |
 | the gap nears the tolerance and was smaller before, in two reports running | 80 % | gap |
 | more than 10 % is lost | by half the loss; without a queue not below half of what it was | loss |
-| 2 to 10 % is lost, or the estimate fell, or a queue begins | stays | |
+| 2 to 10 % is lost, or the estimate fell, or a queue begins, or the console itself is late | stays | |
 | nothing of this for a second, the rate is used, and something was heard since the last increase | see below | |
 
-The pause is as long as the queue, half a second at most: what waits in it is out of tolerance when it arrives, so no
-picture is lost by waiting, and the next one finds an empty path.
+The pause is as long as the queue, a second at most: meanwhile the pictures that wait in it arrive, and the next one
+finds an empty path.
 
-Increase: half as much again every second until the first limit was met; after that 12 % a second up to 85 % of the
+Increase: by 35 % every second until the first limit was met; after that 12 % a second up to 85 % of the
 last limit, and 4 % beyond. What was lost to silence comes back at once, by half.
 
 What a decrease does not cure is not caused by the rate: when three of them did not shorten the round trips by a fifth,
-the path has become longer and its new length counts; when two did not narrow the gap, the gap is left alone for half a
-minute; loss without a queue costs half the rate at most. A rate that an undemanding picture does not use is not
-raised, and not lowered either.
+and nothing is lost, the path has become longer and its new length counts; when two did not narrow the gap, the gap is
+left alone for half a minute; loss without a queue costs half the rate at most, and loss as usual nothing. A rate that
+an undemanding picture does not use is not raised, and not lowered either.
 
 In the words of RFC 8836: round trips and the receiver's own delay-based estimate (REMB, which Chromium and aiortc make
 from abs-send-time) detect the standing queue, loss is only its last resort, and "no feedback" is its circuit breaker
@@ -43,13 +43,16 @@ SILENT_STEP = 1.0  # s between two decreases in silence
 REACTION = 0.5  # s on top of a round trip until a decrease shows
 FRESH = 0.3  # s after a decrease from which on a round trip tells what it did
 LOSS_EVERY = 2.0  # s
+LATENESS = 0.3  # s
+DRAINS = 0.8  # share of a queue that shows that it does
+EPISODE = 4.0  # s; decreases that follow one another so closely are of one queue
 CALM = 1.0  # s without any sign before an increase
 RAISE_EVERY = 1.0  # s
 HIGH_LOSS, SOME_LOSS = 0.10, 0.02
 FALL = 0.97  # an estimate below this share of the one before has fallen
 NEAR_TOLERANCE = 0.75
-MOST_PAUSE = 0.5  # s
-START_GROWTH, FAR_GROWTH, NEAR_GROWTH = 1.5, 1.12, 1.04
+MOST_PAUSE = 1.0  # s
+START_GROWTH, FAR_GROWTH, NEAR_GROWTH = 1.35, 1.12, 1.04
 NEAR_LIMIT = 0.85
 USED = 0.7  # share of the rate that has to leave for it to count as tried
 GAP_TRIES, LENGTH_TRIES = 2, 3
@@ -96,7 +99,9 @@ class PathController:
         self._gap_tries: list[int] = []  # lag at each decrease for it
         self._gap_rests_until = 0.0
         self._length_tries: list[float] = []  # queue at each decrease for it
+        self._queue_then = 0.0  # at the last decrease
         self._loss_floor: float | None = None
+        self._late_at = float("-inf")
 
     # what comes in
 
@@ -112,13 +117,15 @@ class PathController:
         """A receiver report: packets since the last one, and the round trip in s if it tells one."""
         self.heard(now)
         self.losses.add(lost, expected, now)
-        if round_trip is not None:
+        if round_trip is not None and now - self._late_at > LATENESS:
             self.round_trips.add(round_trip, now)
 
     def estimated(self, bitrate_bps: float, now: float) -> None:
         """The peer's own estimate of what it can receive (REMB)."""
         self.heard(now)
-        if self._estimate is not None and bitrate_bps < FALL * self._estimate:
+        # aiortc gives its first estimate when it finds the path overused.
+        before = self.sent_bps if self._estimate is None else self._estimate
+        if bitrate_bps < FALL * before:
             self._estimate_fell = True
         self._estimate = bitrate_bps
 
@@ -130,6 +137,10 @@ class PathController:
         self._gap_near = self._gap_near + 1 if near else 0
         self._lag = lag
         self._gap_base = [*self._gap_base[-19:], lag]
+
+    def late(self, now: float) -> None:
+        """This computer was busy: round trips measured now say nothing of the network."""
+        self._late_at = self._sign_at = now
 
     def sent(self, octets: int, now: float) -> None:
         """So many bytes of pictures have been sent in all."""
@@ -182,13 +193,12 @@ class PathController:
     def _lower(self, now: float) -> bool:
         """Whether something speaks against an increase; the decrease that it asks for is made."""
         queued = self.round_trips.queued and self.round_trips.at > self._lowered_at + FRESH
-        loss = self.losses.fraction(now)
+        loss = self.losses.unusual(now)
         fell, self._estimate_fell = self._estimate_fell, False
         near = self._gap_near >= 2 and now >= self._gap_rests_until
         queue_begins = self.round_trips.queue > self.round_trips.limit
         if not (queued or fell or near or loss > SOME_LOSS or queue_begins):
-            if loss <= SOME_LOSS:
-                self._loss_floor = None
+            self._loss_floor = None
             return False
         self._sign_at = now
         if now - self._lowered_at < self.round_trips.base + REACTION:
@@ -206,17 +216,24 @@ class PathController:
         return True
 
     def _for_queue(self, now: float) -> None:
-        queue = self.round_trips.queue
-        if self._length_tries and queue < 0.8 * self._length_tries[0]:
+        trips = self.round_trips
+        self.paused_until = now + min(MOST_PAUSE, trips.queue)
+        recent = now - self._lowered_at < EPISODE
+        if recent and trips.growth == 0 and trips.queue < DRAINS * self._queue_then:
+            return
+        if self._length_tries and trips.queue < DRAINS * self._length_tries[0]:
             self._length_tries = []
-        self._length_tries.append(queue)
+        if self.losses.fraction(now) <= SOME_LOSS:  # a queue that overflows is no longer path
+            self._length_tries.append(trips.queue)
         if len(self._length_tries) > LENGTH_TRIES:
-            self.round_trips.accept()
+            trips.accept()
             self._length_tries = []
             return
-        carried = min(self.rate, self.sent_bps or self.rate) / (1 + self.round_trips.growth)
-        self.paused_until = now + min(MOST_PAUSE, queue)
-        self._limit(0.85 * carried, "round trip", now)
+        self._queue_then = trips.queue
+        carried = min(self.rate, self.sent_bps or self.rate) / (1 + trips.growth)
+        # What an undemanding picture left unused says little of the path, unless the queue is seen to grow or overflow.
+        sure = trips.growth > 0.2 or self.losses.fraction(now) > SOME_LOSS
+        self._limit(max(0.85 * carried, (0.4 if sure else 0.65) * self.rate), "round trip", now)
 
     def _for_gap(self, now: float) -> None:
         if len(self._gap_tries) >= GAP_TRIES and self._lag >= self._gap_tries[0]:
@@ -239,7 +256,8 @@ class PathController:
     def _limit(self, rate: float, reason: Reason, now: float) -> None:
         """The path carries no more than about `rate`."""
         self.limited_at = now
-        self._ceiling = min(self.rate, rate / 0.85)
+        if self._ceiling is None or now - self._lowered_at > EPISODE:
+            self._ceiling = max(rate, min(self.rate, rate / 0.85))
         self._set(rate, reason, now)
 
     def _set(self, rate: float, reason: Reason, now: float) -> None:

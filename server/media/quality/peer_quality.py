@@ -68,7 +68,7 @@ class PeerQuality:
         return [camera.sender.stats for camera in self.cameras]
 
     def reception(self, sender: "MediaSender", lost: int, expected: int, round_trip: float | None) -> None:
-        """A receiver report about one of its streams."""
+        """A receiver report about one of its streams, sound included: each tells of the one path."""
         self.path.received(lost, expected, round_trip, self._clock())
 
     def bandwidth(self, bitrate_bps: int, ssrcs: frozenset[int]) -> None:

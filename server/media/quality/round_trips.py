@@ -1,27 +1,33 @@
 """What round trips say about a queue in the network. No clock is read here."""
 
+from collections import deque
+
 __all__ = ["RoundTrips"]
 
 WINDOW = 30.0  # s; the shortest round trip of this window and the one before is that of the empty path
-LEAST_QUEUE = 0.040  # s that count as a queue on any path
+LEAST_QUEUE = 0.060  # s that count as a queue on any path
 SHARE = 0.15  # of the empty path's round trip
 SPREADS = 3.0  # of the usual difference between two round trips
 MOST_FOR_SPREAD = 0.15  # s
-SLOPE_MIN, SLOPE_MAX = 0.0, 3.0
+FEW, SURE = 2, 3  # round trips running that prove a long queue, and a short one
+KEEP = 4.0  # s
+MOST_GROWTH = 3.0
 
 
 class RoundTrips:
-    """The queue's delay is what a round trip takes longer than the shortest one."""
+    """The queue's delay is what round trips take longer than the shortest one.
+
+    One long round trip may be a computer that was busy: a queue lengthens all of them, so the shortest of the last few
+    counts.
+    """
 
     def __init__(self) -> None:
-        self.queue = 0.0  # s; of the newest round trip
-        self.growth = 0.0  # s of queue per second, between the last two
-        self.standing = False  # the last two were both longer than the limit
         self.at = float("-inf")  # when the newest one was measured
+        self.growth = 0.0  # s of queue per second, lately
+        self._recent: deque[tuple[float, float]] = deque(maxlen=SURE)  # when, round trip
         self._window_start: float | None = None
         self._current = float("inf")
         self._previous = float("inf")
-        self._last: tuple[float, float] | None = None  # when, round trip
         self._spread = 0.0
 
     @property
@@ -35,32 +41,41 @@ class RoundTrips:
         """Delay in s that is not yet a queue: paths differ by themselves."""
         return max(LEAST_QUEUE, SHARE * self.base, min(MOST_FOR_SPREAD, SPREADS * self._spread))
 
+    @property
+    def queue(self) -> float:
+        """s that packets wait in the network; 0 before two round trips are known."""
+        return self._least(FEW)
+
+    @property
+    def queued(self) -> bool:
+        """Whether that is too much."""
+        return self._least(SURE) > self.limit or self._least(FEW) > 2 * self.limit
+
     def add(self, seconds: float, now: float) -> None:
         """A round trip was measured."""
         if self._window_start is None or now - self._window_start >= WINDOW:
             self._previous, self._current = self._current, float("inf")
             self._window_start = now
         self._current = min(self._current, seconds)
-        before = self.queue > self.limit
-        self.queue = seconds - self.base
-        self.growth = 0.0
-        if self._last is not None and now > self._last[0]:
-            at, last = self._last
-            self.growth = min(SLOPE_MAX, max(SLOPE_MIN, (seconds - last) / max(0.1, now - at)))
-            # A growing queue must not pass for a path that varies: growth counts little.
+        while self._recent and now - self._recent[0][0] > KEEP:
+            self._recent.popleft()
+        if self._recent:
+            at, last = self._recent[-1]
+            # A growing queue must not pass for a path that varies: one difference counts for little.
             self._spread += (min(abs(seconds - last), 2 * LEAST_QUEUE) - self._spread) / 16
-        self._last = now, seconds
+            at, last = self._recent[0]
+            self.growth = min(MOST_GROWTH, max(0.0, (seconds - last) / max(0.2, now - at)))
+        self._recent.append((now, seconds))
         self.at = now
-        self.standing = before and self.queue > self.limit
-
-    @property
-    def queued(self) -> bool:
-        """Whether there is a queue: two long round trips, or one that is far too long."""
-        return self.standing or self.queue > 2 * self.limit + LEAST_QUEUE
 
     def accept(self) -> None:
-        """The path itself became longer: the newest round trip is that of the empty path now."""
-        if self._last is not None:
+        """The path itself became longer: what is measured now is the empty path."""
+        if self._recent:
             self._previous = float("inf")
-            self._current = self._last[1]
-            self.queue, self.standing = 0.0, False
+            self._current = min(seconds for _, seconds in self._recent)
+            self._recent.clear()
+
+    def _least(self, count: int) -> float:
+        if len(self._recent) < count:
+            return 0.0
+        return min(seconds for _, seconds in list(self._recent)[-count:]) - self.base
