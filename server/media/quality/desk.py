@@ -101,8 +101,7 @@ class QualityDesk:
 
     def leaders(self) -> list[PeerQuality]:
         """Whom the operator's tier is for."""
-        operators = [peer for peer in self._peers if peer.operator]
-        return [peer for peer in operators if peer.drives] or operators
+        return [peer for peer in self._peers if peer.drives] or [peer for peer in self._peers if peer.operator]
 
     def _needs(self, peer: PeerQuality) -> float:
         return len(peer.cameras) * float(self._settings.video_bitrate_bps)
