@@ -183,7 +183,7 @@ async def test_while_the_operators_path_is_paused_no_picture_is_encoded_for_it()
         desk(plane).tick()
         plane.feed(noise(3, 3 / 30), 3 / 30)
         async with asyncio.timeout(TIMEOUT):
-            while not value(plane, "frames_dropped_total", stream="camera0", stage="path_busy"):
+            while not value(plane, "frames_dropped_total", stream="camera0", stage="path_busy"):  # noqa: ASYNC110
                 await asyncio.sleep(0)
         viewer.media.quality.path.paused_until = 0.0
         desk(plane).tick()
