@@ -7,7 +7,7 @@ from bench.emulator.profile import Profile
 from client.command_gate import Pacing
 from client.media_gate import GateMode
 
-__all__ = ["MODES", "PROFILES", "THESIS_PROFILES", "Choices", "MediaChoice", "Mode", "media_of"]
+__all__ = ["MODES", "PROFILES", "THESIS_PROFILES", "Choices", "MediaChoice", "Mode", "media_of", "round_trip_of"]
 
 Mode = Literal["off", "age", "feedback", "media"]
 MODES: tuple[Mode, ...] = ("off", "age", "feedback", "media")
@@ -31,6 +31,7 @@ class MediaChoice:
     frames_per_second: float
     sound_codec: str
     tolerance: int  # events
+    adapts: bool = False  # the console's quality controller is on
 
     def environment(self) -> dict[str, str]:
         """As the console's settings."""
@@ -38,20 +39,30 @@ class MediaChoice:
             "LOCKSTEP_MEDIA__VIDEO_BITRATE_BPS": str(round(self.video_kbps * 1000)),
             "LOCKSTEP_MEDIA__VIDEO_FRAMES_PER_SECOND": str(self.frames_per_second),
             "LOCKSTEP_MEDIA__SOUND_CODECS": f'["{self.sound_codec}"]',
+            "LOCKSTEP_MEDIA__QUALITY": str(self.adapts).lower(),
         }
 
 
-def media_of(profile: Profile) -> MediaChoice:
-    """The thesis' settings for its profiles, which are in their files; for others what the console does by itself."""
+def media_of(profile: Profile, adapts: bool | None = None) -> MediaChoice:
+    """The thesis' settings for its profiles, fixed as they were there. For others what the console does by itself, its
+    quality controller included, unless `adapts` says otherwise."""
     said = profile.experiment
+    adapting = said.video_kbps is None if adapts is None else adapts
     bottleneck = profile.bottleneck_to_operator
-    narrow = bottleneck is not None and bottleneck.rate < 1_000_000
+    narrow = bottleneck is not None and bottleneck.rate < 1_000_000 and not adapting
     return MediaChoice(
         said.video_kbps or (FITTING_KBPS if narrow else USUAL_KBPS),
         said.frame_rate or USUAL_FRAME_RATE,
         said.audio_codec or "PCMU",
         USUAL_TOLERANCE if said.tolerance is None else said.tolerance,
+        adapting,
     )
+
+
+def round_trip_of(profile: Profile) -> float:
+    """Mean time of a command to the robot and its feedback back, in s, without what the programs take."""
+    paths = (profile.control, profile.robot_control)
+    return sum(path.to_operator.delay.mean + path.to_robot.delay.mean for path in paths)
 
 
 @dataclass(frozen=True)
@@ -61,10 +72,11 @@ class Choices:
     profile: str  # a name or a file
     mode: Mode
     seconds: float
-    tolerance: int  # events, of pictures and of sound
+    tolerance: int  # events, of pictures and of sound; below 0: the profile's
     seed: int
     robot: str = "planar"
     browser: bool = False
+    adapts: bool | None = None  # the quality controller; None: as `media_of` says
     watchers: bool = True  # clients in the other gate modes beside the operator, in the same session
 
     @property

@@ -2,19 +2,25 @@
 
 import json
 import sys
+from collections.abc import Coroutine
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 import uvloop
 
 from bench.emulator.errors import ProfileError
 from bench.emulator.profile import Profile, load_profile
-from bench.experiment.choices import PROFILES, Choices, Mode, media_of
+from bench.experiment.choices import PROFILES, Choices, Mode, media_of, round_trip_of
+from bench.experiment.findings import Cell, Findings
+from bench.experiment.growth import run_growth
+from bench.experiment.matrix import GROWTH_SECONDS, OUTAGE_SECONDS, matrix_of
 from bench.experiment.outage import run_outages
-from bench.experiment.results import Result, result_of
+from bench.experiment.results import result_of
 from bench.experiment.run import run_experiment
 from bench.experiment.table import render_table
+from bench.machine import machine_facts
 from bench.processes import ProcessFailed
 from client.errors import ConsoleError
 from robot_bridge.robots.registry import robot_names
@@ -24,16 +30,28 @@ __all__ = ["experiment_command"]
 EXIT_BROKEN = 1  # a verdict is false
 EXIT_USAGE = 2
 EXIT_FAILED = 3  # something did not run
+GROWTH_PROFILE = "hong-kong"
+RUN_SECONDS = 25.0
+OWN_TOLERANCE = -1  # the profile's
+
+Found = TypeVar("Found")
 
 
 def experiment_command(
     profile: Annotated[
-        str, typer.Argument(help=f"A network: {', '.join(PROFILES)}, or the file of one; or all; growth; outage.")
+        str,
+        typer.Argument(
+            help=f"A network: {', '.join(PROFILES)}, or the file of one. Or growth: how large the gap gets without a "
+            "gate. Or outage: the network is cut in mid-drive. Or all of these."
+        ),
     ],
     mode: Annotated[
         Mode, typer.Option(help="off: no gate; age: a gate by age; feedback: the thesis' rule; media: media pacing.")
     ] = "feedback",
-    seconds: Annotated[float, typer.Option(min=1, max=3600, help="How long the operator drives.")] = 25.0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=1, max=3600, help="How long; unless given 25 s a run, 6 s a rate for growth, 10 s of outage."),
+    ] = None,
     tolerance: Annotated[
         int | None, typer.Option(min=0, max=1000, help="Largest gap, in events; unless given, the profile's own.")
     ] = None,
@@ -44,72 +62,104 @@ def experiment_command(
         bool | None,
         typer.Option(help="Clients in the other gate modes beside the operator; unless given, without a browser."),
     ] = None,
+    quality: Annotated[
+        bool | None, typer.Option(help="The quality controller; unless given, for all but the thesis' networks.")
+    ] = None,
     json_to: Annotated[str, typer.Option("--json", help="Write the figures there; - is standard output.")] = "",
     report: Annotated[Path | None, typer.Option(help="Write a page with the figures into this folder.")] = None,
 ) -> None:
     """Drive a robot over an emulated network and say what was rendered, and how far behind the robot it was."""
-    if profile == "outage":
-        _outage(Choices(profile, mode, seconds, 0, seed, robot, browser), json_to)
-        return
-    try:
-        found = load_profile(profile)
-    except ProfileError as error:
-        _say(str(error))
-        raise typer.Exit(EXIT_USAGE) from error
     choices = Choices(
-        profile=found.name,
+        profile=profile,
         mode=mode,
-        seconds=seconds,
-        tolerance=media_of(found).tolerance if tolerance is None else tolerance,
+        seconds=seconds or RUN_SECONDS,
+        tolerance=OWN_TOLERANCE if tolerance is None else tolerance,
         seed=seed,
         robot=robot,
         browser=browser,
+        adapts=quality,
         watchers=not browser if watchers is None else watchers,
     )
-    result = _run(choices, found)
-    _publish(result, [result], json_to)
-    if False in result["verdicts"].values():
-        raise typer.Exit(EXIT_BROKEN)
+    session = _Session()
+    if profile == "outage":
+        session.outage(replace(choices, seconds=seconds or OUTAGE_SECONDS))
+    elif profile == "growth":
+        session.grow(replace(choices, seconds=seconds or GROWTH_SECONDS))
+    elif profile == "all":
+        for each in matrix_of(choices):
+            session.drive(each)
+        session.grow(replace(choices, seconds=GROWTH_SECONDS))
+        session.outage(replace(choices, seconds=OUTAGE_SECONDS))
+    else:
+        session.drive(choices)
+    session.publish(json_to, report)
 
 
-def _run(choices: Choices, profile: Profile) -> Result:
+class _Session:
+    """Runs one thing after the other; one that fails does not keep the others from being run."""
+
+    def __init__(self) -> None:
+        self._findings = Findings(machine=machine_facts())
+
+    def drive(self, choices: Choices) -> None:
+        profile, choices = _fitted(choices)
+        run = self._run(f"{profile.name}, {choices.mode}", run_experiment(choices, profile, _say))
+        if run is not None:
+            result = result_of(choices, media_of(profile, choices.adapts), run, round_trip_of(profile))
+            self._findings.cells.append(Cell(choices, profile, result, run))
+
+    def grow(self, choices: Choices) -> None:
+        profile, choices = _fitted(replace(choices, profile=GROWTH_PROFILE))
+        self._findings.growth = self._run("growth", run_growth(choices, profile, _say))
+
+    def outage(self, choices: Choices) -> None:
+        found = self._run("outage", run_outages(choices, _say))
+        if found is not None:
+            self._findings.outages.append(found)
+
+    def _run(self, name: str, work: Coroutine[Any, Any, Found]) -> Found | None:
+        try:
+            return uvloop.run(work)
+        except* (ProcessFailed, ConsoleError, TimeoutError) as errors:
+            why = f"{name}: {type(errors.exceptions[0]).__name__} {errors.exceptions[0]}"
+        _say(why)
+        self._findings.failed.append(why)
+        return None
+
+    def publish(self, json_to: str, folder: Path | None) -> None:
+        findings = self._findings
+        results = findings.results()
+        text = render_table(cell.result for cell in findings.cells)
+        if findings.cells:
+            print(text, file=sys.stderr if json_to == "-" else sys.stdout)
+        _write(results[0] if len(results) == 1 else results, json_to)
+        if folder is not None:
+            from bench.experiment.report import write_report  # needs matplotlib, which only the tests install
+
+            _say(f"the report is {write_report(findings, folder)}")
+            _write(results, str(folder / "results.json"))
+        if findings.failed:
+            raise typer.Exit(EXIT_FAILED)
+        if findings.broken:
+            raise typer.Exit(EXIT_BROKEN)
+
+
+def _fitted(choices: Choices) -> tuple[Profile, Choices]:
+    """The profile, and the choices with its tolerance unless they have one."""
     try:
-        run = uvloop.run(run_experiment(choices, profile, _say))
-    except* (ProcessFailed, ConsoleError, TimeoutError) as errors:
-        _say(f"{choices.profile}, {choices.mode}: {errors.exceptions[0]}")
-        raise typer.Exit(EXIT_FAILED) from errors
-    return result_of(choices, media_of(profile), run, round_trip(profile))
-
-
-def _outage(choices: Choices, json_to: str) -> None:
-    try:
-        found = uvloop.run(run_outages(choices, _say))
-    except* (ProcessFailed, ConsoleError, TimeoutError) as errors:
-        _say(f"outage: {errors.exceptions[0]}")
-        raise typer.Exit(EXIT_FAILED) from errors
-    for each in found["outages"]:
-        _say(", ".join(f"{name} {value}" for name, value in each.items()))
-    _write(found, json_to)
-    if False in found["verdicts"].values():
-        raise typer.Exit(EXIT_BROKEN)
-
-
-def round_trip(profile: Profile) -> float:
-    """Mean time of a command to the robot and its feedback back, in s, without what the programs take."""
-    paths = (profile.control, profile.robot_control)
-    return sum(path.to_operator.delay.mean + path.to_robot.delay.mean for path in paths)
-
-
-def _publish(found: Any, results: list[Result], json_to: str) -> None:
-    print(render_table(results), file=sys.stderr if json_to == "-" else sys.stdout)
-    _write(found, json_to)
+        profile = load_profile(choices.profile)
+    except ProfileError as error:
+        _say(str(error))
+        raise typer.Exit(EXIT_USAGE) from error
+    tolerance = media_of(profile).tolerance if choices.tolerance < 0 else choices.tolerance
+    return profile, replace(choices, profile=profile.name, tolerance=tolerance)
 
 
 def _write(found: Any, json_to: str) -> None:
     if json_to == "-":
         sys.stdout.write(json.dumps(found, ensure_ascii=False) + "\n")
     elif json_to:
-        Path(json_to).write_text(json.dumps(found, indent=2, ensure_ascii=False) + "\n")
+        Path(json_to).write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n")
 
 
 def _say(text: str) -> None:

@@ -32,6 +32,7 @@ def result_of(choices: Choices, media: MediaChoice, run: Run, round_trip: float)
             "video_kbps": media.video_kbps,
             "frames_per_second": media.frames_per_second,
             "sound_codec": media.sound_codec,
+            "adapts": media.adapts,
         },
         "clients": clients,
         "verdicts": _verdicts(choices, run, clients, round_trip),

@@ -40,7 +40,7 @@ class RunningClient(Protocol):
 async def run_experiment(choices: Choices, profile: Profile, say: Say) -> Run:
     """Raises ProcessFailed, ConsoleError, TimeoutError."""
     async with (
-        running_stage(choices.robot, profile, media_of(profile), choices.seed) as stage,
+        running_stage(choices.robot, profile, media_of(profile, choices.adapts), choices.seed) as stage,
         _clients(stage, choices) as clients,
     ):
         operator = clients[0]

@@ -1,0 +1,41 @@
+"""Everything that one command found. No I/O."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from bench.emulator.profile import Profile
+from bench.experiment.choices import Choices
+from bench.experiment.growth import Growth
+from bench.experiment.record import Run
+from bench.experiment.results import Result
+
+__all__ = ["Cell", "Findings"]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One run."""
+
+    choices: Choices
+    profile: Profile
+    result: Result
+    run: Run
+
+
+@dataclass
+class Findings:
+    cells: list[Cell] = field(default_factory=list)
+    growth: Growth | None = None
+    outages: list[dict[str, Any]] = field(default_factory=list)
+    failed: list[str] = field(default_factory=list)  # what did not come to an end, and why
+    machine: dict[str, Any] = field(default_factory=dict)
+
+    def results(self) -> list[dict[str, Any]]:
+        """For JSON."""
+        growth = [] if self.growth is None else [self.growth.fields()]
+        return [*(cell.result for cell in self.cells), *growth, *self.outages]
+
+    @property
+    def broken(self) -> bool:
+        """A verdict is false."""
+        return any(False in result["verdicts"].values() for result in self.results())
