@@ -142,5 +142,4 @@ class ConsoleProxy:
             response.headers.append(name, value)
 
     async def _websocket(self, browser: WebSocket) -> None:
-        target = "ws" + self._console.removeprefix("http") + browser.url.path
-        await join(browser, target + (f"?{browser.url.query}" if browser.url.query else ""), self._paths)
+        await join(browser, self._console, self._paths)

@@ -1,13 +1,15 @@
 """Joins a browser's WebSocket with the console's, each direction over its path. It carries the 3D scene."""
 
 import asyncio
+import ssl
 from collections.abc import AsyncIterator, Mapping
 from contextlib import aclosing, suppress
+from urllib.parse import urlsplit
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 from bench.emulator.delayed import delayed
 from bench.emulator.profile import Direction
@@ -20,16 +22,20 @@ POLICY_VIOLATION = 1008  # RFC 6455 7.4.1
 GOING_AWAY = 1001
 
 
-async def join(browser: WebSocket, url: str, paths: Mapping[Direction, StreamPath]) -> None:
-    """Until one side closes. `url` is the console's side."""
-    headers = {name: browser.headers[name] for name in ("origin", "host") if name in browser.headers}
-    wanted = [Subprotocol(each) for each in browser.scope.get("subprotocols", [])]
+async def join(browser: WebSocket, console: str, paths: Mapping[Direction, StreamPath]) -> None:
+    """Until one side closes. `console` is its URL; to it the request is for the host that the browser asked for."""
+    target = urlsplit(console)
+    secure = target.scheme == "https"
+    query = f"?{browser.url.query}" if browser.url.query else ""
+    origin = browser.headers.get("origin")
     try:
         upstream = await connect(
-            url,
-            subprotocols=wanted or None,
-            additional_headers=headers,
-            origin=None,
+            f"{'wss' if secure else 'ws'}://{browser.headers['host']}{browser.url.path}{query}",
+            host=target.hostname,
+            port=target.port or (443 if secure else 80),
+            ssl=_unchecked() if secure else None,
+            origin=None if origin is None else Origin(origin),
+            subprotocols=[Subprotocol(each) for each in browser.scope.get("subprotocols", [])] or None,
             compression=None,
             max_size=MAX_MESSAGE,
             proxy=None,
@@ -50,6 +56,14 @@ async def join(browser: WebSocket, url: str, paths: Mapping[Direction, StreamPat
             for way in ways:
                 way.cancel()
             await asyncio.gather(*ways, return_exceptions=True)
+
+
+def _unchecked() -> ssl.SSLContext:
+    """The console's own certificate may be self-signed, and there is nobody between it and this process."""
+    context = ssl.create_default_context()
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE
+    return context
 
 
 async def _to_console(browser: WebSocket, upstream: ClientConnection, path: StreamPath) -> None:
