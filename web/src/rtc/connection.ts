@@ -16,7 +16,7 @@ import type { StampReader } from "./stamp_reader";
 /** How the page stands with the console. */
 export type LinkState =
   | { readonly kind: "no_token" }
-  | { readonly kind: "connecting" }
+  | { readonly kind: "connecting"; readonly after?: { readonly why: LinkTrouble; readonly detail: string } }
   | { readonly kind: "connected" }
   | { readonly kind: "ended"; readonly why: LinkEnd } // for good: this link opens nothing any more
   | {
@@ -50,6 +50,7 @@ export class Connection {
 
   /** Connects, and connects again whenever it ends, until closed. */
   async run(): Promise<void> {
+    this.events.state({ kind: "connecting" });
     while (!this.closed()) {
       const trouble = await this.live();
       if (this.closed()) return;
@@ -61,6 +62,7 @@ export class Connection {
       const retryAtMs = performance.now() + waitMs;
       this.events.state({ kind: "waiting", why: trouble.why, detail: trouble.detail, retryAtMs });
       await this.sleep(waitMs);
+      this.events.state({ kind: "connecting", after: trouble });
     }
   }
 
@@ -100,7 +102,6 @@ export class Connection {
 
   /** One connection from its first request to its end; says what ended it. */
   private async live(): Promise<Trouble> {
-    this.events.state({ kind: "connecting" });
     const started = performance.now();
     const ending = Promise.withResolvers<PeerEnd>();
     const peer = new Peer(this.api, this.reader, this.options, {

@@ -1,6 +1,6 @@
 import { mayDrive, robotIsUp } from "../core/console_state";
 import { ageWords, resumeWords } from "../core/freshness";
-import { END_WORDS, TROUBLE_WORDS } from "../core/trouble";
+import { END_WORDS, TROUBLE_WORDS, type LinkTrouble } from "../core/trouble";
 import type { ConsoleApp } from "../console_app";
 import type { LinkState } from "../rtc/connection";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
@@ -60,12 +60,11 @@ function linkWords(link: LinkState, now: number): OverlayWords {
         text: "This page needs the link that lockstep up printed: it ends in #token=…",
       };
     case "connecting":
-      return { tone: "calm", title: "Connecting…", text: "" };
+      if (link.after === undefined) return { tone: "calm", title: "Connecting…", text: "" };
+      return troubleWords(link.after, "Trying again now.");
     case "waiting": {
-      const { title, text } = TROUBLE_WORDS[link.why];
       const seconds = Math.max(0, Math.ceil((link.retryAtMs - now) / 1000));
-      const detail = link.detail === "" ? "" : ` ${sentence(link.detail)}`;
-      return { tone: "bad", title, text: `${text}${detail} Trying again in ${seconds} s.`.trim() };
+      return troubleWords(link, `Trying again in ${seconds} s.`);
     }
     case "ended":
       return { tone: "calm", ...END_WORDS[link.why] };
@@ -90,6 +89,12 @@ function stopWords(app: ConsoleApp): OverlayWords {
     ? "Reset moves nothing; arm again afterwards."
     : "An operator or a supervisor can reset it.";
   return { tone: "stopped", title: "Stopped", text: `${who}${why}. ${next}` };
+}
+
+function troubleWords(link: { why: LinkTrouble; detail: string }, next: string): OverlayWords {
+  const { title, text } = TROUBLE_WORDS[link.why];
+  const detail = link.detail === "" ? "" : sentence(link.detail);
+  return { tone: "bad", title, text: [text, detail, next].filter((part) => part !== "").join(" ") };
 }
 
 function sentence(text: string): string {

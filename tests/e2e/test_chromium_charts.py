@@ -1,0 +1,64 @@
+"""Live charts: shown beside the pictures while driving, frozen, and saved with one key as CSV and PNG."""
+
+import csv
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser, Download, expect
+
+from tests.e2e.console_page import open_console
+from tests.support.stack import Stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+
+async def test_one_key_saves_what_the_charts_show_while_the_operator_drives(
+    stack: Stack, chromium: Browser, tmp_path: Path
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        page = console.page
+        downloads: list[Download] = []
+        page.on("download", lambda download: downloads.append(download))
+        await console.until_live()
+        await console.arm()
+        await console.drive_forward()
+        await page.keyboard.press("c")
+        await expect(page.locator(".chart")).to_have_count(4)
+        await console.until("s.event > 30")
+        assert (await console.stats())["driving"], "charts do not stand in the operator's way"
+        await expect(page.locator("[data-chart=gap] .chart-figure").first).not_to_have_text("–")
+        async with page.expect_download(lambda download: download.suggested_filename.endswith(".png")):
+            await page.keyboard.press("x")
+        kinds = {Path(download.suggested_filename).suffix: download for download in downloads}
+        await kinds[".csv"].save_as(tmp_path / "charts.csv")
+        await kinds[".png"].save_as(tmp_path / "charts.png")
+        await page.keyboard.press("f")
+        await expect(page.locator(".charts")).to_have_attribute("data-frozen", "true")
+        await page.keyboard.press("c")
+        await expect(page.locator(".charts")).to_be_hidden()
+        await expect(page.locator(".chart")).to_have_count(0)
+    rows = list(csv.DictReader((tmp_path / "charts.csv").read_text().splitlines()))
+    events = [int(row["event"]) for row in rows if row["event"]]
+    assert events == sorted(events)
+    assert events[-1] > 30
+    gaps = [abs(int(row["overview_gap"])) for row in rows if row["overview_gap"]]
+    assert gaps
+    assert max(gaps) <= 4
+    assert {row["epoch"] for row in rows if row["event"]} == {rows[-1]["epoch"]}
+    assert (tmp_path / "charts.png").read_bytes().startswith(b"\x89PNG")
+
+
+async def test_on_a_small_screen_the_charts_stand_over_the_pictures_and_nobody_drives_behind_them(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, stack.operator, width=390, height=844, touch=True) as console:
+        page = console.page
+        await console.until_live()
+        await console.arm()
+        await page.get_by_role("button", name="Details").click()
+        await page.locator(".details-extras").get_by_role("button", name="Charts").click()
+        await expect(page.locator(".chart")).to_have_count(4)
+        await console.until("!s.armed")
+        await expect(page.get_by_role("button", name="STOP")).to_be_visible()
+        await page.get_by_role("button", name="10 min").click()
+        await expect(page.get_by_role("button", name="10 min")).to_have_attribute("aria-pressed", "true")
