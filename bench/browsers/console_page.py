@@ -52,11 +52,11 @@ class ConsolePage:
         return statistics
 
     async def until(self, condition: str, seconds: float = 20.0) -> None:
-        """Until `condition`, an expression over `s`, the page's statistics, is true."""
+        """Until `condition`, an expression over `s`, the page's statistics, is true; one that throws is not."""
         holds = f"const s = window.lockstep?.stats(); return Boolean(s && ({condition}));"
         # The condition is part of the script: the page's content security policy forbids evaluating strings.
         waiting = """(limit) => new Promise((resolve) => {
-          const holds = () => { %s };
+          const holds = () => { try { %s } catch { return false; } };
           const end = performance.now() + limit;
           const look = () => {
             if (holds()) resolve(null);

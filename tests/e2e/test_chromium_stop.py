@@ -14,8 +14,14 @@ async def _stopped(console: ConsolePage) -> None:
 
 
 def _executed_after_the_stop(stack: Stack) -> list[int]:
-    stop = next(stack.events("stop"))
-    return [record["event"] for record in stack.events("executed") if record["time"] > stop["time"]]
+    """Events executed between a stop and its reset."""
+    times = [record["time"] for record in stack.events("reset")] + [float("inf")]
+    return [
+        record["event"]
+        for stop in stack.events("stop")
+        for record in stack.events("executed")
+        if stop["time"] < record["time"] < min(time for time in times if time > stop["time"])
+    ]
 
 
 async def test_the_stop_button_stops_a_driven_robot_and_it_stays_stopped(stack: Stack, chromium: Browser) -> None:
@@ -63,6 +69,125 @@ async def test_an_observer_stops_what_the_operator_drives(stack: Stack, chromium
     assert _executed_after_the_stop(stack) == []
 
 
+async def _press_key(observer: ConsolePage) -> None:
+    await observer.page.keyboard.press("Escape")
+
+
+async def _press_pad(observer: ConsolePage) -> None:
+    await observer.press(STOP_BUTTON)
+
+
+async def _press_button(observer: ConsolePage) -> None:
+    await observer.page.get_by_role("button", name="Stop the robot").click()
+
+
+async def _ask_over_http(observer: ConsolePage) -> None:
+    """As the page does when nothing else works: its own token, no data channel."""
+    await observer.page.evaluate(
+        """() => fetch("/api/stop", {
+          method: "POST",
+          headers: {
+            Authorization: `Bearer ${new URLSearchParams(location.hash.slice(1)).get("token")}`,
+            "Content-Type": "application/json",
+          },
+          body: JSON.stringify({ reason: "from outside" }),
+        }).then((answer) => { if (!answer.ok) throw new Error(`${answer.status}`); })"""
+    )
+
+
+async def test_an_observer_stops_by_key_pad_button_and_http_and_all_see_who_and_why(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with (
+        open_console(chromium, stack.operator) as operator,
+        open_console(chromium, stack.observer) as observer,
+    ):
+        await operator.until_live()
+        await observer.until("s.connected && s.event !== null")
+        for way, reason in (
+            (_press_key, "stop key"),
+            (_press_pad, "stop key"),
+            (_press_button, "stop button"),
+            (_ask_over_http, "from outside"),
+        ):
+            await operator.arm()
+            await operator.drive_forward()
+            await way(observer)
+            await _stopped(operator)
+            for console in (operator, observer):
+                await console.page.locator(".plate").get_by_text(f"By observer: {reason}").wait_for()
+            await observer.press(STOP_BUTTON, False)
+            await operator.press(RB, False)
+            await _reset(operator)
+    assert _executed_after_the_stop(stack) == []
+
+
+async def test_a_supervisor_stops_and_resets_what_an_operator_drives(stack: Stack, chromium: Browser) -> None:
+    async with (
+        open_console(chromium, stack.operator) as operator,
+        open_console(chromium, stack.supervisor, pad=False) as supervisor,
+    ):
+        await operator.until_live()
+        await supervisor.until("s.connected && s.event !== null")
+        await operator.arm()
+        await operator.drive_forward()
+        await supervisor.page.keyboard.press("Escape")
+        await _stopped(operator)
+        await _reset(supervisor)
+        await operator.until("!s.stop.stopped")
+        assert not (await operator.stats())["armed"]
+
+
+async def test_stop_works_while_a_dialogue_is_open_and_says_so_above_it(stack: Stack, chromium: Browser) -> None:
+    async with (
+        open_console(chromium, stack.operator, pad=False) as operator,
+        open_console(chromium, stack.observer + "&name=Dee", pad=False) as observer,
+    ):
+        await operator.until("s.connected && s.seat && s.seat.mine")
+        await operator.page.get_by_role("tab", name="People").click()
+        await operator.page.get_by_role("button", name="Invite…").click()
+        dialogue = operator.page.get_by_role("dialog")
+        await dialogue.get_by_label("Name").fill("half written")
+        await observer.page.get_by_role("button", name="Stop the robot").click()
+        await operator.until("s.stop.stopped")
+        await operator.page.locator(".banner").get_by_text("Stopped by Dee").wait_for()
+        assert await dialogue.is_visible()
+        await dialogue.get_by_role("button", name="Close").click()
+        await _reset(operator)
+        await operator.page.get_by_role("button", name="Invite…").click()
+        await operator.page.get_by_role("button", name="Stop the robot").click()
+        await operator.until("s.stop.stopped")
+        await dialogue.get_by_role("button", name="Close").click()
+        await _reset(operator)
+        await operator.page.get_by_role("button", name="Invite…").click()
+        await dialogue.get_by_label("Name").fill("half written")
+        await operator.page.keyboard.press("Escape")
+        await operator.until("s.stop.stopped")
+        assert await dialogue.count() == 0, "Escape also closes it: the stop is to be seen"
+
+
+async def test_a_stop_key_works_inside_the_3d_scene(stack: Stack, chromium: Browser) -> None:
+    async with open_console(chromium, stack.observer, pad=False) as observer:
+        # Drawing the real scene takes so long on a busy machine that the page gives it up.
+        await observer.page.route("**/scene/**", lambda route: route.fulfill(body="<input>", content_type="text/html"))
+        await observer.until_live()
+        await observer.page.get_by_role("button", name="Show 3D scene large").click()
+        await observer.page.frame_locator("iframe").locator("input").click()
+        assert await observer.page.evaluate("document.activeElement.tagName") == "IFRAME"
+        await observer.page.keyboard.press("Escape")
+        await observer.until("s.stop.stopped")
+
+
+async def _reset(console: ConsolePage) -> None:
+    """Hold the button until the robot says that it is no longer stopped."""
+    box = await console.page.get_by_role("button", name="Hold to reset").bounding_box()
+    assert box is not None
+    await console.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    await console.page.mouse.down()
+    await console.until("!s.stop.stopped")
+    await console.page.mouse.up()
+
+
 async def test_reset_moves_nothing_and_driving_needs_arming_again(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
@@ -70,13 +195,7 @@ async def test_reset_moves_nothing_and_driving_needs_arming_again(stack: Stack, 
         await console.drive_forward()
         await console.page.keyboard.press("Escape")
         await _stopped(console)
-        reset = console.page.get_by_role("button", name="Hold to reset")
-        box = await reset.bounding_box()
-        assert box is not None
-        await console.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-        await console.page.mouse.down()
-        await console.until("!s.stop.stopped")
-        await console.page.mouse.up()
+        await _reset(console)
         # Deadman and stick are still held as they were.
         rendered = (await console.stats())["streams"]["overview"]["rendered"]
         await console.until(f"s.streams.overview.rendered > {rendered + 15}")

@@ -1,0 +1,151 @@
+"""The control seat goes from page to page: asked for, granted, declined, taken, lost to idleness.
+
+The robot rests in between.
+"""
+
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser, Locator
+
+from bench.browsers.console_page import RB, ConsolePage, open_console
+from tests.support.stack import Stack, running_stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+
+def _button(console: ConsolePage, name: str) -> Locator:
+    return console.page.get_by_role("button", name=name)
+
+
+def _seat(console: ConsolePage) -> Locator:
+    """The bar that says who drives."""
+    return console.page.get_by_role("region", name="Control seat")
+
+
+async def _says(console: ConsolePage, words: str) -> None:
+    await _seat(console).get_by_text(words).first.wait_for(timeout=10_000)
+
+
+async def _drives(console: ConsolePage) -> None:
+    await console.until_live()
+    await console.arm()
+    await console.drive_forward()
+
+
+async def _lost_the_seat(console: ConsolePage) -> None:
+    """Disarmed and at rest, although stick and deadman are still held."""
+    await console.until("!s.armed && !s.seat.mine && s.at_rest === true")
+
+
+async def _drives_after_arming(console: ConsolePage) -> None:
+    assert not (await console.stats())["armed"], "a new operator has to arm"
+    event = (await console.stats())["event"]
+    await console.arm()
+    await console.drive_forward()
+    await console.until(f"s.event > {event + 5}")
+
+
+async def test_a_granted_request_hands_over_a_robot_at_rest_and_events_go_on(stack: Stack, chromium: Browser) -> None:
+    async with (
+        open_console(chromium, stack.operator + "&name=Ann") as ann,
+        open_console(chromium, stack.operator + "&name=Ben") as ben,
+        open_console(chromium, stack.observer, pad=False) as watcher,
+    ):
+        await _drives(ann)
+        await ben.until("s.connected && s.seat.name === 'Ann'")
+        await _button(ben, "Request control").click()
+        await _says(ben, "You have asked")
+        await _says(watcher, "Ben asked for control")
+        await _says(ann, "Ben asks for control")
+        assert (await ann.stats())["driving"], "being asked disturbs nobody"
+        before = (await ann.stats())["event"]
+        await ann.page.keyboard.press("F8")
+        await _lost_the_seat(ann)
+        await _says(ann, "You handed control to Ben")
+        await _says(ben, "Ann handed control to you. Arm to drive")
+        await _says(watcher, "Ann handed control to Ben")
+        await _drives_after_arming(ben)
+        assert (await ben.stats())["event"] > before
+    executed = [record["event"] for record in stack.events("executed")]
+    assert executed == sorted(set(executed)), "events go on across a hand-over"
+
+
+async def test_a_declined_request_changes_nothing_and_is_told(stack: Stack, chromium: Browser) -> None:
+    async with (
+        open_console(chromium, stack.operator + "&name=Ann") as ann,
+        open_console(chromium, stack.operator + "&name=Ben", pad=False) as ben,
+    ):
+        await _drives(ann)
+        await ben.until("s.connected && s.seat.name === 'Ann'")
+        await _button(ben, "Request control").click()
+        await _button(ann, "Decline").click()
+        await _says(ben, "Ann declined your request")
+        assert await _button(ben, "Request control").is_enabled()
+        assert await _button(ann, "Decline").count() == 0
+        assert (await ann.stats())["driving"], "answering with the pointer lets go of nothing"
+
+
+async def test_a_supervisor_takes_control_with_one_click_and_drives_after_arming(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with (
+        open_console(chromium, stack.operator + "&name=Ann") as ann,
+        open_console(chromium, stack.supervisor + "&name=Sue") as sue,
+    ):
+        await _drives(ann)
+        await sue.until_live()
+        assert not (await sue.stats())["seat"]["mine"], "a supervisor's page takes nothing by itself"
+        assert await sue.page.get_by_role("button", name="Arm", exact=True).count() == 0
+        await _button(sue, "Take control").click()
+        await _lost_the_seat(ann)
+        await _says(ann, "Sue took control from you")
+        await _says(sue, "You took control from Ann. Arm to drive")
+        await _drives_after_arming(sue)
+        await sue.press(RB, False)
+        await sue.until("s.at_rest === true")
+
+
+async def test_an_idle_operator_is_warned_can_stay_and_loses_the_seat_otherwise(
+    tmp_path: Path, chromium: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LOCKSTEP_SEAT_IDLE_SECONDS", "6")
+    async with running_stack(tmp_path) as stack, open_console(chromium, stack.operator) as console:
+        await console.until("s.connected && s.seat.mine")
+        await console.arm()
+        await _says(console, "Control is given back in 3 s")
+        await _button(console, "Keep control").click()
+        await _says(console, "Control is given back in 6 s")
+        assert (await console.stats())["seat"]["mine"]
+        await console.until("!s.armed && s.seat.holder === ''", 15)
+        await _says(console, "You were idle: the control seat is free")
+        await _button(console, "Request control").click()
+        await console.until("s.seat.mine")
+        assert not (await console.stats())["armed"]
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (844, 390), (1280, 800)])
+async def test_the_seats_button_is_always_in_view_and_in_one_place(
+    stack: Stack, chromium: Browser, width: int, height: int
+) -> None:
+    touch = width < 1000
+    async with (
+        open_console(chromium, stack.operator + "&name=Ann", width=width, height=height, touch=touch) as ann,
+        open_console(chromium, stack.operator + "&name=Ben", width=width, height=height, touch=touch) as ben,
+    ):
+        await ann.until("s.connected && s.seat.mine")
+        await ben.until("s.connected && s.seat.name === 'Ann'")
+        request = await _button(ben, "Request control").bounding_box()
+        give = await _button(ann, "Give control back").bounding_box()
+        assert request is not None
+        assert give is not None
+        assert abs(request["y"] - give["y"]) < 1
+        assert abs(request["x"] + request["width"] - give["x"] - give["width"]) < 1
+        assert request["y"] + request["height"] < height / 3
+        assert request["height"] >= 32
+        await _button(ben, "Request control").click()
+        await _says(ann, "asks for control")
+        for name in ("Grant", "Decline"):
+            box = await _button(ann, name).bounding_box()
+            assert box is not None
+            assert box["x"] + box["width"] <= width
