@@ -8,6 +8,8 @@ from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
+SCENE = '<input style="margin: 30vh 30vw">'  # takes the focus as viser does
+
 
 async def _stopped(console: ConsolePage) -> None:
     await console.until("s.stop.stopped && !s.armed && s.at_rest === true")
@@ -169,7 +171,7 @@ async def test_stop_works_while_a_dialogue_is_open_and_says_so_above_it(stack: S
 async def test_a_stop_key_works_inside_the_3d_scene(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.observer, pad=False) as observer:
         # Drawing the real scene takes so long on a busy machine that the page gives it up.
-        await observer.page.route("**/scene/**", lambda route: route.fulfill(body="<input>", content_type="text/html"))
+        await observer.page.route("**/scene/**", lambda route: route.fulfill(body=SCENE, content_type="text/html"))
         await observer.until_live()
         await observer.page.get_by_role("button", name="Show 3D scene large").click()
         await observer.page.frame_locator("iframe").locator("input").click()
