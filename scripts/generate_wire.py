@@ -13,6 +13,7 @@ import msgspec
 
 from robot_bridge.protocol.console import ClientMessage, ServerMessage
 from robot_bridge.protocol.messages import LinkMessage
+from server.openapi import openapi_document
 
 SCHEMAS = Path(__file__).resolve().parent.parent / "docs" / "schemas"
 
@@ -49,6 +50,7 @@ def generated() -> dict[Path, str]:
     received = frozenset(_reachable(ServerMessage) - _reachable(ClientMessage))
     return {
         SCHEMAS / "console.schema.json": _schema("Lockstep console messages", console, received),
+        SCHEMAS / "console-openapi.json": json.dumps(openapi_document(), indent=2) + "\n",
         SCHEMAS / "robot-link.schema.json": _schema("Lockstep robot link messages", {"LinkMessage": LinkMessage}),
     }
 

@@ -13,7 +13,7 @@ from server.body import read_json
 from server.errors import LinkDown
 from server.services import authorized, services
 
-__all__ = ["Health", "ScenePath", "SessionInfo", "router"]
+__all__ = ["Delivered", "Health", "ScenePath", "SessionInfo", "StopRequest", "router"]
 
 router = APIRouter()
 Caller = Annotated[Identity, Depends(authorized)]

@@ -24,6 +24,7 @@ from server.log_context import LogContext, follow_clock
 from server.media.aiortc_private import own_addresses, restrict_ice_hosts
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
+from server.openapi import openapi_document
 from server.page import page_router
 from server.rate_limits import RateLimits
 from server.scene import SceneView
@@ -59,9 +60,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         follow_clock(console.clock)
         audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
         warden = LinkWarden(opened.invitations, console.peers, console.audit, metrics)
-        app.state.services = Services(
-            settings, metrics, console, media, opened, audit, warden, Guard(settings), scene
-        )
+        app.state.services = Services(settings, metrics, console, media, opened, audit, warden, Guard(settings), scene)
         try:
             async with asyncio.TaskGroup() as tasks:
                 running = [
@@ -90,6 +89,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
     app.include_router(api.router)
     app.include_router(api_access.router)
     app.include_router(api_ice.router)
+    app.add_api_route("/openapi.json", _describe, include_in_schema=False)
     app.include_router(scene_proxy.router)
     app.include_router(page_router())
     app.add_exception_handler(ConsoleError, _answer_console_error)
@@ -152,6 +152,10 @@ def _answer(request: Request, error: ConsoleError) -> Response:
     entry = http_error(error)
     services(request).metrics.bad_input.labels("http", entry.name).inc()
     return _error_response(entry.status, entry.name, error.detail, entry.headers)
+
+
+async def _describe() -> Response:
+    return Response(msgspec.json.encode(openapi_document()), media_type="application/json")
 
 
 def _count_refused(scope: Scope, name: str) -> None:

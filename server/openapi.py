@@ -1,0 +1,224 @@
+"""The OpenAPI document of the console's HTTP interface: one table of operations. No I/O.
+
+FastAPI could only write one that knows no answers, since bodies are read with bounds and answers are msgspec structs.
+"""
+
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import Any, NamedTuple
+
+import msgspec
+
+from server.api import Delivered, Health, ScenePath, SessionInfo, StopRequest
+from server.api_access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
+from server.errors import (
+    HTTP_ERRORS,
+    BadJson,
+    BadParameter,
+    BadSdp,
+    BadSdpFragment,
+    BodyTooLarge,
+    BodyTooSlow,
+    ConsoleError,
+    HostRefused,
+    HttpError,
+    LinkDown,
+    LinkExpired,
+    LinkRevoked,
+    NotAllowed,
+    NotConnected,
+    NotFound,
+    OriginRefused,
+    PreconditionFailed,
+    PreconditionRequired,
+    RobotUnreachable,
+    SceneUnavailable,
+    ShuttingDown,
+    TokenInvalid,
+    TokenMissing,
+    TooManyInvitations,
+    TooManyPeers,
+    TooManyRequests,
+    WrongMediaType,
+)
+from server.ice_servers import IceServers
+
+__all__ = ["OPERATIONS", "Operation", "openapi_document"]
+
+SDP = "application/sdp"
+FRAGMENT = "application/trickle-ice-sdpfrag"
+JSON = "application/json"
+
+Errors = tuple[type[ConsoleError], ...]
+
+EVERYWHERE: Errors = (HostRefused, TooManyRequests)
+WITH_TOKEN: Errors = (TokenMissing, TokenInvalid, LinkExpired, LinkRevoked)
+WITH_BODY: Errors = (BodyTooLarge, BodyTooSlow)
+WITH_JSON: Errors = (BadJson, *WITH_BODY)
+
+
+class Problem(msgspec.Struct, frozen=True):
+    """Every error: a stable name, and words for a person."""
+
+    error: str
+    detail: str
+
+
+class Parameter(NamedTuple):
+    name: str
+    where: str  # "path", "query", "header"
+    schema: dict[str, Any]
+    required: bool = False
+
+
+class Operation(NamedTuple):
+    """One method of one path."""
+
+    method: str
+    path: str
+    summary: str
+    status: int  # when it goes well
+    answer: type[msgspec.Struct] | str | None  # a struct as JSON, text of a media type, nothing
+    errors: Errors = ()
+    body: type[msgspec.Struct] | str | None = None
+    token: bool = True
+    parameters: tuple[Parameter, ...] = ()
+    headers: tuple[str, ...] = ()  # of the answer, besides those of every answer
+    also: tuple[int, ...] = ()  # other statuses that are no errors; without a body
+
+
+RESOURCE = Parameter("resource", "path", {"type": "string"}, required=True)
+MATCH = Parameter("If-Match", "header", {"type": "string", "pattern": r'^(\*|"[0-9a-f]{16}")$'}, required=True)
+STAMP = Parameter("stamp", "query", {"type": "string", "enum": ["trailer"]})
+AFTER = Parameter("after", "query", {"type": "integer", "default": 0})
+LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS, "default": 100})
+INVITATION = Parameter("invitation_id", "path", {"type": "string"}, required=True)
+
+OPERATIONS: tuple[Operation, ...] = (
+    Operation(
+        *("post", "/whep", "Offer a WebRTC connection (WHEP).", 201, SDP),
+        errors=(BadSdp, WrongMediaType, BadParameter, RobotUnreachable, TooManyPeers, ShuttingDown, *WITH_BODY),
+        body=SDP,
+        parameters=(STAMP,),
+        headers=("Location", "ETag", "Accept-Patch"),
+    ),
+    Operation(
+        *("patch", "/whep/{resource}", "More ICE candidates, or an ICE restart (If-Match: *).", 200, FRAGMENT),
+        errors=(
+            *(BadSdpFragment, WrongMediaType, NotFound, NotConnected, PreconditionFailed, PreconditionRequired),
+            *WITH_BODY,
+        ),
+        body=FRAGMENT,
+        parameters=(RESOURCE, MATCH),
+        headers=("ETag",),
+        also=(204,),
+    ),
+    Operation("delete", "/whep/{resource}", "End a connection.", 200, None, (NotFound,), parameters=(RESOURCE,)),
+    Operation("get", "/api/session", "What is going on.", 200, SessionInfo),
+    Operation("get", "/api/ice", "STUN and TURN servers, with credentials for a while.", 200, IceServers),
+    Operation(
+        *("post", "/api/stop", "Stop the robot, latched. From every role.", 200, Delivered),
+        errors=(LinkDown, *WITH_JSON),
+        body=StopRequest,
+    ),
+    Operation("post", "/api/reset", "Release the latched stop.", 200, Delivered, (NotAllowed, LinkDown)),
+    Operation("post", "/api/scene", "A ticket for the 3D scene.", 200, ScenePath, (SceneUnavailable,)),
+    Operation("get", "/api/invitations", "Whom one has invited.", 200, InvitationList, (NotAllowed,)),
+    Operation(
+        *("post", "/api/invitations", "Invite a person.", 201, NewInvitation),
+        errors=(NotAllowed, BadParameter, TooManyInvitations, *WITH_JSON),
+        body=InvitationRequest,
+    ),
+    Operation(
+        *("delete", "/api/invitations/{invitation_id}", "Revoke, and end whoever came with it.", 200, InvitationList),
+        errors=(NotAllowed, NotFound),
+        parameters=(INVITATION,),
+    ),
+    Operation(
+        *("get", "/api/audit", "Who did what.", 200, AuditPage),
+        errors=(NotAllowed, BadParameter),
+        parameters=(AFTER, LIMIT),
+    ),
+    Operation("get", "/healthz", "Whether the console runs, and reaches its robot.", 200, Health, token=False),
+    Operation("get", "/metrics", "Prometheus.", 200, "text/plain", token=False),
+)
+
+
+def openapi_document(operations: Sequence[Operation] = OPERATIONS) -> dict[str, Any]:
+    """OpenAPI 3.1."""
+    structs = {Problem} | {kind for each in operations for kind in (each.answer, each.body) if isinstance(kind, type)}
+    ordered = sorted(structs, key=lambda struct: struct.__name__)
+    _, components = msgspec.json.schema_components(ordered, ref_template="#/components/schemas/{name}")
+    paths: dict[str, dict[str, Any]] = {}
+    for operation in operations:
+        paths.setdefault(operation.path, {})[operation.method] = _operation(operation)
+    return {
+        "openapi": "3.1.0",
+        "info": {"title": "Lockstep console", "version": "1", "description": "See docs/console-api.md."},
+        "paths": paths,
+        "components": {
+            "schemas": dict(sorted(components.items())),
+            "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
+        },
+    }
+
+
+def _operation(operation: Operation) -> dict[str, Any]:
+    found: dict[str, Any] = {"summary": operation.summary, "responses": _responses(operation)}
+    if operation.token:
+        found["security"] = [{"token": []}]
+    if operation.parameters:
+        found["parameters"] = [
+            {"name": each.name, "in": each.where, "required": each.required, "schema": each.schema}
+            for each in operation.parameters
+        ]
+    if operation.body is not None:
+        found["requestBody"] = {"required": isinstance(operation.body, str), "content": _content(operation.body)}
+    return found
+
+
+def _responses(operation: Operation) -> dict[str, Any]:
+    good: dict[str, Any] = {"description": HTTPStatus(operation.status).phrase}
+    if operation.answer is not None:
+        good["content"] = _content(operation.answer)
+    if operation.headers:
+        good["headers"] = {name: {"required": True, "schema": {"type": "string"}} for name in operation.headers}
+    responses = {str(operation.status): good}
+    responses |= {str(status): {"description": HTTPStatus(status).phrase} for status in operation.also}
+    for status, entries in sorted(_errors(operation).items()):
+        responses[str(status)] = _error(status, entries)
+    return responses
+
+
+def _errors(operation: Operation) -> dict[int, list[HttpError]]:
+    """By status: what this operation can raise, and what anything can."""
+    errors = (*operation.errors, *EVERYWHERE, *(WITH_TOKEN if operation.token else ()))
+    if operation.method != "get":
+        errors += (OriginRefused,)
+    by_status: dict[int, list[HttpError]] = {}
+    for error in errors:
+        entry = HTTP_ERRORS[error]
+        known = by_status.setdefault(entry.status, [])
+        if entry.name not in [each.name for each in known]:
+            known.append(entry)
+    return by_status
+
+
+def _error(status: int, entries: list[HttpError]) -> dict[str, Any]:
+    names = sorted(entry.name for entry in entries)
+    schema = {"allOf": [_reference(Problem), {"properties": {"error": {"enum": names}}}]}
+    always = set.intersection(*({*entry.headers} for entry in entries)) - {"Connection"}
+    found: dict[str, Any] = {"description": ", ".join(names), "content": {JSON: {"schema": schema}}}
+    if always:
+        found["headers"] = {name: {"required": True, "schema": {"type": "string"}} for name in sorted(always)}
+    return found
+
+
+def _content(kind: type[msgspec.Struct] | str) -> dict[str, Any]:
+    if isinstance(kind, str):
+        return {kind: {"schema": {"type": "string"}}}
+    return {JSON: {"schema": _reference(kind)}}
+
+
+def _reference(struct: type[msgspec.Struct]) -> dict[str, str]:
+    return {"$ref": f"#/components/schemas/{struct.__name__}"}
