@@ -172,7 +172,7 @@ class SeatMachine(RuleBasedStateMachine):
         assert not self.seat.claims(self.now)
 
 
-SeatMachine.TestCase.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+SeatMachine.TestCase.settings = settings(max_examples=80, stateful_step_count=30, deadline=None)
 TestSeatMachine = SeatMachine.TestCase
 
 

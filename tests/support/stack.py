@@ -59,12 +59,14 @@ class Stack:
         with _frozen(self.process.pid):
             yield
 
-    def events(self, kind: str) -> Iterator[dict[str, Any]]:
-        """The bridge's records of one kind so far."""
+    def records(self) -> Iterator[dict[str, Any]]:
+        """The bridge's records so far."""
         for line in self.event_log.read_text().splitlines():
-            record = json.loads(line)
-            if record["kind"] == kind:
-                yield record
+            yield json.loads(line)
+
+    def events(self, kind: str) -> Iterator[dict[str, Any]]:
+        """Those of one kind."""
+        return (record for record in self.records() if record["kind"] == kind)
 
 
 @contextmanager
