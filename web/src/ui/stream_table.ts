@@ -1,3 +1,4 @@
+import { limitWords, streamQualityWords } from "../core/quality_words";
 import type { ConsoleApp } from "../console_app";
 import type { SoundStream } from "../media/sound_stream";
 import type { VideoStream } from "../media/video_stream";
@@ -5,7 +6,7 @@ import { grouped, h, setData, setHidden, setText, type Panel } from "./dom";
 
 interface Row {
   readonly element: HTMLElement;
-  show(stream: VideoStream | SoundStream, tolerance: number): void;
+  show(stream: VideoStream | SoundStream, tolerance: number, quality: string): void;
 }
 
 /** Every stream's gap against its tolerance, and what the gate did with it. */
@@ -15,16 +16,25 @@ export function createStreamTable(app: ConsoleApp): Panel {
   const body = h("div", "streams");
   const carrier = h("span", "card-note");
   const head = h("div", "card-head", {}, h("h2", "", {}, "Streams"), carrier);
+  const limit = h("p", "quality-limit");
   return {
-    element: h("section", "card", { "aria-label": "Streams" }, head, empty, body),
+    element: h("section", "card", { "aria-label": "Streams" }, head, limit, empty, body),
     update() {
       const streams = [...app.room.videos.values(), ...app.room.sounds.values()];
       setHidden(empty, streams.length > 0);
+      const words = limitWords(app.state.quality);
+      setHidden(limit, words === null);
+      setText(limit, words ?? "");
       setText(carrier, [...new Set(streams.map((stream) => stream.info.carrier))].join(", "));
       keepRows(rows, body, new Set(streams.map((stream) => stream.info.stream)));
       for (const stream of streams) {
         const row = rows.get(stream.info.stream) ?? addRow(rows, body, stream.info.stream);
-        row.show(stream, app.state.settings.tolerance[stream.info.kind === "audio" ? "audio" : "video"]);
+        const quality = app.state.quality?.streams.find((found) => found.stream === stream.info.stream);
+        row.show(
+          stream,
+          app.state.settings.tolerance[stream.info.kind],
+          quality === undefined ? "" : streamQualityWords(quality),
+        );
       }
     },
   };
@@ -50,16 +60,19 @@ function createRow(): Row {
   const codec = h("span", "stream-codec");
   const gap = h("span", "stream-gap");
   const bar = h("span", "gap-bar", { "aria-hidden": "true" }, h("span", "gap-fill"));
+  const picture = h("span", "stream-quality");
   const counts = h("span", "stream-counts");
-  const element = h("div", "stream", {}, label, codec, bar, gap, counts);
+  const element = h("div", "stream", {}, label, codec, bar, gap, picture, counts);
   return {
     element,
-    show(stream, tolerance) {
+    show(stream, tolerance, quality) {
       const { counts: found } = stream.gate;
       const discarded = "discarded" in stream ? stream.discarded() : found.discarded;
       const size = Math.abs(found.gap ?? 0);
       setText(label, stream.info.label);
       setText(codec, stream.info.codec);
+      setText(picture, quality);
+      setHidden(picture, quality === "");
       setText(gap, found.gap === null ? "–" : `${found.gap} of ${tolerance}`);
       bar.style.setProperty(
         "--share",
