@@ -1,6 +1,7 @@
 """Private parts of aiortc and aioice under media and ICE; tests pin every one of them.
 
-Those under the data channels are in `server/data_transport_private.py`; nothing else in the server touches any.
+Those under the data channels are in `server/data_transport_private.py`; what peers send is
+guarded in `server/media/receive_guard_private.py`; nothing else in the server touches any.
 
 What is used and why:
 
@@ -8,15 +9,14 @@ What is used and why:
 - `RTCRtpTransceiver.__sender`, `._codecs`, `._headerExtensions`, `._offerDirection`: the answer is built from them
 - `RTCRtpSender`'s attributes that `RTCPeerConnection` reads: `_ssrc`, `_rtx_ssrc`, `_stream_id`, `_track_id`
 - `RTCDtlsTransport._tx_srtp`, `._state`, `._register_rtp_sender`: ready packets go out without a coroutine each
-- `RTCDtlsTransport._recv_next`: an exception there would end the connection
-- `aioice.Connection._nominated`, `._queue`: the selected path, and the receive queue, which has no bound
+- `aioice.Connection._nominated`: the selected path
 """
 
 import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 import aioice.ice
 import pylibsrtp
@@ -28,7 +28,7 @@ from aiortc import (
     RTCRtpSender,
     RTCRtpTransceiver,
 )
-from aiortc.rtcdtlstransport import RTCDtlsTransport, State
+from aiortc.rtcdtlstransport import State
 from aiortc.rtcrtpparameters import RTCRtpHeaderExtensionParameters, RTCRtpSendParameters
 from aiortc.rtp import (
     RTCP_PSFB_APP,
@@ -53,7 +53,6 @@ __all__ = [
     "MediaSender",
     "ReceptionListener",
     "create_peer_connection",
-    "guard_transports",
     "install_sender",
     "keep_codec",
     "keep_extensions",
@@ -64,8 +63,6 @@ __all__ = [
 ]
 
 SOCKET_BACKLOG_BYTES = 64 * 1024  # a peer with more unsent bytes than this gets no more frames for now
-RECEIVE_QUEUE_DATAGRAMS = 1024
-DATAGRAM_MAX = 1500  # bytes, what pylibsrtp takes
 MOST_PATIENCE = 1.0  # s that a keyframe request waits for retransmissions
 MOST_EXPECTED = 100_000  # packets between two reports of a peer
 
@@ -364,49 +361,3 @@ def _backlog(transport: Any) -> int:
     """Bytes that wait for the socket; the transports of TURN cannot tell."""
     size: Callable[[], int] | None = getattr(transport, "get_write_buffer_size", None)
     return 0 if size is None else size()
-
-
-class _BoundedReceiveQueue(asyncio.Queue[Any]):
-    """Drops what the connection could not use: datagrams beyond the bound, and those that would raise further on."""
-
-    def __init__(self, on_error: Callable[[str], None]) -> None:
-        super().__init__()
-        self._on_error = on_error
-
-    def put_nowait(self, item: tuple[bytes, int] | None) -> None:
-        if item is not None and not 0 < len(item[0]) <= DATAGRAM_MAX:
-            self._on_error("datagram_size")
-        elif item is not None and self.qsize() >= RECEIVE_QUEUE_DATAGRAMS:
-            self._on_error("receive_overflow")
-        else:
-            super().put_nowait(item)
-
-
-def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None]) -> None:
-    """Keep what a peer sends from ending its connection or filling memory; `on_error` gets a stable name to count.
-
-    Call after setRemoteDescription, when the transports exist. Calling it again changes nothing.
-    """
-    transports = {transceiver.receiver.transport for transceiver in pc.getTransceivers()}
-    if pc.sctp is not None:
-        transports.add(pc.sctp.transport)
-    for transport in transports:
-        _guard_transport(transport, on_error)
-
-
-def _guard_transport(dtls: RTCDtlsTransport, on_error: Callable[[str], None]) -> None:
-    connection = dtls.transport._connection
-    if isinstance(connection._queue, _BoundedReceiveQueue):
-        return
-    connection._queue = _BoundedReceiveQueue(on_error)
-    receive = dtls._recv_next
-
-    async def guarded() -> None:
-        try:
-            await receive()
-        except ConnectionError:
-            raise
-        except Exception:  # what a parser of aiortc did not expect; CancelledError is no Exception
-            on_error("malformed")
-
-    cast(Any, dtls)._recv_next = guarded

@@ -14,6 +14,7 @@ from server.media.frame import EncodedFrame
 from server.media.metrics import MediaMetrics
 from server.media.output import Output
 from server.media.packetise import packetise_sound
+from server.media.quality.expected_loss import ExpectedLoss
 from server.media.settings import MediaSettings
 from server.media.sound_encoder import AUDIO_CODECS, EncodedSound, Segment, SoundEncoder, create_sound_encoder
 from server.media.stream import Encoded, Stream
@@ -28,6 +29,7 @@ class SoundJob(NamedTuple):
     media: Media
     capture_time: float
     outputs: list[tuple[Output, frozenset[bool]]]  # with the variants to be packetised in the worker
+    expected_loss: int  # percent
 
 
 class AudioStream(Stream[SoundJob]):
@@ -41,6 +43,7 @@ class AudioStream(Stream[SoundJob]):
         super().__init__(microphone.name, microphone.label, settings, fan_out, metrics)
         self._waiting: deque[tuple[Media, float]] = deque()
         self._encoders: dict[str, SoundEncoder] = {}
+        self._expected = ExpectedLoss(settings.opus_packet_loss_percent)
 
     def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
         if len(self._waiting) >= QUEUE_SEGMENTS:
@@ -54,7 +57,11 @@ class AudioStream(Stream[SoundJob]):
             return None
         media, capture_time = self._waiting.popleft()
         outputs = [(output, output.variants()) for output in self._outputs.values() if output.needed]
-        return SoundJob(media, capture_time, outputs)
+        return SoundJob(media, capture_time, outputs, self._expected.percent)
+
+    def measured_loss(self, loss: float, now: float) -> None:
+        """What the peers that matter lose, 0 to 1: sound is protected against it."""
+        self._expected.update(loss, now)
 
     def _work(self, job: SoundJob) -> list[Encoded]:
         needed = {output.codec for output, _ in job.outputs}
@@ -63,16 +70,15 @@ class AudioStream(Stream[SoundJob]):
             segment = _segment(job)
         except MediaError as error:
             return [Encoded(output, (), 0.0, error) for output, _ in job.outputs]
-        return [self._encode(segment, output, variants) for output, variants in job.outputs]
+        return [self._encode(segment, output, variants, job.expected_loss) for output, variants in job.outputs]
 
-    def _encode(self, segment: Segment, output: Output, variants: frozenset[bool]) -> Encoded:
+    def _encode(self, segment: Segment, output: Output, variants: frozenset[bool], expected_loss: int) -> Encoded:
         started = time.perf_counter()
         encoder = self._encoders.get(output.codec)
         if encoder is None:
-            encoder = create_sound_encoder(
-                output.codec, self._settings.opus_bitrate_bps, self._settings.opus_packet_loss_percent
-            )
+            encoder = create_sound_encoder(output.codec, self._settings.opus_bitrate_bps, expected_loss)
             self._encoders[output.codec] = encoder
+        encoder.expect_loss(expected_loss)
         try:
             frames = [_frame(output, sound) for sound in encoder.encode(segment)]
         except MediaError as error:

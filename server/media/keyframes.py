@@ -3,6 +3,9 @@
 __all__ = ["KeyframeScheduler"]
 
 JOIN_BURST = 3
+BACKOFF = 1.6  # times the spacing, for each request that comes soon after it could be served
+MOST_SPACING = 3.0  # s
+SOON = 2.0  # spacings
 
 
 class KeyframeScheduler:
@@ -10,10 +13,14 @@ class KeyframeScheduler:
 
     A joining peer is served with the next picture. Many at once would make every picture a keyframe, which the
     operator would pay for, so joins beyond a burst of three wait for the spacing, as requests do.
+
+    A keyframe costs as much as many pictures, and where the path is full it brings the next loss: when requests keep
+    coming, the spacing between the keyframes that answer them grows, and it shrinks again with rest.
     """
 
     def __init__(self, interval_seconds: float, spacing_seconds: float) -> None:
         self._interval = interval_seconds
+        self._least_spacing = spacing_seconds
         self._spacing = spacing_seconds
         self._joined = False
         self._requested = False
@@ -33,20 +40,29 @@ class KeyframeScheduler:
         """Whether the picture about to be encoded must be a keyframe; if so all waiting requests are served by it."""
         if not self._wanted(now):
             return False
+        if self._requested and self._last is not None:
+            self._adapt(now - self._last)
         self._joined = self._requested = False
         self._last = now
         return True
 
+    def _adapt(self, passed: float) -> None:
+        if passed < SOON * self._spacing:
+            self._spacing = min(max(MOST_SPACING, self._least_spacing), self._spacing * BACKOFF)
+        else:
+            self._spacing = max(self._least_spacing, self._spacing / BACKOFF)
+
     def _wanted(self, now: float) -> bool:
         if self._last is None or now - self._last >= self._interval:
             return True
-        if (self._joined or self._requested) and now - self._last >= self._spacing:
+        spacing = self._least_spacing if self._joined else self._spacing
+        if (self._joined or self._requested) and now - self._last >= spacing:
             return True
         return self._joined and self._spend_token(now)
 
     def _spend_token(self, now: float) -> bool:
-        if self._tokens_at is not None and self._spacing > 0:
-            self._tokens = min(JOIN_BURST, self._tokens + (now - self._tokens_at) / self._spacing)
+        if self._tokens_at is not None and self._least_spacing > 0:
+            self._tokens = min(JOIN_BURST, self._tokens + (now - self._tokens_at) / self._least_spacing)
         self._tokens_at = now
         if self._tokens < 1:
             return False

@@ -15,7 +15,6 @@ from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Media
 from server.media.aiortc_private import (
     MediaSender,
-    guard_transports,
     install_sender,
     keep_codec,
     keep_extensions,
@@ -34,6 +33,7 @@ from server.media.quality.desk import QualityDesk
 from server.media.quality.metrics import QualityMetrics
 from server.media.quality.path import RateLimits
 from server.media.quality.peer_quality import CameraLink, PeerQuality
+from server.media.receive_guard_private import guard_transports
 from server.media.settings import MediaSettings
 from server.media.video_stream import VideoStream
 
@@ -135,7 +135,8 @@ class MediaPlane:
             for each in deliveries
             if isinstance(each.stream, VideoStream)
         ]
-        if peer.quality.cameras:
+        peer.quality.sounds = [each.stream for each in deliveries if isinstance(each.stream, AudioStream)]
+        if peer.quality.cameras or peer.quality.sounds:
             self._quality.join(peer.quality)
         return peer
 

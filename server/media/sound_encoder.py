@@ -79,6 +79,9 @@ class SoundEncoder(ABC):
         self._resampler: AudioResampler | None = None
         self._talkspurt = True
 
+    def expect_loss(self, percent: int) -> None:
+        """So many packets may be lost on the way. Nothing for a codec without error correction."""
+
     def encode(self, segment: Segment) -> list[EncodedSound]:
         """The packets that are complete with this segment: none, one or several.
 
@@ -167,6 +170,11 @@ class OpusEncoder(SoundEncoder):
         }
         self._bitrate = bitrate_bps
         self._context: AudioCodecContext | None = None
+
+    def expect_loss(self, percent: int) -> None:
+        if self._options["packet_loss"] != str(percent):
+            self._options = {**self._options, "packet_loss": str(percent)}
+            self._context = None  # it takes its options when it is opened
 
     @property
     def channels(self) -> int:

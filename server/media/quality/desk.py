@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from robot_bridge.protocol.console import StreamQuality, Tier
+from server.media.audio_stream import AudioStream
 from server.media.quality.budget import CameraNeed, share_out
 from server.media.quality.ladder import PictureLadder
 from server.media.quality.metrics import QualityMetrics
@@ -97,6 +98,7 @@ class QualityDesk:
         if self._ticks % OBSERVER_TICKS == 0:
             for peer in leaders:
                 self._tell(peer)
+            self._protect_sound(leaders or observers, now)
             self._measure(leaders, observers)
 
     def leaders(self) -> list[PeerQuality]:
@@ -172,6 +174,16 @@ class QualityDesk:
                 )
             )
         peer.tell(streams)
+
+    @staticmethod
+    def _protect_sound(peers: list[PeerQuality], now: float) -> None:
+        """Sound is encoded once for all: against the operator's loss, or the worst observer's without one."""
+        losses: dict[AudioStream, float] = {}
+        for peer in peers:
+            for stream in peer.sounds:
+                losses[stream] = max(losses.get(stream, 0.0), peer.loss or 0.0)
+        for stream, loss in losses.items():
+            stream.measured_loss(loss, now)
 
     def _measure(self, leaders: list[PeerQuality], observers: list[PeerQuality]) -> None:
         tiers: dict[Tier, list[PeerQuality]] = {

@@ -14,6 +14,7 @@ from server.media.quality.path import PathController, RateLimits, Reason
 
 if TYPE_CHECKING:
     from server.media.aiortc_private import MediaSender
+    from server.media.audio_stream import AudioStream
     from server.media.video_stream import VideoStream
 
 __all__ = ["CameraLink", "PeerQuality"]
@@ -39,6 +40,7 @@ class PeerQuality:
         self.operator = operator
         self.drives = False  # holds the control seat
         self.cameras: list[CameraLink] = []  # the main one first
+        self.sounds: list[AudioStream] = []
         self.pacer = Pacer()
         self.path = PathController(limits, clock())
         self.choice = ObserverTier(clock())

@@ -11,15 +11,14 @@ from aiortc.rtcdtlstransport import RTCDtlsTransport, State
 from aiortc.rtcpeerconnection import create_media_description_for_transceiver
 
 from server.media.aiortc_private import (
-    _BoundedReceiveQueue,
     create_peer_connection,
-    guard_transports,
     keep_codec,
     offered_direction,
     offered_extensions,
     own_addresses,
     restrict_ice_hosts,
 )
+from server.media.receive_guard_private import _BoundedReceiveQueue, guard_transports
 from tests.server.media.viewer import running_plane, viewing
 
 MOVED = "aiortc moved a private part: see server/media/aiortc_private.py"

@@ -12,7 +12,7 @@ from server.media.packetise import split_nal_units
 from server.media.picture import PictureDecoder
 from server.media.picture_encoder import VIDEO_CODECS, EncodedPicture, PictureEncoder, create_picture_encoder
 from server.media.sound_encoder import AUDIO_CODECS, EncodedSound, Segment, SoundEncoder, create_sound_encoder
-from tests.server.media.viewer import HEIGHT, WIDTH, noise, picture
+from tests.server.media.viewer import HEIGHT, WIDTH, noise, picture, sound
 
 DECODERS = {"H264": "h264", "VP8": "libvpx", "opus": "libopus", "PCMU": "pcm_mulaw"}
 
@@ -201,3 +201,45 @@ def test_mu_law_follows_the_recommendation() -> None:
     samples = np.array([0, -1, 32767, -32768, 8, -8, 1000, -1000] * 20, np.int16)
     packet = encoder.encode(Segment(samples, 8_000, 1, 1, 0.0, 0.0))[0]
     assert list(packet.data[:8]) == [0xFF, 0x7F, 0x80, 0x00, 0xFE, 0x7E, 0xCE, 0x4E]
+
+
+def test_opus_goes_on_when_more_loss_is_expected() -> None:
+    encoder = create_sound_encoder("opus", 32_000, 5)
+    packets = []
+    for i in range(40):
+        if i == 20:
+            encoder.expect_loss(30)
+        medium = sound(i + 1, i / 50, rate=48_000)
+        samples = np.frombuffer(medium.payload, "<i2")
+        packets += encoder.encode(Segment(samples, 48_000, 1, medium.stamp, medium.time, medium.time))
+    assert [packet.media_time for packet in packets] == [i * 960 for i in range(len(packets))]
+    decoder: Any = av.CodecContext.create("libopus", "r")
+    decoder.sample_rate = 48_000
+    levels = [
+        float(np.abs(frame.to_ndarray()).mean())
+        for packet in packets
+        for frame in decoder.decode(av.Packet(packet.data))
+    ]
+    assert min(levels[5:]) > 0.5 * max(levels)
+
+
+@pytest.mark.parametrize("codec", VIDEO_CODECS)
+def test_a_running_encoder_follows_a_lower_bitrate_without_a_keyframe(codec: str) -> None:
+    encoder = video_encoder(codec)
+    encoder.aim(2_000_000, 30.0)
+    ample = encode(encoder, [noise(i, 0.0) for i in range(1, 31)])
+    encoder.aim(800_000, 30.0)
+    decoder = PictureDecoder()
+    scarce = [encoder.encode(decoder.decode(noise(i, 0.0)), i * 3000, False) for i in range(31, 91)]
+    assert not any(item.keyframe for item in scarce)
+    assert sum(len(item.data) for item in scarce[30:]) < 0.8 * sum(len(item.data) for item in ample)
+
+
+@pytest.mark.parametrize("codec", VIDEO_CODECS)
+def test_a_bitrate_beyond_what_steering_can_do_begins_with_a_keyframe(codec: str) -> None:
+    encoder = video_encoder(codec)
+    encoder.aim(400_000, 30.0)
+    encode(encoder, [picture(1, 0.0), picture(2, 0.0)])
+    encoder.aim(50_000, 30.0)
+    decoder = PictureDecoder()
+    assert encoder.encode(decoder.decode(picture(3, 0.0)), 9000, False).keyframe

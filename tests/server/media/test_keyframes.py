@@ -1,4 +1,4 @@
-from server.media.keyframes import JOIN_BURST, KeyframeScheduler
+from server.media.keyframes import JOIN_BURST, MOST_SPACING, KeyframeScheduler
 
 FPS = 30
 
@@ -61,3 +61,30 @@ def test_without_spacing_every_request_is_served() -> None:
     for i in range(5):
         scheduler.request()
         assert scheduler.take(i / FPS)
+
+
+def test_requests_that_keep_coming_are_served_more_and_more_rarely() -> None:
+    scheduler = KeyframeScheduler(1000, 0.3)
+    scheduler.take(0.0)
+    keyframes = []
+    for i in range(1, 20 * FPS):
+        scheduler.request()
+        if scheduler.take(i / FPS):
+            keyframes.append(i / FPS)
+    gaps = [round(later - earlier, 1) for earlier, later in zip(keyframes, keyframes[1:], strict=False)]
+    assert gaps == sorted(gaps)
+    assert gaps[-1] == MOST_SPACING
+    scheduler.join()
+    assert scheduler.take(20.5)  # who joins does not wait for that
+
+
+def test_after_some_rest_requests_are_served_soon_again() -> None:
+    scheduler = KeyframeScheduler(1000, 0.3)
+    for i in range(20 * FPS):
+        scheduler.request()
+        scheduler.take(i / FPS)
+    for i in range(6):
+        scheduler.request()
+        assert scheduler.take(30.0 + 10 * i)
+    scheduler.request()
+    assert any(scheduler.take(80.0 + i / FPS) for i in range(12))
