@@ -43,7 +43,7 @@ export class SessionApi {
 /** What somebody can do about an error of the two. */
 export function troubleWords(error: unknown): string {
   if (!(error instanceof ConsoleError)) return "The page could not do this. Reload it and try again.";
-  if (error.status === 0) return "The console does not answer. It is tried again when you are.";
+  if (error.status === 0) return "The console does not answer. Check the connection and try again.";
   if (error.status === 401) return "Your own link is no longer valid. Ask for a new one.";
   if (error.status === 403) return `Your link does not permit it: ${error.detail}.`;
   if (error.status === 404) return "The console does not know it any more.";
