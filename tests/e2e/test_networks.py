@@ -1,0 +1,44 @@
+"""Unmodified browsers behind an emulated network."""
+
+import pytest
+from playwright.async_api import Browser
+
+from bench.emulator import Network
+from tests.e2e.console_page import open_console
+from tests.support.firefox import Firefox
+from tests.support.stack import Stack
+
+SHOWN = """(() => {
+    const s = window.lockstep?.stats();
+    return Boolean(s?.connected && s.streams.overview?.rendered > 3);
+})()"""
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+
+
+async def test_with_bursts_of_loss_the_page_drives_and_shows_nothing_outside_the_tolerance(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with (
+        Network("bursty-loss", console_url=stack.console) as network,
+        open_console(chromium, network.link(stack.operator)) as console,
+    ):
+        await console.until_live()
+        await console.arm()
+        await console.drive_forward()
+        event = (await console.stats())["event"]
+        await console.until(f"s.event > {event + 30}")
+        statistics = await console.stats()
+        counts = network.statistics().paths
+    streams = statistics["streams"]
+    assert {name: stream["violations"] for name, stream in streams.items()} == dict.fromkeys(streams, 0)
+    assert statistics["round_trip_ms"] >= 100
+    assert counts["media"]["to_operator"].lost > 10
+    assert counts["control"]["to_robot"].lost > 0
+
+
+async def test_firefox_finds_its_way_through_the_network_too(stack: Stack, firefox: Firefox) -> None:
+    async with Network("micro-lan", console_url=stack.console) as network:
+        await firefox.open(network.link(stack.operator))
+        await firefox.wait(SHOWN, 60)
+        assert network.statistics().paths["media"]["to_operator"].passed > 20
