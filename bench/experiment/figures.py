@@ -70,8 +70,9 @@ def _within(run: Run, entries: Sequence[Rendered]) -> list[Rendered]:
     return [each for each in entries if each.at >= run.began]
 
 
-def _label(axes: Axes, title: str, ylabel: str) -> None:
+def _label(axes: Axes, title: str, ylabel: str, run: Run) -> None:
     axes.set_title(title)
+    axes.set_xlim(0, run.ended - run.began)
     axes.set_xlabel("time (s)")
     axes.set_ylabel(ylabel)
 
@@ -81,9 +82,9 @@ def robot_figure(run: Run) -> str:
     with mpl.rc_context(STYLE):
         figure, ((server, client),) = _figure(1, 2)
         _events(server, run.robot.answered, run.began, ROBOT, "")
-        _label(server, "Robot server", "event reference")
+        _label(server, "Robot server", "event reference", run)
         _events(client, run.operator.feedbacks, run.began, ROBOT, "")
-        _label(client, "Robot client", "event reference")
+        _label(client, "Robot client", "event reference", run)
         client.sharey(server)
         return _svg(figure)
 
@@ -101,9 +102,9 @@ def medium_figure(run: Run, client: ClientRecord, stream: str, what: str) -> str
         _steps(server_index, [each.at - run.began for each in captured], range(1, len(captured) + 1), FAINT, "")
         _steps(client_index, [each.at - run.began for each in rendered], range(1, len(rendered) + 1), FAINT, "")
         for axes, side in ((server_event, "server"), (client_event, "client")):
-            _label(axes, f"{what} {side}", "event reference")
+            _label(axes, f"{what} {side}", "event reference", run)
         for axes, side in ((server_index, "server"), (client_index, "client")):
-            _label(axes, f"{what} {side}", index)
+            _label(axes, f"{what} {side}", index, run)
         client_event.sharey(server_event)
         client_index.sharey(server_index)
         return _svg(figure)
@@ -116,7 +117,7 @@ def client_against_medium(runs: Sequence[tuple[str, Run, ClientRecord]], stream_
         for axes, (title, run, client) in zip(row, runs, strict=True):
             _events(axes, client.feedbacks, run.began, ROBOT, "robot client")
             _events(axes, _within(run, client.rendered.get(stream_of[title], [])), run.began, MEDIUM, f"{what} client")
-            _label(axes, title, "event reference")
+            _label(axes, title, "event reference", run)
             axes.legend(loc="upper left")
         return _svg(figure)
 
@@ -130,12 +131,12 @@ def gap_figure(run: Run, stream: str, tolerance: int) -> str:
         for axes, client in zip(row, clients, strict=True):
             entries = [each for each in _within(run, client.rendered[stream]) if each.gap is not None]
             gaps = [each.gap or 0 for each in entries]
-            colours = [MODE_COLOURS[client.gate] if abs(gap) <= tolerance else BAD for gap in gaps]
-            axes.axhspan(-tolerance, tolerance, color=BAND, alpha=0.1, linewidth=0)
-            axes.scatter(
-                [each.at - run.began for each in entries], gaps, s=5, c=colours, linewidths=0, rasterized=False
-            )
-            _label(axes, _gate_title(client), "gap (events)")
+            times = [each.at - run.began for each in entries]
+            axes.axhspan(-tolerance, tolerance, color=BAND, alpha=0.12, linewidth=0)
+            axes.plot(times, gaps, drawstyle="steps-post", color=MODE_COLOURS[client.gate], linewidth=0.9)
+            beyond = [(time, gap) for time, gap in zip(times, gaps, strict=True) if abs(gap) > tolerance]
+            axes.plot(*(zip(*beyond, strict=True) if beyond else ([], [])), ".", color=BAD, markersize=3.5)
+            _label(axes, _gate_title(client), "gap (events)", run)
             top = max(top, *(abs(gap) + 1 for gap in gaps)) if gaps else top
         for axes in row:
             axes.set_ylim(-tolerance - 1, top)

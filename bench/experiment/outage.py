@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import itertools
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any, Protocol
 
@@ -24,8 +24,8 @@ ONE_WAY = Impairment(delay=Constant(0.02))
 PATH = TwoWay(ONE_WAY, ONE_WAY)
 OUTAGE_PROFILE = Profile("outage", "40 ms round trip, cut on demand", media=PATH, control=PATH, signalling=PATH)
 
-BEFORE = 3.0  # s of driving before each cut
-AFTER = 1.0  # s of driving after control returned
+BEFORE = 1.5  # s of driving before each cut
+AFTER = 0.5  # s of driving after control returned
 PATIENCE = 20.0  # s to wait for control to return
 STEP = 0.05  # s between two intentions
 MARK = 1e-5  # by which each intention differs from the one before
@@ -39,11 +39,13 @@ class Stick(Protocol):
     intentions: list[tuple[float, float]]  # (time, value of the first axis); empty when they all are the same
 
 
-async def run_outages(choices: Choices, say: Callable[[str], None]) -> dict[str, Any]:
-    """One outage in which packets are lost, and one in which they wait in the network. Raises ProcessFailed."""
+async def run_outages(
+    choices: Choices, say: Callable[[str], None], ways: Sequence[bool] = (False, True)
+) -> dict[str, Any]:
+    """An outage for each of `ways`: whether packets wait in the network, or are lost. Raises ProcessFailed."""
     found = []
     async with running_stage(choices.robot, OUTAGE_PROFILE, media_of(OUTAGE_PROFILE), choices.seed) as stage:
-        for held in (False, True):
+        for held in ways:
             say(f"outage of {choices.seconds:g} s, packets {'wait in the network' if held else 'are lost'}")
             cut, stick, description = await _cut(stage, choices, held)
             finding = judge_outage(

@@ -1,0 +1,81 @@
+"""Real robots, consoles, networks and clients, for a few seconds."""
+
+import asyncio
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from bench.emulator.network import Network
+from bench.emulator.profile import load_profile
+from bench.experiment.choices import PROFILES
+from bench.experiment.growth import MEDIA
+from bench.experiment.headless import headless_client
+from bench.experiment.measures import beyond
+from bench.experiment.operator_script import OperatorScript
+from bench.experiment.outage import run_outages
+from bench.experiment.stage import running_stage
+from server.cli import app
+from tests.bench.experiment.made_up import choices
+
+pytestmark = pytest.mark.timeout(120)
+
+SECONDS = 3.0
+
+
+async def test_behind_every_network_nothing_beyond_the_tolerance_is_rendered() -> None:
+    """One operator beside the robot; behind each network a viewer, all at the same time."""
+    driven, said = asyncio.Event(), choices(tolerance=3)
+    ready: list[str] = []
+    all_ready = asyncio.Event()
+    async with running_stage("planar", load_profile("perfect"), MEDIA, 1) as stage:
+
+        async def look(name: str) -> None:
+            network = Network(name, console_url=stage.near_link.partition("/#")[0], seed=1)
+            async with (
+                network,
+                headless_client(network.link(stage.near_link), said, name, "event", "feedback", drives=False) as viewer,
+            ):
+                await viewer.until_picture()
+                ready.append(name)
+                if len(ready) == len(PROFILES):
+                    all_ready.set()
+                async with viewer.observed():
+                    await driven.wait()
+                record = viewer.record
+            assert all(record.rendered.values()), name
+            for stream, entries in record.rendered.items():
+                assert beyond(entries, said.tolerance) == 0, (name, stream)
+            assert [stream["violations"] for stream in record.statistics["streams"]] == [0, 0]
+            assert record.drawn_wrong == 0
+
+        async with asyncio.timeout(50), asyncio.TaskGroup() as group:
+            for name in PROFILES:
+                group.create_task(look(name))
+            near = headless_client(stage.link, said, "operator", "event", "media", drives=True)
+            async with near as operator:
+                await operator.take_seat()
+                await all_ready.wait()
+                await operator.drive(OperatorScript(operator.description.axes, 1), SECONDS)
+                await operator.rest()
+            driven.set()
+
+
+def test_the_command_runs_an_experiment_and_prints_its_figures() -> None:
+    done = CliRunner().invoke(app, ["experiment", "micro-lan", "--mode", "off", "--seconds", "2", "--json", "-"])
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert (result["profile"], result["mode"], result["tolerance"]) == ("micro-lan", "off", 4)
+    assert set(result["clients"]) == {"operator", "watcher-age", "watcher-event"}
+    for client in result["clients"].values():
+        picture = client["streams"]["overview"]
+        assert picture["received"] == picture["rendered"] + picture["discarded"] > 0
+    assert result["verdicts"]["no_violation"]
+
+
+async def test_after_an_outage_nothing_that_was_queued_is_executed_and_the_operator_drives_again() -> None:
+    found = await run_outages(choices(seconds=2.5), lambda _: None, ways=[True])
+    [outage] = found["outages"]
+    assert outage["nothing_queued_executed"], outage
+    assert outage["rest_ms"] is not None
+    assert outage["control_ms"] is not None

@@ -1,0 +1,17 @@
+from importlib import import_module
+
+import pytest
+from typer.testing import CliRunner
+
+from server.bench_commands import COMMANDS
+from server.cli import app
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_that_is_listed_is_there_and_explains_itself(name: str) -> None:
+    module, function, about = COMMANDS[name]
+    assert callable(getattr(import_module(module), function))
+    assert about in CliRunner().invoke(app, ["--help"], terminal_width=200).output
+    asked = CliRunner().invoke(app, [name, "--help"], terminal_width=200)
+    assert asked.exit_code == 0
+    assert "--seed" in asked.output
