@@ -26,12 +26,12 @@ from server.errors import (
 from server.ice_restart_private import IceSession
 from server.ice_servers import IceServers, for_aiortc, link_headers
 from server.media.aiortc_private import create_peer_connection
-from server.offer import FragmentCandidate, format_fragment, parse_fragment, prepare_offer
+from server.offer import Fragment, FragmentCandidate, format_fragment, parse_fragment, prepare_offer
 from server.peer import Peer
 from server.peer_guards_private import guard_data
 from server.services import Services, authorized, services
 
-__all__ = ["router"]
+__all__ = ["candidates_of", "router"]
 
 SDP = "application/sdp"
 FRAGMENT = "application/trickle-ice-sdpfrag"
@@ -78,7 +78,7 @@ async def patch(resource: str, request: Request, identity: Annotated[Identity, D
     text = await read_text(request, FRAGMENT, here.settings.max_sdp_bytes)
     first = SessionDescription.parse(peer.pc.remoteDescription.sdp).media[0]
     fragment = parse_fragment(text, first.rtp.muxId)
-    candidates = [_candidate(each) for each in fragment.candidates]
+    candidates = candidates_of(fragment)
     if fragment.username in ("", peer.ice.username):
         for candidate in candidates:
             if not await peer.ice.add_candidate(candidate):
@@ -107,6 +107,11 @@ def _precondition(request: Request, tag: str) -> str:
     if expected != "*" and tag not in [each.strip() for each in expected.split(",")]:
         raise PreconditionFailed("that is not the newest ICE session")
     return expected
+
+
+def candidates_of(fragment: Fragment) -> list[RTCIceCandidate]:
+    """Raises BadSdpFragment when one cannot be used."""
+    return [_candidate(each) for each in fragment.candidates]
 
 
 def _candidate(each: FragmentCandidate) -> RTCIceCandidate:

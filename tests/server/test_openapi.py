@@ -77,7 +77,7 @@ def _try(operation: Any, headers: dict[str, str], statuses: set[int]) -> None:
         phases=[Phase.explicit, Phase.generate],
         suppress_health_check=list(HealthCheck),
     )
-    @_given(operation)
+    @_given(operation)  # type: ignore[untyped-decorator]
     def ask(case: Any) -> None:
         response = case.call(headers=headers)
         statuses.add(response.status_code)
@@ -102,7 +102,7 @@ def _fragments() -> st.SearchStrategy[str]:
 
 def test_the_description_names_every_route_and_no_other() -> None:
     routes = {
-        (method.lower(), route.path)
+        (method.lower(), str(getattr(route, "path", "")))
         for route in create_app(Settings()).routes
         for method in getattr(route, "methods", None) or ()
         if method != "HEAD" and getattr(route, "path", "").startswith(("/api", "/whep", "/healthz", "/metrics"))
