@@ -78,7 +78,7 @@ async def _plain(link: str) -> AsyncIterator[Callable[[], Counts]]:
 
     try:
         await peer.negotiate()
-        peer.take_raw_rtp(count)
+        peer.take_raw_rtp(count, lambda _: None)
         await peer.connect(CONNECT_SECONDS)
         yield lambda: {"video": [counter.frames, counter.lost]}
     finally:

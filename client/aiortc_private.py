@@ -37,6 +37,7 @@ __all__ = [
     "gather_here",
     "gather_only_on",
     "hasten_sctp",
+    "send_control",
     "take_packets",
     "take_raw_rtp",
     "transport_of",
@@ -169,20 +170,34 @@ def _tap(receiver: Any, tap: _PacketTap, sink: PacketSink) -> None:
     receiver.receive = MethodType(receive, receiver)
 
 
-def take_raw_rtp(pc: RTCPeerConnection, take: Callable[[bytes], None]) -> None:
-    """Give every decrypted RTP packet to `take` and do nothing else with it: no thread, no buffer, no reports."""
+def take_raw_rtp(pc: RTCPeerConnection, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
+    """Give every decrypted RTP packet to `take`, and RTCP packets to `control`, and do nothing else with them.
+
+    No thread, no buffer; reports are sent with `send_control`.
+    """
     transport: Any = transport_of(pc)
 
     async def handle(data: bytes, arrival_time_ms: int) -> None:
         take(data)
 
+    async def handle_control(data: bytes) -> None:
+        control(data)
+
     async def receive(parameters: Any) -> None:
         """Not even registered: the packets do not come this way."""
 
     transport._handle_rtp_data = handle
+    transport._handle_rtcp_data = handle_control
     for transceiver in pc.getTransceivers():
         receiver: Any = transceiver.receiver
         receiver.receive = receive
+
+
+async def send_control(pc: RTCPeerConnection, packet: bytes) -> None:
+    """Send an RTCP packet; nothing while the connection is not up."""
+    transport: Any = transport_of(pc)
+    with contextlib.suppress(ConnectionError):
+        await transport._send_rtp(packet)
 
 
 def drain_dtls(pc: RTCPeerConnection) -> None:

@@ -210,6 +210,8 @@ class Connection:
                 round_trip = self._pings.answered(number, self._heard_at)
                 if round_trip is not None and self._driver is not None:
                     self._driver.pilot.ping_answered(round_trip)
+                if round_trip is not None:
+                    self.media.round_trip(round_trip)
             case RobotState():
                 self._take_robot(message)
             case StopStateNotice():

@@ -12,10 +12,11 @@ __all__ = ["Assembler", "AudioAssembler", "EncodedFrame", "MediaPacket", "VideoA
 
 SEQUENCES = 1 << 16
 WINDOW = 1024  # packets that may wait for a missing one
-PATIENCE = 0.3  # s to wait for a missing packet
-RETRY = 0.06  # s between two requests for the same missing packets
+PATIENCE = 0.3  # s to wait for a missing packet, at least
+PATIENT_TRIPS, MOST_PATIENCE = 2.2, 1.6  # round trips, s; a second try over a satellite takes 1.2 s
+RETRY = 0.06  # s between two requests for the same missing packets, at least; and a round trip
 MOST_ASKED = 128  # sequence numbers after the first missing one that one request covers
-KEYFRAME_RETRY = 0.4  # s between two keyframe requests
+KEYFRAME_RETRY = 0.4  # s between two keyframe requests, at least; and a round trip and a half
 
 
 class MediaPacket(NamedTuple):
@@ -42,6 +43,7 @@ class Assembler(Protocol):
     """What a stream needs of either kind."""
 
     lost: int
+    round_trip: float  # s to the sender and back; 0 while unknown
 
     def add(self, packet: MediaPacket, now: float) -> list[EncodedFrame]: ...
 
@@ -57,6 +59,7 @@ class AudioAssembler:
 
     def __init__(self) -> None:
         self.lost = 0
+        self.round_trip = 0.0
         self._newest: int | None = None
 
     def add(self, packet: MediaPacket, now: float) -> list[EncodedFrame]:
@@ -85,6 +88,7 @@ class VideoAssembler:
 
     def __init__(self, is_keyframe: Callable[[bytes], bool]) -> None:
         self.lost = 0  # packets given up
+        self.round_trip = 0.0  # s
         self.undecodable = 0  # complete frames left out for want of a keyframe
         self._is_keyframe = is_keyframe
         self._packets: dict[int, MediaPacket] = {}
@@ -100,7 +104,7 @@ class VideoAssembler:
         """The frames that `packet` completes."""
         if self._start is None:
             self._begin_at(packet.sequence)
-            self._keyframe_due = now + KEYFRAME_RETRY  # the sender begins with one: it may be on its way
+            self._keyframe_due = now + self._keyframe_retry  # the sender begins with one: it may be on its way
         elif (packet.sequence - self._start) % SEQUENCES >= SEQUENCES // 2 or packet.sequence in self._packets:
             return []  # belongs to a frame already given out or given up, or is a copy
         elif self._offset(packet.sequence) >= WINDOW or self._waited_too_long(now):
@@ -114,7 +118,11 @@ class VideoAssembler:
 
     def missing(self, now: float) -> list[int]:
         """Sequence numbers to ask for once more; the first request is made when a gap opens."""
-        if self._start is None or self._gap_since is None or now - max(self._gap_since, self._asked_at) < RETRY:
+        if (
+            self._start is None
+            or self._gap_since is None
+            or now - max(self._gap_since, self._asked_at) < max(RETRY, 1.1 * self.round_trip)
+        ):
             return []
         self._asked_at = now
         count = min((self._highest - self._end) % SEQUENCES, MOST_ASKED)
@@ -125,8 +133,12 @@ class VideoAssembler:
         """Whether to ask for a keyframe now."""
         if not self._needs_keyframe or now < self._keyframe_due:
             return False
-        self._keyframe_due = now + KEYFRAME_RETRY
+        self._keyframe_due = now + self._keyframe_retry
         return True
+
+    @property
+    def _keyframe_retry(self) -> float:
+        return max(KEYFRAME_RETRY, 1.5 * self.round_trip)
 
     def broken(self) -> None:
         """A frame that was given out did not reach the decoder, or failed there."""
@@ -147,7 +159,8 @@ class VideoAssembler:
         return (sequence - (self._start or 0)) % SEQUENCES
 
     def _waited_too_long(self, now: float) -> bool:
-        return self._gap_since is not None and now - self._gap_since > PATIENCE
+        patience = max(PATIENCE, min(MOST_PATIENCE, PATIENT_TRIPS * self.round_trip))
+        return self._gap_since is not None and now - self._gap_since > patience
 
     def _note_gap(self, now: float) -> None:
         waiting = self._offset(self._end) < len(self._packets)

@@ -23,6 +23,7 @@ from client.aiortc_private import (
     drain_dtls,
     gather_only_on,
     hasten_sctp,
+    send_control,
     take_packets,
     take_raw_rtp,
     use_ice_servers,
@@ -159,9 +160,13 @@ class Peer:
         """Give packets to the sink of their section's mid. Between `negotiate` and `connect`."""
         take_packets(self._pc, sinks, extension_id, stamp_reader(self._carrier))
 
-    def take_raw_rtp(self, take: Callable[[bytes], None]) -> None:
+    def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
         """Give every RTP packet to `take`, and nothing to anybody else. Between `negotiate` and `connect`."""
-        take_raw_rtp(self._pc, take)
+        take_raw_rtp(self._pc, take, control)
+
+    async def send_control(self, packet: bytes) -> None:
+        """Send an RTCP packet, if the connection is up."""
+        await send_control(self._pc, packet)
 
     async def connect(self, seconds: float) -> None:
         """Connect; returns when the data channels are open.

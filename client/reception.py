@@ -1,6 +1,8 @@
 """The media of one connection: a stream for each received section, or mere counters."""
 
 import asyncio
+import random
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
@@ -9,6 +11,7 @@ from client.aiortc_private import PacketSink
 from client.errors import NoSuchStream
 from client.media_gate import GateMode, MediaGate
 from client.peer import stamp_reader
+from client.receiver_reports import ReceiverReports
 from client.render_log import Rendering
 from client.rtp_counter import RtpCounter
 from client.rtp_header import parse_rtp_header
@@ -20,6 +23,8 @@ from robot_bridge.protocol.carriers import Carrier
 __all__ = ["PacketSource", "Reception"]
 
 DECODERS = 2  # threads
+REPORT_SECONDS = 1.0  # between two receiver reports, on average
+CLOCK_RATES = {"video": 90_000, "audio": 48_000}  # Hz; only the unit of the jitter
 
 
 class PacketSource(Protocol):
@@ -27,7 +32,8 @@ class PacketSource(Protocol):
 
     def extension_id(self, sections: list[Section]) -> int | None: ...
     def take_packets(self, sinks: dict[str, PacketSink], extension_id: int | None) -> None: ...
-    def take_raw_rtp(self, take: Callable[[bytes], None]) -> None: ...
+    def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None: ...
+    async def send_control(self, packet: bytes) -> None: ...
 
 
 class Reception:
@@ -47,6 +53,8 @@ class Reception:
         self._streams: list[Stream] = []
         self._counters: dict[int, tuple[Section, RtpCounter]] = {}  # by SSRC
         self._executor: ThreadPoolExecutor | None = None
+        self._source: PacketSource | None = None  # of packets that are only counted
+        self._reports = ReceiverReports(random.getrandbits(32))
 
     def prepare(self, source: PacketSource, sections: list[Section], decode: bool) -> None:
         """Take the packets of `source`: into decoders, or only counting them."""
@@ -55,8 +63,11 @@ class Reception:
         if not decode:
             for section in received:
                 counter = RtpCounter(extension_id, stamp_reader(self._carrier))
-                self._counters[section.ssrcs[0] if section.ssrcs else 0] = (section, counter)
-            source.take_raw_rtp(self._count)
+                ssrc = section.ssrcs[0] if section.ssrcs else 0
+                self._counters[ssrc] = (section, counter)
+                self._reports.add(ssrc, CLOCK_RATES[section.kind])
+            source.take_raw_rtp(self._count, lambda data: self._reports.control(data, time.monotonic()))
+            self._source = source
             return
         sinks: dict[str, PacketSink] = {}
         for section in received:
@@ -80,14 +91,30 @@ class Reception:
         header = parse_rtp_header(data)
         if header is not None and header.ssrc in self._counters:
             self._counters[header.ssrc][1].take(header)
+            self._reports.packet(header, time.monotonic())
 
     async def run(self) -> None:
-        """Decode until cancelled."""
+        """Decode, or report what is only counted, until cancelled."""
+        if self._source is not None:
+            await self._report(self._source)
         if self._executor is None:
             return
         async with asyncio.TaskGroup() as group:
             for stream in self._streams:
                 group.create_task(stream.run(self._executor))
+
+    async def _report(self, source: PacketSource) -> None:
+        """Receiver reports, spread in time (RFC 3550 6.2): without them the console must take the path for dead."""
+        while True:
+            await asyncio.sleep(REPORT_SECONDS * random.uniform(0.5, 1.5))
+            report = self._reports.report(time.monotonic())
+            if report is not None:
+                await source.send_control(report)
+
+    def round_trip(self, seconds: float) -> None:
+        """A round trip to the console takes so long: lost packets are waited for accordingly."""
+        for stream in self._streams:
+            stream.round_trip(seconds)
 
     def feedback(self, event: int) -> None:
         """The newest feedback is of `event`."""

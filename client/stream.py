@@ -69,6 +69,7 @@ class Stream:
         self._frames = 0
         self._unstamped = 0
         self._closed = False
+        self._round_trip = 0.0  # s; 0 before one was measured
         self._unread = 0  # dropped by readers that are gone
 
     # From the network
@@ -88,11 +89,18 @@ class Stream:
         """Sequence numbers to ask the sender for again."""
         return self._assembler.missing(asyncio.get_running_loop().time()) if self._assembler is not None else []
 
+    def round_trip(self, seconds: float) -> None:
+        """A round trip to the sender takes so long."""
+        self._round_trip = seconds
+        if self._assembler is not None:
+            self._assembler.round_trip = seconds
+
     def _assembler_for(self, payload_type: int) -> Assembler | None:
         codec = self._codecs.get(payload_type, "")
         if codec != self.codec and (codec in KEYFRAMES or self.kind == "audio"):
             self.codec = codec
             self._assembler = AudioAssembler() if self.kind == "audio" else VideoAssembler(KEYFRAMES[codec])
+            self._assembler.round_trip = self._round_trip
         return self._assembler
 
     def _assembled(self, frame: EncodedFrame, assembler: Assembler) -> None:

@@ -173,7 +173,7 @@ async def test_raw_packets_come_without_threads_or_receivers() -> None:
         if len(taken) >= 5:
             enough.set()
 
-    async with connected(pc, VideoStreamTrack(), before_answer=lambda pc: take_raw_rtp(pc, count)):
+    async with connected(pc, VideoStreamTrack(), before_answer=lambda pc: take_raw_rtp(pc, count, lambda _: None)):
         await enough.wait()
         assert decoder_threads() == []
     assert all(parse_rtp_header(data) is not None for data in taken)
