@@ -25,16 +25,17 @@ from client.media_gate import GateMode
 __all__ = ["Growth", "Point", "later", "run_growth"]
 
 RATES = (2.0, 5.0, 10.0, 20.0)  # events a second
-DELAYS = (0.0, 0.5, 1.0, 2.0)  # s that a player adds
+DELAYS = (0.0, 0.25, 1.0, 2.0)  # s that a player adds
 # Every player is watched without a gate; the gates where it is hardest for them.
 VIEWERS: tuple[tuple[GateMode, float], ...] = (
     *(("off", delay) for delay in DELAYS),
     ("age", 0.0),
-    ("age", 2.0),
+    ("age", 0.25),
     ("event", 0.0),
+    ("event", 0.25),
     ("event", 2.0),
 )
-MEDIA = MediaChoice(400, 10.0, "PCMU", 2)  # eight viewers have to be decoded on this machine
+MEDIA = MediaChoice(400, 10.0, "PCMU", 2)  # nine viewers have to be decoded on this machine
 SETTLE = 3.0  # s for a new rate to reach the slowest player
 
 

@@ -1,7 +1,7 @@
 """One page with all figures and tables, in one file that needs nothing else."""
 
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from itertools import groupby
 from pathlib import Path
@@ -29,6 +29,12 @@ MODE_WORDS = {
     "feedback": "event gate, feedback pacing: the thesis' rule",
     "media": "event gate, media pacing",
 }
+PANEL_TITLES = {
+    "off": "without",
+    "age": "gate by age",
+    "feedback": "with: feedback pacing",
+    "media": "with: media pacing",
+}
 VERDICT_WORDS = {
     "no_violation": "nothing beyond the tolerance behind the event gate",
     "pixels_agree": "pixels show the event that the stamp says",
@@ -42,15 +48,38 @@ VERDICT_WORDS = {
 
 
 def write_report(findings: Findings, folder: Path) -> Path:
-    """Writes `index.html` there."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Writes `index.html` there, and the figures that compare as files of their own."""
+    figures = folder / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    for name, svg in _comparisons(findings):
+        (figures / f"{name}.svg").write_text(_standing_alone(svg), encoding="utf-8")
     target = folder / "index.html"
     target.write_text(_page(findings), encoding="utf-8")
     return target
 
 
+def _comparisons(findings: Findings) -> Iterator[tuple[str, str]]:
+    for name, cells in _by_profile(findings):
+        for what in ("video", "audio"):
+            svg = _compared(cells, what)
+            if svg is not None:
+                yield f"{name}-{what}", svg
+    if findings.growth is not None:
+        yield "growth", growth_figure(findings.growth)
+
+
+def _standing_alone(svg: str) -> str:
+    """On white, whatever is behind it."""
+    head, _, rest = svg.partition(">")
+    return f'{head}><rect width="100%" height="100%" fill="#fff"/>{rest}'
+
+
+def _by_profile(findings: Findings) -> list[tuple[str, list[Cell]]]:
+    return [(name, list(cells)) for name, cells in groupby(findings.cells, lambda cell: cell.profile.name)]
+
+
 def _page(report: Findings) -> str:
-    profiles = [(name, list(cells)) for name, cells in groupby(report.cells, lambda cell: cell.profile.name)]
+    profiles = _by_profile(report)
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",
@@ -182,7 +211,7 @@ def _profile_section(name: str, cells: Sequence[Cell]) -> str:
                 COLUMNS[1:],
                 [[_text(each) for each in row[1:]] for cell in cells for row in rows_of(cell.result)],
             ),
-            _compared(cells),
+            _comparison_figures(cells),
             *(_cell_figures(cell) for cell in cells),
             "</section>",
         ]
@@ -202,28 +231,26 @@ def _figure(svg: str, caption: str) -> str:
     return f"<figure>{svg}<figcaption>{_text(caption)}</figcaption></figure>"
 
 
-def _compared(cells: Sequence[Cell]) -> str:
-    """The thesis' comparison: without and with, pictures and sound; one panel for each mode that was run."""
-    shown = []
-    for what in ("video", "audio"):
-        runs: list[tuple[str, Run, ClientRecord]] = []
-        streams: dict[str, str] = {}
-        for cell in cells:
-            names = cell.run.cameras if what == "video" else cell.run.microphones
-            stream = next((name for name in names if cell.run.operator.rendered.get(name)), None)
-            if stream is None:
-                continue
-            title = cell.choices.mode if cell.choices.mode != "off" else "without"
+def _compared(cells: Sequence[Cell], what: str) -> str | None:
+    """The thesis' comparison, without and with: a panel for each mode that was run. None: there is no such medium."""
+    runs: list[tuple[str, Run, ClientRecord]] = []
+    streams: dict[str, str] = {}
+    for cell in cells:
+        names = cell.run.cameras if what == "video" else cell.run.microphones
+        stream = next((name for name in names if cell.run.operator.rendered.get(name)), None)
+        if stream is not None:
+            title = PANEL_TITLES[cell.choices.mode]
             runs.append((title, cell.run, cell.run.operator))
             streams[title] = stream
-        if runs:
-            shown.append(
-                _figure(
-                    client_against_medium(runs, streams, what),
-                    f"Event reference of the robot client and of the {what} client, in each mode.",
-                )
-            )
-    return "".join(shown)
+    return client_against_medium(runs, streams, what) if runs else None
+
+
+def _comparison_figures(cells: Sequence[Cell]) -> str:
+    return "".join(
+        _figure(svg, f"Event reference of the robot client and of the {what} client, in each mode.")
+        for what in ("video", "audio")
+        if (svg := _compared(cells, what)) is not None
+    )
 
 
 def _cell_figures(cell: Cell) -> str:

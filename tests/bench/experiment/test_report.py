@@ -1,5 +1,6 @@
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 from bench.emulator.profile import load_profile
 from bench.experiment.choices import MODES, media_of
@@ -50,6 +51,14 @@ def test_the_page_has_every_figure_and_needs_nothing_else(tmp_path: Path) -> Non
     for section in ("overview", "micro-lan", "growth", "outage"):
         assert f"id='{section}'" in page
     assert "<span class='bad'>5</span>" in page
+
+
+def test_the_comparisons_are_files_of_their_own_too(tmp_path: Path) -> None:
+    write_report(findings(), tmp_path)
+    files = sorted(file.name for file in (tmp_path / "figures").iterdir())
+    assert files == ["growth.svg", "micro-lan-audio.svg", "micro-lan-video.svg"]
+    for name in files:
+        ElementTree.parse(tmp_path / "figures" / name)
 
 
 def test_a_failed_run_is_said(tmp_path: Path) -> None:
