@@ -3,18 +3,34 @@ them fails here, by name."""
 
 import asyncio
 import threading
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
-from aiortc import RTCBundlePolicy, RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from aiortc import (
+    RTCBundlePolicy,
+    RTCConfiguration,
+    RTCDataChannel,
+    RTCPeerConnection,
+    RTCRtpSender,
+    RTCSessionDescription,
+)
 from aiortc.mediastreams import AudioStreamTrack, VideoStreamTrack
-from aiortc.rtp import RtpPacket
+from aiortc.rtp import RtcpRrPacket, RtpPacket
 
 from client import aiortc_private
-from client.aiortc_private import drain_dtls, gather_only_on, hasten_sctp, take_packets, take_raw_rtp
+from client.aiortc_private import (
+    drain_dtls,
+    gather_only_on,
+    hasten_sctp,
+    send_control,
+    take_packets,
+    take_raw_rtp,
+)
 from client.frame_assembler import MediaPacket
+from client.receiver_reports import ReceiverReports
 from client.rtp_header import parse_rtp_header
 from client.sdp import offer_extension, read_sections
 from robot_bridge.protocol.carriers import EVENT_REFERENCE_URI, unpack_event_reference
@@ -163,7 +179,9 @@ async def test_packets_reach_their_sink_and_nothing_is_decoded() -> None:
     assert all(packet.data for packet in audio.packets)
 
 
-async def test_raw_packets_come_without_threads_or_receivers() -> None:
+async def test_raw_packets_come_without_threads_or_receivers_and_can_be_reported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     pc = new_peer("video")
     taken: list[bytes] = []
     enough = asyncio.Event()
@@ -173,9 +191,35 @@ async def test_raw_packets_come_without_threads_or_receivers() -> None:
         if len(taken) >= 5:
             enough.set()
 
-    async with connected(pc, VideoStreamTrack(), before_answer=lambda pc: take_raw_rtp(pc, count, lambda _: None)):
+    reports = ReceiverReports(77)
+    reported = asyncio.Event()
+
+    def control(data: bytes) -> None:
+        reports.control(data, time.monotonic())
+        reported.set()
+
+    heard = asyncio.Event()
+
+    async def hear(sender: RTCRtpSender, packet: Any) -> None:
+        if isinstance(packet, RtcpRrPacket) and packet.reports[0].lsr:
+            heard.set()
+
+    monkeypatch.setattr(RTCRtpSender, "_handle_rtcp_packet", hear)
+    async with (
+        asyncio.timeout(SECONDS),
+        connected(pc, VideoStreamTrack(), before_answer=lambda pc: take_raw_rtp(pc, count, control)),
+    ):
         await enough.wait()
         assert decoder_threads() == []
+        header = parse_rtp_header(taken[0])
+        assert header is not None
+        reports.add(header.ssrc, 90_000)
+        reports.packet(header, time.monotonic())
+        await reported.wait()  # aiortc's own sender report
+        report = reports.report(time.monotonic())
+        assert report is not None
+        await send_control(pc, report)
+        await heard.wait()
     assert all(parse_rtp_header(data) is not None for data in taken)
 
 

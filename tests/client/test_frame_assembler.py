@@ -144,3 +144,17 @@ def test_sound_comes_out_packet_by_packet_and_never_backwards() -> None:
     assert assembler.missing(9.0) == []
     assert not assembler.wants_keyframe(9.0)
     assembler.broken()
+
+
+def test_over_a_satellite_a_lost_packet_is_asked_for_once_a_round_trip_and_waited_for() -> None:
+    assembler = VideoAssembler(is_keyframe)
+    assembler.round_trip = 0.6
+    packets = packets_of([1, 3, 1])
+    add_all(assembler, [packet for packet in packets if packet.sequence != 2], 10.0)
+    assert assembler.missing(10.5) == []
+    assert assembler.missing(10.7) == [2]
+    assert assembler.missing(11.2) == []
+    lost = next(packet for packet in packets if packet.sequence == 2)
+    assert len(assembler.add(lost, 11.25)) == 2
+    assert assembler.lost == 0
+    assert not assembler.wants_keyframe(11.3)
