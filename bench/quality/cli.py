@@ -9,11 +9,14 @@ from typing import Annotated, Any
 import typer
 
 from bench.emulator import Profile, load_profile, parse_profile
+from bench.machine import busy_percent
 from bench.quality.stage import driving, running_console
 from bench.quality.summary import summarise, timeline
 
 __all__ = ["app"]
 
+LOOK_SECONDS = 1.5
+BUSY_PERCENT = 8.0
 LOSSY = """
 title = "Loss"
 about = "A path that loses packets."
@@ -50,6 +53,7 @@ def delay(
 ) -> None:
     """Command-to-picture delay over time with the controller off and on."""
     results: dict[str, Any] = {}
+    _say_machine()
     for name in profiles or ["narrow-uplink", "lte-drive"]:
         for mode in modes.split(","):
             found = asyncio.run(_drive(load_profile(name), mode == "on", seconds, tolerance, seed, robot, codec))
@@ -57,7 +61,7 @@ def delay(
             print(f"{name}, controller {mode}: {_line(found['summary'])}", file=sys.stderr, flush=True)
     _publish(results, json_to)
     if svg is not None:
-        from bench.quality.figure import draw  # matplotlib takes a second to load
+        from bench.quality.figure import draw  # needs matplotlib, which only the tests install
 
         draw(results, svg)
 
@@ -76,12 +80,21 @@ def freezes(
 ) -> None:
     """Freezes per minute of the pictures within tolerance, by packet loss in both directions."""
     results: dict[str, Any] = {}
+    _say_machine()
     for percent in losses or [1.0, 3.0, 5.0, 10.0]:
         text = LOSSY.format(round_trip_ms=round_trip_ms, percent=percent, burst=burst)
         found = asyncio.run(_drive(parse_profile(text, "--loss"), True, seconds, tolerance, seed, robot, codec))
         results[f"{percent:g} %"] = found["summary"]
         print(f"{percent:g} % lost: {_line(found['summary'])}", file=sys.stderr, flush=True)
     _publish(results, json_to)
+
+
+def _say_machine() -> None:
+    busy = asyncio.run(busy_percent(LOOK_SECONDS))
+    neighbours = f"others use {busy:.0f} % of this machine"
+    print(
+        f"{neighbours}{': too much to quote the figures' if busy > BUSY_PERCENT else ''}", file=sys.stderr, flush=True
+    )
 
 
 async def _drive(

@@ -87,7 +87,7 @@ async def driving(
         Network(profile, console_url=stack.url, seed=seed) as network,
         Console(
             network.link(stack.operator),
-            gate=False,  # every picture that arrives is counted; the tolerance is judged here
+            gate="off",  # every picture that arrives is counted; the tolerance is judged here
             tolerance=tolerance,
             name="bench",
             codec=codec,
