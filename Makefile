@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-unit test-web test-browser check format bench lock generate clean
+.PHONY: help setup run test test-unit test-web test-browser check format bench fuzz lock generate clean
 
 help: ## List the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/  make \1|\2/' | column -t -s '|'
@@ -49,6 +49,13 @@ format: $(VENV)/.dev web/node_modules/.installed ## Format the code
 bench: $(VENV)/.dev setup ## Measure; results belong in docs/performance.md (ARGS="--json results.json")
 	@scripts/system-packages $(TEST_PACKAGES)
 	$(BIN)/python -m bench $(ARGS)
+
+FUZZ_SECONDS ?= 60
+
+fuzz: $(VENV)/.dev ## Fuzz every parser for FUZZ_SECONDS each (60), beginning with tests/fuzz/corpus
+	@for target in $$($(BIN)/python -m tests.fuzz --list); do \
+	  $(BIN)/python -m tests.fuzz $$target --seconds $(FUZZ_SECONDS) || exit 1; \
+	done
 
 generate: $(VENV)/.dev web/node_modules/.installed ## Write the JSON Schemas and the page's message types
 	$(BIN)/python -m scripts.generate_wire

@@ -1,0 +1,43 @@
+"""What is fuzzed: a name, a function of bytes, and a folder of inputs to begin with."""
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+__all__ = ["TARGETS", "Target", "corpus"]
+
+CORPUS = Path(__file__).parent / "corpus"
+
+
+class Target(NamedTuple):
+    """`module` has a function `try_input(data)` that raises when something is wrong. It is imported late, so that a
+    fuzzer can instrument what it imports."""
+
+    module: str
+    instrumented: tuple[str, ...]  # modules whose code the fuzzer watches
+
+    def load(self) -> Callable[[bytes], None]:
+        attempt: Callable[[bytes], None] = importlib.import_module(self.module).try_input
+        return attempt
+
+
+TARGETS = {
+    "robot_link": Target(
+        "tests.fuzz.robot_link",
+        (  # not the ticks: watching those would leave a tenth of the inputs a second
+            "robot_bridge.event_core",
+            "robot_bridge.link_server",
+            "robot_bridge.link_session",
+            "robot_bridge.link_transport",
+            "robot_bridge.protocol",
+        ),
+    ),
+    "sdp": Target("tests.fuzz.sdp", ("server.offer", "server.whep", "aiortc.sdp")),
+    "channels": Target("tests.fuzz.channels", ("server.channels", "server.scene_proxy", "robot_bridge.protocol")),
+}
+
+
+def corpus(target: str) -> dict[str, bytes]:
+    """By file name."""
+    return {path.name: path.read_bytes() for path in sorted((CORPUS / target).iterdir())}
