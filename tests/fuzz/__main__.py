@@ -1,8 +1,8 @@
 """Fuzz a target for a while: `python -m tests.fuzz TARGET --seconds N`; `make fuzz` does all of them.
 
-Begins with the corpus, and ends with another status than 0 on a finding. With atheris the mutations follow the code that
-they reach; where it does not run, they are blind. Inputs that reach something new stay in `.fuzz/TARGET`; a finding is
-written to `.fuzz/TARGET-…`: add it to the corpus.
+Begins with the corpus, and ends with another status than 0 on a finding. With atheris the mutations follow the code
+that they reach; where it does not run, they are blind. Inputs that reach something new stay in `.fuzz/TARGET`; a
+finding is written to `.fuzz/TARGET-…`: add it to the corpus.
 """
 
 import argparse
