@@ -5,7 +5,7 @@ import re
 __all__ = ["duration_words", "parse_duration"]
 
 UNITS = {"s": 1, "m": 60, "h": 3600, "d": 24 * 3600, "w": 7 * 24 * 3600}
-PART = re.compile(r"(\d{1,6})([smhdw])")
+PART = re.compile(r"([0-9]{1,6})([smhdw])")
 
 
 def parse_duration(text: str) -> float:

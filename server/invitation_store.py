@@ -73,9 +73,9 @@ class InvitationStore:
         if version is None or version == self._version:
             return []
         self._version = version
-        before = {(each.id, each.revoked_at) for each in self._known.all}
+        before = {step for each in self._known.all for step in _steps(each)}
         self._take(self._read(), version)
-        return [each for each in self._known.all if (each.id, each.revoked_at) not in before]
+        return [step for each in self._known.all for step in _steps(each) if step not in before]
 
     def _take(self, known: Invitations, version: tuple[int, int] | None) -> None:
         self._version = version
@@ -88,3 +88,9 @@ class InvitationStore:
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             path = self._directory.path / FILE
             raise StateDamaged(path, f"not understood: {error}; who removes it removes signing.key too") from error
+
+
+def _steps(invitation: Invitation) -> list[Invitation]:
+    """What happened to it: it was made, and perhaps revoked."""
+    made = msgspec.structs.replace(invitation, revoked_at=None)
+    return [made] if invitation.revoked_at is None else [made, invitation]

@@ -5,18 +5,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.access import Access, require_role
-from server.errors import NotAllowed, TokenInvalid, TokenMissing
+from server.access import Access, Identity, require_role
+from server.errors import LinkExpired, LinkRevoked, NotAllowed, TokenInvalid, TokenMissing
 
 SECRET = "a secret of at least thirty-two bytes"
 ACCESS = Access(SECRET, 60, 60)
-CLAIMS = {"aud": "lockstep", "exp": 2**40, "role": "operator", "name": "x", "jti": "1"}
+CLAIMS = {"aud": "lockstep", "exp": 2**40, "iat": 1, "role": "operator", "name": "x", "jti": "1"}
 
 
 def test_a_token_stands_for_its_role_and_name() -> None:
     identity = ACCESS.verify(ACCESS.issue("observer", "Ada"))
     assert (identity.role, identity.name) == ("observer", "Ada")
     assert identity.token_id
+
+
+def test_the_claims_of_these_tests_would_be_taken() -> None:
+    assert ACCESS.verify(jwt.encode(CLAIMS, SECRET, "HS256")).role == "operator"
 
 
 def test_every_token_has_an_id_of_its_own() -> None:
@@ -37,6 +41,12 @@ def test_every_token_has_an_id_of_its_own() -> None:
         jwt.encode({key: value for key, value in CLAIMS.items() if key != "exp"}, SECRET, "HS256"),
         jwt.encode({key: value for key, value in CLAIMS.items() if key != "role"}, SECRET, "HS256"),
         jwt.encode(CLAIMS | {"aud": "another"}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"aud": ["lockstep"]}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"exp": "4000000000"}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"exp": True}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"jti": ""}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"name": "x" * 61}, SECRET, "HS256"),
+        jwt.encode(CLAIMS | {"admin": True}, SECRET, "HS256"),
         jwt.encode(CLAIMS, "", "none"),
         ACCESS.issue("operator", "x" * 4000),
     ],
@@ -80,13 +90,38 @@ def test_a_ticket_opens_the_scene_and_a_token_does_not() -> None:
         ACCESS.verify_ticket(ACCESS.issue("operator", "x"))
 
 
-def test_a_ticket_expires() -> None:
-    ticket = jwt.encode({"aud": "lockstep-scene", "exp": time.time() - 1}, SECRET, "HS256")
+def test_only_who_holds_a_link_of_ours_is_told_that_it_ended() -> None:
+    with pytest.raises(LinkExpired):
+        ACCESS.verify(Access(SECRET, -1, 60).issue("operator", "x"))
+    access = Access(SECRET, 60, 60, is_revoked={"gone"}.__contains__)
+    gone = Identity("operator", "x", "gone", time.time() + 60)
+    with pytest.raises(LinkRevoked):
+        access.verify(access.sign(gone, 0.0))
+    with pytest.raises(LinkExpired):
+        access.verify(access.sign(gone._replace(expires=1.0), 0.0))
     with pytest.raises(TokenInvalid):
-        ACCESS.verify_ticket(ticket)
+        ACCESS.verify(Access("another secret of thirty-two bytes", -1, 60).issue("operator", "x"))
+
+
+def test_a_ticket_ends_with_its_link() -> None:
+    access = Access(SECRET, 60, 60, is_revoked={"gone"}.__contains__)
+    assert access.verify_ticket(access.issue_ticket("good")) == "good"
+    with pytest.raises(LinkRevoked):
+        access.verify_ticket(access.issue_ticket("gone"))
+
+
+def test_the_same_identity_is_always_the_same_token() -> None:
+    identity = Identity("observer", "Ada", "id", 2.0**40)
+    assert ACCESS.sign(identity, 5.0) == ACCESS.sign(identity, 5.0)
+    assert ACCESS.verify(ACCESS.sign(identity, 5.0)) == identity
+
+
+def test_a_ticket_expires() -> None:
+    with pytest.raises(LinkExpired):
+        ACCESS.verify_ticket(Access(SECRET, 60, -1).issue_ticket("link"))
 
 
 def test_a_role_is_required_where_it_is() -> None:
     require_role(ACCESS.verify(ACCESS.issue("operator", "x")), "operator")
     with pytest.raises(NotAllowed):
-        require_role(ACCESS.verify(ACCESS.issue("observer", "x")), "operator")
+        require_role(ACCESS.verify(ACCESS.issue("observer", "x")), "operator", "supervisor")

@@ -59,6 +59,21 @@ async def test_the_stream_needs_a_ticket_and_our_own_page() -> None:
         assert rig.count("lockstep_bad_input_total", where="scene", reason="OriginRefused") == 1
 
 
+async def test_a_viewer_whose_link_is_revoked_is_shown_nothing_more() -> None:
+    async with running_rig(scene=True) as rig:
+        invited = await rig.http.post("/api/invitations", headers=rig.token("operator"), json={})
+        token = {"Authorization": f"Bearer {invited.json()['link'].partition('#token=')[2]}"}
+        path = (await rig.http.post("/api/scene", headers=token)).json()["path"]
+        address = path.split("websocket=")[1].split("&")[0]
+        async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None) as websocket:
+            await rig.http.delete(f"/api/invitations/{invited.json()['id']}", headers=rig.token("supervisor"))
+            async with asyncio.timeout(PATIENCE):
+                await websocket.wait_closed()
+            assert websocket.close_code == 1008
+        with pytest.raises(websockets.InvalidStatus):
+            await connect(address, subprotocols=[VERSION], proxy=None)
+
+
 async def test_only_so_many_may_watch() -> None:
     async with running_rig(scene=True, max_scene_viewers=1) as rig:
         _, address = await _scene_url(rig)

@@ -1,4 +1,4 @@
-"""The seat with the desk behind it, in any order of inputs: never pinned, one driver, rest before anyone else drives."""
+"""The seat with the desk behind it, in any order of inputs: never pinned, one driver, rest before the next."""
 
 from hypothesis import settings
 from hypothesis import strategies as st

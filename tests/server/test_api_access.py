@@ -1,0 +1,247 @@
+"""Invitations, revocations and the audit over HTTP, and what becomes of the peers."""
+
+import asyncio
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+import jwt
+import pytest
+
+from client import Console, SignallingRefused
+from robot_bridge.protocol.console import Notice, Role, SeatTake
+from robot_bridge.protocol.messages import Stop
+from server.access import Identity
+from server.invitation_store import InvitationStore
+from server.invitations import MAX_LIVE
+from server.state_dir import StateDir
+from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_console, running_rig
+
+NOWHERE = 1  # a port where no robot bridge is
+
+
+async def _invite(rig: Rig, by: Role, **wanted: Any) -> httpx.Response:
+    return await rig.http.post("/api/invitations", headers=rig.token(by), json=wanted)
+
+
+def _bearer(link: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {link.partition('#token=')[2]}"}
+
+
+async def _kinds(rig: Rig) -> list[str]:
+    answer = await rig.http.get("/api/audit?limit=500", headers=rig.token("supervisor"))
+    return [record["kind"] for record in answer.json()["records"]]
+
+
+async def test_an_invitation_gives_a_link_with_its_role_and_name() -> None:
+    async with running_console(NOWHERE) as rig:
+        answer = await _invite(rig, "operator", role="observer", name="Ada\n", seconds=3600)
+        made = answer.json()
+        assert answer.status_code == 201
+        assert made["link"].startswith(f"{rig.url}/#token=")
+        assert (made["role"], made["name"], made["by"], made["revoked"]) == ("observer", "Ada", "operator", False)
+        session = await rig.http.get("/api/session", headers=_bearer(made["link"]))
+        assert session.json()["you"] == {"role": "observer", "name": "Ada"}
+        listed = (await rig.http.get("/api/invitations", headers=rig.token("supervisor"))).json()
+        assert [each["id"] for each in listed["invitations"]] == [made["id"]]
+        assert listed["may_invite"] == ["observer", "operator", "supervisor"]
+        assert "link" not in listed["invitations"][0]
+
+
+@pytest.mark.parametrize(
+    ("by", "wanted", "status", "error"),
+    [
+        ("observer", {"role": "observer"}, 403, "not_allowed"),
+        ("operator", {"role": "supervisor"}, 403, "not_allowed"),
+        ("operator", {"role": "admin"}, 400, "bad_json"),
+        ("operator", {"name": "x" * 61}, 400, "bad_json"),
+        ("operator", {"seconds": 1}, 422, "bad_parameter"),
+        ("supervisor", {"seconds": 1e9}, 422, "bad_parameter"),
+        ("supervisor", {"seconds": "long"}, 400, "bad_json"),
+    ],
+)
+async def test_what_is_not_permitted_or_not_understood_is_refused(
+    by: Role, wanted: dict[str, Any], status: int, error: str
+) -> None:
+    async with running_console(NOWHERE) as rig:
+        answer = await _invite(rig, by, **wanted)
+        assert (answer.status_code, answer.json()["error"]) == (status, error)
+        assert rig.services.state.invitations.known.all == []
+
+
+async def test_observers_see_no_invitations_and_revoke_none_and_only_supervisors_read_the_audit() -> None:
+    async with running_console(NOWHERE) as rig:
+        for method, path, role in (
+            ("GET", "/api/invitations", "observer"),
+            ("DELETE", "/api/invitations/x", "observer"),
+            ("GET", "/api/audit", "observer"),
+            ("GET", "/api/audit", "operator"),
+        ):
+            answer = await rig.http.request(method, path, headers=rig.token(role))  # type: ignore[arg-type]
+            assert (answer.status_code, answer.json()["error"]) == (403, "not_allowed")
+            assert (await rig.http.request(method, path)).status_code == 401
+
+
+async def test_there_are_only_so_many() -> None:
+    async with running_console(NOWHERE) as rig:
+
+        def fill(known: Any) -> None:
+            for _ in range(MAX_LIVE):
+                known.invite(None, "observer", "", 3600, time.time())
+
+        rig.services.state.invitations.update(fill)
+        answer = await _invite(rig, "operator")
+        assert (answer.status_code, answer.json()["error"]) == (409, "too_many_invitations")
+
+
+async def test_revoking_closes_the_peers_at_once_and_the_link_says_so_by_name() -> None:
+    async with running_rig() as rig, rig.peer("observer") as other:
+        made = (await _invite(rig, "operator", role="operator")).json()
+        peer = TestPeer()
+        try:
+            await peer.join(rig, _bearer(made["link"]), ("control", "session", "stop"))
+            listed = (await rig.http.get("/api/invitations", headers=rig.token("supervisor"))).json()
+            assert listed["invitations"][0]["connected"] == 1
+            stranger = await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("operator"))
+            assert (stranger.status_code, stranger.json()["error"]) == (404, "not_found")
+            await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
+            async with asyncio.timeout(PATIENCE):
+                await peer.closed.wait()
+        finally:
+            await peer.close()
+        assert rig.count("lockstep_peers_ended_total", why="link revoked") == 1
+        refused = await rig.http.post("/api/stop", headers=_bearer(made["link"]))
+        assert (refused.status_code, refused.json()["error"]) == (401, "link_revoked")
+        with pytest.raises(SignallingRefused, match="link_revoked"):
+            async with Console(made["link"]):
+                pass
+        assert not other.closed.is_set()
+        kinds = await _kinds(rig)
+        assert kinds.index("invitation") < kinds.index("revocation") < len(kinds)
+
+
+async def test_what_another_process_revokes_ends_here_within_seconds_and_is_recorded(tmp_path: Path) -> None:
+    async with running_rig(state_dir=tmp_path) as rig, rig.peer("observer") as other:
+        beside = InvitationStore(StateDir(tmp_path))
+        made = beside.update(lambda known: known.invite(None, "operator", "Ada", 3600, time.time()))
+        token = rig.access.sign(made.identity, made.created)
+        peer = TestPeer()
+        try:
+            await peer.join(rig, {"Authorization": f"Bearer {token}"}, ("control", "session", "stop"))
+            beside.update(lambda known: known.revoke(None, made.id, time.time()))
+            async with asyncio.timeout(PATIENCE):
+                await peer.closed.wait()
+        finally:
+            await peer.close()
+        assert not other.closed.is_set()
+        records = [each for each in rig.services.audit if each.kind in ("invitation", "revocation")]
+        assert [(each.kind, each.who) for each in records] == [
+            ("invitation", "command line"),
+            ("revocation", "command line"),
+        ]
+
+
+async def test_a_link_that_expires_ends_its_peers_and_says_so_by_name() -> None:
+    async with running_rig() as rig:
+        token = rig.access.sign(Identity("observer", "x", "id", time.time() + 2.5), time.time())
+        peer = TestPeer()
+        try:
+            await peer.join(rig, {"Authorization": f"Bearer {token}"}, ("control", "session", "stop"))
+            async with asyncio.timeout(PATIENCE):
+                await peer.closed.wait()
+        finally:
+            await peer.close()
+        assert rig.count("lockstep_peers_ended_total", why="link expired") == 1
+        answer = await rig.http.get("/api/session", headers={"Authorization": f"Bearer {token}"})
+        assert (answer.status_code, answer.json()["error"]) == (401, "link_expired")
+
+
+async def test_who_brings_a_token_of_another_console_is_never_told_what_is_wrong_with_it() -> None:
+    async with running_console(NOWHERE) as rig:
+        claims = {"aud": "lockstep", "exp": 1.0, "iat": 0.0, "role": "operator", "name": "x", "jti": "1"}
+        answers = [
+            await rig.http.get("/api/session", headers={"Authorization": f"Bearer {token}"})
+            for token in ("rubbish", jwt.encode(claims, "not our secret, of thirty-two bytes", "HS256"))
+        ]
+        assert [(answer.status_code, answer.text) for answer in answers] == [(401, answers[0].text)] * 2
+        assert answers[0].json()["error"] == "unauthorized"
+
+
+async def test_the_audit_has_pages_and_the_event_references() -> None:
+    async with running_rig() as rig, rig.peer("supervisor") as peer:
+        peer.send("session", SeatTake())
+        peer.send("stop", Stop(reason="a person came in"))
+        observer = rig.token("observer")
+        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        for _ in range(20):
+            await rig.http.post("/api/stop", headers=observer)
+            await asyncio.sleep(0.01)
+        await eventually(lambda: any(record.kind == "stop" and record.count > 1 for record in rig.services.audit))
+        headers = rig.token("supervisor")
+        page = (await rig.http.get("/api/audit?after=0&limit=2", headers=headers)).json()
+        assert [record["n"] for record in page["records"]] == [1, 2]
+        rest = (await rig.http.get("/api/audit?after=2&limit=500", headers=headers)).json()
+        newest = (await rig.http.get("/api/audit?after=-1&limit=1", headers=headers)).json()
+        assert rest["records"][-1]["n"] == newest["records"][0]["n"] == rest["last"]
+        assert rest["trouble"] == ""
+        stop = next(record for record in rest["records"] if record["kind"] == "stop")
+        assert (stop["who"], stop["role"], stop["what"], stop["detail"]) == (
+            *("supervisor", "supervisor", "stop"),
+            "a person came in",
+        )
+        assert stop["event"] >= 1
+        assert stop["epoch"] == rig.services.console.clock.epoch
+        seat = next(record for record in rest["records"] if record["kind"] == "seat")
+        assert (seat["who"], seat["what"]) == ("supervisor", "taken")
+        for wrong in ("limit=0", "limit=501", "after=x"):
+            assert (await rig.http.get(f"/api/audit?{wrong}", headers=headers)).status_code == 422
+
+
+async def test_the_audit_goes_on_over_a_restart(tmp_path: Path) -> None:
+    for run in (1, 2):
+        async with running_console(NOWHERE, state_dir=tmp_path) as rig:
+            await rig.http.post("/api/stop", headers=rig.token("observer"), json={"reason": str(run)})
+            stops = [record for record in rig.services.audit if record.kind == "stop"]
+            assert [record.detail for record in stops] == [str(each) for each in range(1, run + 1)]
+    numbers = [record.n for record in rig.services.audit]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+async def test_a_disk_that_is_full_stops_nothing_and_everyone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    async with running_rig() as rig, rig.peer("operator") as peer:
+        monkeypatch.setattr("server.audit_file.AuditFile.write", full)
+        await rig.http.post("/api/stop", headers=rig.token("observer"))
+        notice = await peer.until(lambda each: isinstance(each, Notice) and "audit" in each.text)
+        assert isinstance(notice, Notice)
+        assert "No space left on device" in notice.text
+        assert rig.count("lockstep_audit_failing") == 1
+        async with rig.peer("observer") as late:
+            await late.until(lambda each: each == notice)
+        page = (await rig.http.get("/api/audit?after=-1", headers=rig.token("supervisor"))).json()
+        assert page["trouble"] == "No space left on device"
+        assert any(record["kind"] == "stop" for record in page["records"])
+        assert "lockstep_audit_failures_total" in (await rig.http.get("/metrics")).text
+        monkeypatch.undo()
+        await peer.until(lambda each: isinstance(each, Notice) and each.level == "info")
+        assert rig.count("lockstep_audit_failing") == 0
+
+
+def _contents(directory: Path) -> bytes:
+    return b"".join(each.read_bytes() for each in directory.iterdir() if each.name != "signing.key")
+
+
+async def test_no_token_is_ever_logged_or_kept(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    async with running_rig(state_dir=tmp_path) as rig, rig.peer("operator") as peer:
+        made = (await _invite(rig, "operator", role="observer")).json()
+        await rig.http.get("/api/session", headers=_bearer(made["link"]))
+        await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
+        await rig.http.get("/api/session", headers=_bearer(made["link"]))
+        peer.send("stop", Stop())
+    out, err = capfd.readouterr()
+    kept = _contents(tmp_path)
+    assert b"eyJ" not in kept
+    assert "eyJ" not in out + err

@@ -1,0 +1,99 @@
+"""What becomes a record, and with what."""
+
+from robot_bridge.protocol.console import Seat, SeatClaim
+from robot_bridge.protocol.messages import Feedback
+from server.audit import MAX_PENDING, Actor, AuditMerger, AuditRecord
+from server.audit_tail import KEPT, AuditTail
+from server.audit_trail import AuditTrail
+from server.event_clock import EventClock
+
+ADA = Actor("Ada", "operator", "a1", "link1")
+GRACE = Actor("Grace", "supervisor", "b2", "link2")
+
+
+def _trail(tail: AuditTail | None = None) -> tuple[AuditTrail, AuditTail, EventClock]:
+    kept = AuditTail() if tail is None else tail
+    clock = EventClock()
+    return AuditTrail(clock, kept), kept, clock
+
+
+def _last(tail: AuditTail) -> AuditRecord:
+    return list(tail)[-1]
+
+
+def test_a_record_says_who_and_which_event_and_counts_up() -> None:
+    trail, tail, clock = _trail()
+    trail.record("start")
+    clock.begin("e1")
+    clock.observe(Feedback(event=7, issue=1, time=0.0, axes=[]), 0.0)
+    trail.record("stop", ADA, "http", "a person came in")
+    first, second = tail
+    assert (first.n, first.epoch, first.event) == (1, "", 0)
+    assert (second.n, second.epoch, second.event, second.kind) == (2, "e1", 7, "stop")
+    assert (second.who, second.role, second.peer, second.link) == ADA
+    assert (second.what, second.detail) == ("http", "a person came in")
+
+
+def test_numbers_go_on_after_a_restart() -> None:
+    trail, tail, _ = _trail(AuditTail([AuditRecord(n=41, time=0.0, kind="start")]))
+    trail.record("start")
+    assert _last(tail).n == 42
+
+
+def test_hand_overs_name_both() -> None:
+    trail, tail, _ = _trail()
+    trail.seat(Seat(holder="a1", why="request"), ADA, ADA)
+    trail.seat(Seat(holder="b2", why="taken"), GRACE, GRACE)
+    assert (_last(tail).who, _last(tail).what, _last(tail).detail) == ("Grace", "taken", "was Ada (a1)")
+    trail.seat(Seat(why="idle"), Actor(), Actor())
+    assert (_last(tail).who, _last(tail).what) == ("Grace", "idle, free")
+
+
+def test_claims_are_recorded_when_they_change_and_a_countdown_is_not() -> None:
+    trail, tail, _ = _trail()
+    trail.seat(Seat(holder="a1", why="request"), ADA, ADA)
+    claims = [SeatClaim(peer="b2", name="Grace", seconds_left=60)]
+    trail.seat(Seat(holder="a1", claims=claims), ADA, GRACE)
+    trail.seat(Seat(holder="a1", claims=claims, idle_seconds_left=30), ADA, Actor())
+    assert [(record.kind, record.who, record.detail) for record in tail][1:] == [("claim", "Grace", "Grace (b2)")]
+
+
+def test_a_flood_of_refusals_becomes_one_record_for_each_peer_and_reason() -> None:
+    trail, tail, _ = _trail()
+    for _ in range(500):
+        trail.refused(ADA, "no_seat")
+    trail.refused(ADA, "late")
+    trail.refused(GRACE, "no_seat")
+    assert list(tail) == []
+    trail.flush()
+    assert {(record.who, record.what, record.count) for record in tail} == {
+        ("Ada", "no_seat", 500),
+        ("Ada", "late", 1),
+        ("Grace", "no_seat", 1),
+    }
+    trail.flush()
+    assert len(list(tail)) == 3
+
+
+def test_what_is_merged_is_bounded() -> None:
+    merger = AuditMerger()
+    for number in range(MAX_PENDING + 5):
+        merger.add("refusal", Actor(str(number)), "late")
+    merger.add("refusal", Actor("0"), "late")
+    found = list(merger.take())
+    assert len(found) == MAX_PENDING + 1
+    assert found[-1] == ("refusal", Actor(), "others", 5)
+    assert found[0][3] == 2
+    assert list(merger.take()) == []
+
+
+def test_the_tail_gives_pages_and_the_newest_and_is_bounded() -> None:
+    tail = AuditTail()
+    assert (tail.next_number, tail.after(0, 5), tail.after(-1, 5)) == (1, [], [])
+    for n in range(1, KEPT + 11):
+        tail.append(AuditRecord(n=n, time=0.0, kind="note"))
+    assert len(list(tail)) == KEPT
+    assert [record.n for record in tail.after(0, 3)] == [11, 12, 13]
+    assert [record.n for record in tail.after(100, 2)] == [101, 102]
+    assert [record.n for record in tail.after(-1, 2)] == [KEPT + 9, KEPT + 10]
+    assert tail.after(KEPT + 10, 2) == []

@@ -1,0 +1,106 @@
+import os
+from pathlib import Path
+
+import pytest
+
+from server.audit import AuditRecord
+from server.audit_file import AuditFile, last_records, rotated, stored_records
+
+
+def _record(n: int, detail: str = "") -> AuditRecord:
+    return AuditRecord(n=n, time=1.0, kind="note", detail=detail)
+
+
+def _numbers(path: Path) -> list[int]:
+    return [record.n for record in stored_records(path)]
+
+
+def _file(path: Path, max_bytes: int = 10_000, files: int = 3) -> AuditFile:
+    return AuditFile(path, max_bytes, files)
+
+
+def test_records_are_appended_over_restarts_and_only_the_owner_can_read_them(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    for n in (1, 2):
+        file = _file(path)
+        file.write([_record(n), _record(n + 10)])
+        file.close()
+        file.close()
+    assert _numbers(path) == [1, 11, 2, 12]
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert path.read_text().splitlines()[0] == '{"n":1,"time":1.0,"kind":"note"}', "what is empty is left out"
+
+
+def test_a_full_file_is_set_aside_and_the_oldest_goes(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    file = _file(path, max_bytes=400, files=3)
+    for n in range(1, 41):
+        file.write([_record(n)])
+    file.close()
+    sizes = [rotated(path, number).stat().st_size for number in range(3)]
+    assert all(size <= 400 for size in sizes)
+    assert not rotated(path, 3).exists()
+    numbers = _numbers(path)
+    assert numbers == list(range(numbers[0], 41)), "in order, without gaps"
+    assert numbers[0] > 1
+
+
+def test_one_file_is_enough(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    file = _file(path, max_bytes=100, files=1)
+    for n in range(1, 10):
+        file.write([_record(n)])
+    file.close()
+    assert _numbers(path)[-1] == 9
+    assert os.listdir(tmp_path) == ["audit.jsonl"]
+
+
+def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    path.write_text('{"n":1,"time":1.0,"kind":"note"}\n{"n":2,"ti')
+    file = _file(path)
+    file.write([_record(3)])
+    file.close()
+    assert _numbers(path) == [1, 3]
+
+
+def test_a_write_that_fails_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "audit.jsonl"
+    file = _file(path)
+    file.write([_record(1)])
+    whole = path.read_bytes()
+    real = os.write
+
+    def full(handle: int, data: bytes) -> int:
+        if len(data) > 20:
+            return real(handle, data[:20])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.write", full)
+    with pytest.raises(OSError, match="No space left"):
+        file.write([_record(2)])
+    assert path.read_bytes() == whole
+    monkeypatch.undo()
+    file.write([_record(2)])
+    file.close()
+    assert _numbers(path) == [1, 2]
+
+
+def test_what_cannot_be_understood_is_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    path.write_bytes(b'rubbish\n{"n":"x"}\n\xff\n{"n":5,"time":1.0,"kind":"note","unknown":1}\n')
+    assert _numbers(path) == [5]
+    assert [record.n for record in last_records(path)] == [5]
+
+
+def test_the_end_of_the_log_is_found_quickly_and_a_missing_log_is_empty(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    assert last_records(path) == []
+    assert _numbers(path) == []
+    file = _file(path, max_bytes=3_000_000)
+    for first in range(1, 20_001, 1000):
+        file.write([_record(n, "x" * 80) for n in range(first, first + 1000)])
+    file.close()
+    found = [record.n for record in last_records(path)]
+    assert found[-1] == 20_000
+    assert 5_000 < len(found) < 20_000

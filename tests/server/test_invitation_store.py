@@ -1,0 +1,96 @@
+import time
+from pathlib import Path
+
+import pytest
+import structlog
+
+from server.invitation_store import FILE, InvitationStore
+from server.invitations import Invitation, Invitations
+from server.state_dir import StateDamaged, StateDir
+
+HOUR = 3600.0
+
+
+def _invite(known: Invitations) -> Invitation:
+    return known.invite(None, "observer", "Ada", HOUR, time.time())
+
+
+@pytest.fixture
+def directory(tmp_path: Path) -> StateDir:
+    return StateDir(tmp_path)
+
+
+def test_what_one_process_changes_another_sees(directory: StateDir) -> None:
+    one, other = InvitationStore(directory), InvitationStore(directory)
+    made = one.update(_invite)
+    assert other.refresh() == [made]
+    assert other.refresh() == []
+    revoked = other.update(lambda known: known.revoke(None, made.id, time.time()))
+    assert not one.is_revoked(made.id)
+    assert one.refresh() == revoked
+    assert one.is_revoked(made.id)
+    assert InvitationStore(directory).is_revoked(made.id), "after a restart too"
+
+
+def test_a_change_begins_with_what_others_wrote_meanwhile(directory: StateDir) -> None:
+    one, other = InvitationStore(directory), InvitationStore(directory)
+    made = {one.update(_invite).id, other.update(_invite).id}
+    assert {each.id for each in InvitationStore(directory).known.all} == made
+
+
+def test_a_change_that_fails_changes_nothing(directory: StateDir) -> None:
+    store = InvitationStore(directory)
+    store.update(_invite)
+    before = (directory.path / FILE).read_bytes()
+
+    def fail(known: Invitations) -> None:
+        known.prune(time.time() + 1e9)
+        raise ValueError
+
+    with pytest.raises(ValueError):  # noqa: PT011
+        store.update(fail)
+    assert (directory.path / FILE).read_bytes() == before
+    assert len(store.known.all) == 1
+
+
+@pytest.mark.parametrize("data", [b"", b"rubbish", b'{"invitations": 1}', b'{"invitations": [{"id": 1}]}', b"\xff"])
+def test_a_damaged_file_stops_the_start_and_not_a_console_that_runs(directory: StateDir, data: bytes) -> None:
+    store = InvitationStore(directory)
+    made = store.update(_invite)
+    store.update(lambda known: known.revoke(None, made.id, time.time()))
+    directory.write(FILE, data)
+    with structlog.testing.capture_logs() as logs:
+        assert store.refresh() == []
+        assert store.refresh() == []
+    assert [line["log_level"] for line in logs] == ["error"], "said once"
+    assert store.is_revoked(made.id)
+    with pytest.raises(StateDamaged, match="signing.key"):
+        InvitationStore(directory)
+
+
+def test_a_file_that_vanishes_revives_no_link(directory: StateDir) -> None:
+    store = InvitationStore(directory)
+    made = store.update(_invite)
+    store.update(lambda known: known.revoke(None, made.id, time.time()))
+    (directory.path / FILE).unlink()
+    assert store.refresh() == []
+    assert store.is_revoked(made.id)
+
+
+def test_while_a_thread_changes_it_the_console_does_not_take_the_change_for_another_ones(directory: StateDir) -> None:
+    store, seen = InvitationStore(directory), []
+
+    def change(known: Invitations) -> None:
+        _invite(known)
+        seen.append(store.refresh())
+
+    store.update(change)
+    assert seen == [[]]
+    assert store.refresh() == []
+
+
+def test_the_file_holds_no_token_and_is_for_its_owner_only(directory: StateDir) -> None:
+    InvitationStore(directory).update(_invite)
+    path = directory.path / FILE
+    assert b"eyJ" not in path.read_bytes()
+    assert path.stat().st_mode & 0o777 == 0o600

@@ -1,0 +1,115 @@
+import pytest
+
+from robot_bridge.protocol.console import Role
+from server.access import Identity
+from server.errors import BadParameter, NotAllowed, NotFound, TooManyInvitations
+from server.invitations import MAX_LIVE, MAX_SECONDS, SHOWN_AFTER_END, Invitation, Invitations
+
+NOW = 1_000_000.0
+HOUR = 3600.0
+
+
+def _person(role: Role, link: str = "own", expires: float = NOW + 100 * HOUR) -> Identity:
+    return Identity(role, f"a {role}", link, expires)
+
+
+@pytest.mark.parametrize(
+    ("by", "allowed"),
+    [
+        ("observer", set()),
+        ("operator", {"observer", "operator"}),
+        ("supervisor", {"observer", "operator", "supervisor"}),
+    ],
+)
+def test_who_may_invite_whom(by: Role, allowed: set[Role]) -> None:
+    roles: list[Role] = ["observer", "operator", "supervisor"]
+    for role in roles:
+        known = Invitations([])
+        if role in allowed:
+            made = known.invite(_person(by), role, "Ada", HOUR, NOW)
+            assert (made.role, made.name, made.by, made.by_link) == (role, "Ada", f"a {by}", "own")
+        else:
+            with pytest.raises(NotAllowed):
+                known.invite(_person(by), role, "Ada", HOUR, NOW)
+
+
+def test_the_command_line_invites_anyone() -> None:
+    made = Invitations([]).invite(None, "supervisor", "", HOUR, NOW)
+    assert (made.name, made.by, made.expires) == ("supervisor", "", NOW + HOUR)
+
+
+def test_names_are_cleaned() -> None:
+    assert Invitations([]).invite(None, "observer", "  A\u202eda\x00 \n", HOUR, NOW).name == "Ada"
+
+
+@pytest.mark.parametrize("seconds", [0, 59, -1, MAX_SECONDS + 1, float("inf"), float("nan")])
+def test_a_time_out_of_bounds_is_refused(seconds: float) -> None:
+    with pytest.raises(BadParameter):
+        Invitations([]).invite(None, "observer", "", seconds, NOW)
+
+
+def test_an_invitation_ends_no_later_than_the_link_it_was_made_with() -> None:
+    by = _person("operator", expires=NOW + HOUR)
+    assert Invitations([]).invite(by, "observer", "", 8 * HOUR, NOW).expires == NOW + HOUR
+
+
+def test_they_are_bounded_and_revoked_or_expired_ones_do_not_count() -> None:
+    known = Invitations([])
+    made = [known.invite(None, "observer", "", HOUR, NOW) for _ in range(MAX_LIVE)]
+    with pytest.raises(TooManyInvitations):
+        known.invite(None, "observer", "", HOUR, NOW)
+    known.revoke(None, made[0].id, NOW)
+    known.invite(None, "observer", "", HOUR, NOW)
+    known.invite(None, "observer", "", HOUR, NOW + 2 * HOUR)
+
+
+def test_an_operator_sees_and_revokes_what_it_invited_and_a_supervisor_everything() -> None:
+    known = Invitations([])
+    mine = known.invite(_person("operator", "mine"), "observer", "", HOUR, NOW)
+    other = known.invite(_person("operator", "other"), "observer", "", HOUR, NOW + 1)
+    assert known.visible(_person("operator", "mine")) == [mine]
+    assert known.visible(_person("observer", "mine")) == [mine]
+    assert known.visible(_person("supervisor")) == known.visible(None) == [other, mine]
+    with pytest.raises(NotFound):
+        known.revoke(_person("operator", "mine"), other.id, NOW)
+    assert known.revoke(_person("supervisor"), other.id, NOW)[0].revoked_at == NOW
+    assert known.revoked() == {other.id}
+
+
+def test_what_was_invited_with_a_revoked_link_is_revoked_with_it() -> None:
+    known = Invitations([])
+    first = known.invite(None, "operator", "", HOUR, NOW)
+    second = known.invite(first.identity, "operator", "", HOUR, NOW)
+    third = known.invite(second.identity, "observer", "", HOUR, NOW)
+    apart = known.invite(None, "observer", "", HOUR, NOW)
+    assert {each.id for each in known.revoke(None, first.id, NOW)} == {first.id, second.id, third.id}
+    assert apart.id not in known.revoked()
+    assert known.revoke(None, first.id, NOW + 1) == [], "once is enough"
+
+
+def test_a_circle_of_invitations_ends() -> None:
+    known = Invitations(
+        [
+            Invitation(id="a", role="operator", name="", created=NOW, expires=NOW + 9, by_link="b"),
+            Invitation(id="b", role="operator", name="", created=NOW, expires=NOW + 9, by_link="a"),
+        ]
+    )
+    assert len(known.revoke(None, "a", NOW)) == 2
+
+
+def test_the_link_of_the_start_is_the_same_until_half_of_its_time_is_over() -> None:
+    known = Invitations([])
+    first = known.for_start("operator", 10 * HOUR, NOW)
+    assert known.for_start("operator", 10 * HOUR, NOW + 5 * HOUR) == first
+    assert known.for_start("operator", 10 * HOUR, NOW + 5.1 * HOUR) != first
+    assert known.for_start("observer", 10 * HOUR, NOW) != first
+
+
+def test_what_expired_long_ago_is_forgotten_and_a_revoked_one_is_kept_until_it_would_have_expired() -> None:
+    known = Invitations([])
+    revoked = known.invite(None, "observer", "", HOUR, NOW)
+    known.revoke(None, revoked.id, NOW)
+    known.prune(NOW + HOUR + SHOWN_AFTER_END - 1)
+    assert known.revoked() == {revoked.id}
+    known.prune(NOW + HOUR + SHOWN_AFTER_END)
+    assert known.all == []

@@ -1,0 +1,99 @@
+import pytest
+
+from robot_bridge.protocol.console import SharedNote
+from server.audit import AuditRecord
+from server.names import MAX_NAME, clean_name, printable, unique_name
+from server.notes import BOARD_BURST, BURST, KEPT, PEER_RATE, NoteBoard
+from server.token_bucket import TokenBucket
+
+
+def _write(board: NoteBoard, text: str = "hello", peer: str = "a", now: float = 0.0) -> SharedNote | str:
+    return board.write(peer, "Ada", "observer", text, "e1", 7, now, 1000.0004)
+
+
+def test_a_note_keeps_who_when_and_at_which_event() -> None:
+    note = _write(NoteBoard(0.0), " mind\tthe \x00step\n")
+    assert note == SharedNote(
+        id=1, peer="a", name="Ada", role="observer", text="mind the step", epoch="e1", event=7, time=1000.0
+    )
+
+
+@pytest.mark.parametrize("text", ["", "\x00", " \n\t ", "\u202e\u200b"])
+def test_nothing_that_can_be_printed_is_no_note(text: str) -> None:
+    board = NoteBoard(0.0)
+    assert _write(board, text) == "malformed"
+    assert list(board) == []
+
+
+def test_a_peer_that_writes_too_often_is_refused_and_others_are_not() -> None:
+    board = NoteBoard(0.0)
+    for _ in range(int(BURST)):
+        assert isinstance(_write(board), SharedNote)
+    assert _write(board) == "too_often"
+    assert isinstance(_write(board, peer="b"), SharedNote)
+    assert isinstance(_write(board, now=1 / PEER_RATE), SharedNote)
+
+
+def test_all_together_are_limited_too() -> None:
+    board = NoteBoard(0.0)
+    results = [_write(board, peer=str(number)) for number in range(int(BOARD_BURST) + 5)]
+    assert results.count("too_often") == 5
+
+
+def test_the_last_hundred_are_kept() -> None:
+    board = NoteBoard(0.0)
+    for number in range(KEPT + 10):
+        assert isinstance(_write(board, f"note {number}", now=number * 10.0), SharedNote)
+    assert [note.text for note in board] == [f"note {number}" for number in range(10, KEPT + 10)]
+
+
+def test_who_left_is_forgotten_and_the_notes_stay() -> None:
+    board = NoteBoard(0.0)
+    for _ in range(int(BURST)):
+        _write(board)
+    board.forget("a")
+    board.forget("never here")
+    assert isinstance(_write(board), SharedNote)
+    assert len(list(board)) == BURST + 1
+
+
+def test_notes_come_back_from_the_audit_log() -> None:
+    board = NoteBoard(0.0)
+    board.remember(AuditRecord(n=1, time=5.0, kind="stop", who="Ada", role="observer"))
+    board.remember(AuditRecord(n=2, time=5.0, kind="note", who="Ada", role="nobody", detail="?"))
+    board.remember(AuditRecord(n=3, time=5.0, kind="note", who="Ada", role="observer", peer="a", detail="hi"))
+    assert [(note.id, note.name, note.text, note.event, note.time) for note in board] == [(1, "Ada", "hi", 1, 5.0)]
+    assert isinstance(note := _write(board), SharedNote)
+    assert note.id == 2
+
+
+@pytest.mark.parametrize(
+    ("wanted", "shown"),
+    [
+        ("Ada", "Ada"),
+        ("  Ada \n Lovelace\t", "Ada Lovelace"),
+        ("A\u202eda\x00\u200b", "Ada"),
+        ("", "operator"),
+        ("\x07", "operator"),
+        ("x" * 100, "x" * MAX_NAME),
+        ("Å" * 3, "ÅÅÅ"),
+    ],
+)
+def test_names_are_bounded_and_can_be_printed(wanted: str, shown: str) -> None:
+    assert clean_name(wanted, "operator") == shown
+    assert printable(shown) == shown
+
+
+def test_nobody_has_the_name_of_another() -> None:
+    assert unique_name("Ada", []) == "Ada"
+    assert unique_name("Ada", ["Grace"]) == "Ada"
+    assert unique_name("Ada", ["ada"]) == "Ada 2"
+    assert unique_name("Ada", ["Ada", "Ada 2", "ADA 3"]) == "Ada 4"
+
+
+def test_a_bucket_gives_a_burst_and_then_its_rate() -> None:
+    bucket = TokenBucket(2.0, 3.0, 0.0)
+    assert [bucket.take(0.0) for _ in range(4)] == [True, True, True, False]
+    assert [bucket.take(0.5) for _ in range(2)] == [True, False]
+    assert [bucket.take(100.0) for _ in range(4)] == [True, True, True, False]
+    assert not bucket.has(100.0)
