@@ -16,6 +16,7 @@ import "./style/invite.css";
 import "./style/audit.css";
 import "./style/small_screens.css";
 import "./style/landscape.css";
+import "./style/short_phones.css";
 import "./style/charts.css";
 import "./style/staleness.css";
 import "./style/limits.css";

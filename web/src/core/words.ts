@@ -34,7 +34,7 @@ export const ARM_REFUSAL_WORDS: Readonly<Record<ArmRefusal, string>> = {
   observer: "This link is for watching",
   not_connected: "Not connected to the console",
   robot_down: "The robot cannot be reached",
-  no_seat: "You do not hold the control seat",
+  no_seat: "Get the control seat first",
   stopped: "The robot is stopped: reset it first",
   hidden: "The page is hidden",
   occupied: "Close what is open over the picture, or leave the text field, first",

@@ -95,7 +95,8 @@ class AuditSheet {
       this.loaded = true;
       this.entries = mergeAudit(this.entries, entries);
     } catch (error) {
-      this.trouble = `${troubleWords(error)} What is below is as it was.`;
+      const old = this.entries.length === 0 ? "" : " What is below is as it was.";
+      this.trouble = `${troubleWords(error)}${old}`;
     }
   }
 
