@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 import typer
 import uvloop
 
+from bench.emulator.deliveries import prefer_this_process
 from bench.emulator.errors import EmulatorError
 from bench.emulator.namespaces import OPERATOR_ADDRESS, ROBOT_ADDRESS, Namespaces
 from bench.emulator.network import Network
@@ -84,6 +85,7 @@ def _robot(address: str | None) -> tuple[str, int] | None:
 
 
 async def _run(network: Network, console: str | None, as_json: bool) -> None:
+    prefer_this_process()
     async with network:
         link = "" if console is None else network.link(console)
         if as_json:
