@@ -42,7 +42,12 @@ STYLE: Any = {
 
 
 def _figure(rows: int, columns: int) -> tuple[Figure, list[list[Axes]]]:
-    figure = Figure(figsize=(WIDTH, ROW * rows), layout="constrained")
+    height = ROW * rows
+    figure = Figure(figsize=(WIDTH, height))
+    # A layout engine would draw every figure twice.
+    figure.subplots_adjust(
+        left=0.6 / WIDTH, right=1 - 0.1 / WIDTH, bottom=0.5 / height, top=1 - 0.3 / height, wspace=0.24, hspace=0.45
+    )
     return figure, figure.subplots(rows, columns, squeeze=False).tolist()
 
 

@@ -3,7 +3,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from bench.emulator.profile import load_profile
-from bench.experiment.choices import MODES, media_of
+from bench.experiment.choices import Mode, media_of
 from bench.experiment.findings import Cell, Findings
 from bench.experiment.growth import Growth, Point
 from bench.experiment.report import write_report
@@ -11,6 +11,7 @@ from bench.experiment.results import result_of
 from tests.bench.experiment.made_up import choices, client, run
 
 PROFILE = load_profile("micro-lan")
+MODES: tuple[Mode, ...] = ("off",)  # a figure takes a moment
 OUTAGE = {
     "experiment": "outage",
     "seconds": 10.0,
