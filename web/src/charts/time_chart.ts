@@ -9,6 +9,7 @@ const HOLD_ROWS = 5;
 const GRID = { stroke: "#27313a", width: 1 };
 const TICKS = { stroke: "#4a5763", width: 1, size: 5 };
 const AXIS_STROKE = "#c3ced8";
+const WHOLE_STEPS = [1, 10, 100, 1000, 10_000, 100_000].flatMap((step) => [step, 2 * step, 5 * step]);
 const FONT = "Inter, system-ui, sans-serif";
 
 /** One chart against time, with its name and the values at the cursor, or the newest, above it. */
@@ -117,7 +118,7 @@ function options(spec: ChartSpec, isLast: boolean, moved: () => void): uPlot.Opt
         range: (_plot, low, high) => (count > 0 ? gapRange(low, high) : valueRange(low, high, spec.fromZero)),
       },
     },
-    axes: [timeAxis(isLast), valueAxis()],
+    axes: [timeAxis(isLast), valueAxis(spec.digits === 0)],
     series: [{}, ...spec.bands.flatMap(edges), ...spec.lines.map(lineSeries)],
     bands: spec.bands.map((band, at) => ({ series: [1 + 2 * at, 2 + 2 * at], fill: band.fill })),
   };
@@ -136,8 +137,9 @@ function timeAxis(isLast: boolean): uPlot.Axis {
   };
 }
 
-function valueAxis(): uPlot.Axis {
+function valueAxis(whole: boolean): uPlot.Axis {
   return {
+    ...(whole ? { incrs: WHOLE_STEPS } : {}),
     stroke: AXIS_STROKE,
     font: `600 14px ${FONT}`,
     grid: GRID,
