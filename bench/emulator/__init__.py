@@ -5,6 +5,7 @@ from bench.emulator.errors import BadDescription, EmulatorError, NamespacesUnava
 from bench.emulator.impairment import Impairment, Reordering
 from bench.emulator.loss import bursty, independent
 from bench.emulator.network import Network
+from bench.emulator.network_process import NetworkProcess
 from bench.emulator.network_statistics import NetworkStatistics, QueueStatistics
 from bench.emulator.path import PathStatistics
 from bench.emulator.profile import Profile, even_profile, load_profile, parse_profile, profile_names
@@ -17,6 +18,7 @@ __all__ = [
     "Lognormal",
     "NamespacesUnavailable",
     "Network",
+    "NetworkProcess",
     "NetworkStatistics",
     "Normal",
     "Pareto",
