@@ -167,6 +167,7 @@ class MediaSender(RTCRtpSender):
         self._listener = listener
         self._pacer = pacer  # None: nothing is held back
         self._on_paced = on_paced
+        self.paced = False  # whether packets wait for the pacer
         self._repeats: deque[bytes] = deque()  # retransmissions that the pacer holds back; they go first
         self._rest: deque[bytes] = deque()  # packets of the last frame that it holds back
         self._patience: asyncio.TimerHandle | None = None  # of a keyframe request that waits for a retransmission
@@ -206,6 +207,7 @@ class MediaSender(RTCRtpSender):
         self._stopped = True
         self._repeats.clear()
         self._rest.clear()
+        self.paced = False
         if self._patience is not None:
             self._patience.cancel()
         if self._packets is not None:
@@ -227,9 +229,10 @@ class MediaSender(RTCRtpSender):
             return None
         packets = self._packets.packets(frame, time.time())
         if self._pacer is not None:
-            count = self._pacer.admit([len(packet) for packet in packets], time.monotonic())
+            count = self._pacer.admit(packets, time.monotonic())
             if count < len(packets):
                 self._rest.extend(packets[count:])
+                self.paced = True
                 packets = packets[:count]
         return self._send_all(packets, transport, address)
 
@@ -247,24 +250,21 @@ class MediaSender(RTCRtpSender):
             return 0, 0
         return len(packets), octets
 
-    @property
-    def paced(self) -> bool:
-        """Whether packets wait for the pacer."""
-        return bool(self._rest or self._repeats)
-
     def flush(self) -> tuple[int, int]:
         """Send what the pacer lets through of what waits: packets and bytes handed to the network."""
         path = self._path()
         if path is None or self._packets is None or self._pacer is None:
             self._rest.clear()
             self._repeats.clear()
+            self.paced = False
             return 0, 0
         packets, octets, now = 0, 0, time.time()
         for waiting in (self._repeats, self._rest):
-            count = self._pacer.admit([len(packet) for packet in waiting], time.monotonic())
+            count = self._pacer.admit(waiting, time.monotonic())
             leaving = [self._packets.stamp_send_time(waiting.popleft(), now) for _ in range(count)]
             sent = self._send_all(leaving, *path)
             packets, octets = packets + sent[0], octets + sent[1]
+        self.paced = bool(self._rest or self._repeats)
         return packets, octets
 
     def report(self) -> None:
@@ -350,10 +350,11 @@ class MediaSender(RTCRtpSender):
             packet = self._packets.retransmission(sequence_number, now)
             if packet is None:
                 continue
-            if self._pacer is None or (not self._repeats and self._pacer.admit([len(packet)], time.monotonic())):
+            if self._pacer is None or (not self._repeats and self._pacer.admit((packet,), time.monotonic())):
                 self._send_all((packet,), *path)
             else:
                 self._repeats.append(packet)  # bounded by the history's budget
+                self.paced = True
                 self._on_paced()
 
 

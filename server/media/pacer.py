@@ -1,5 +1,7 @@
 """How fast packets may leave for one peer: a token bucket that spreads keyframes. No clock is read here."""
 
+from collections.abc import Sequence
+
 __all__ = ["Pacer"]
 
 BURST_BYTES = 15_000  # that may leave at once: an ordinary picture never waits
@@ -19,7 +21,7 @@ class Pacer:
         """The path is believed to carry `rate_bps`; None: no limit was seen."""
         self._bytes_per_second = (FREE_BPS if rate_bps is None else rate_bps * HEADROOM) / 8
 
-    def admit(self, sizes: list[int], now: float) -> int:
+    def admit(self, packets: Sequence[bytes], now: float) -> int:
         """How many of these packets may leave now, in their order; they count as sent.
 
         The last one may overdraw the bucket, so that a packet of any size passes some time.
@@ -27,8 +29,12 @@ class Pacer:
         if self._at is not None:
             self._tokens = min(BURST_BYTES, self._tokens + (now - self._at) * self._bytes_per_second)
         self._at = now
-        for count, size in enumerate(sizes):
+        total = sum(map(len, packets))
+        if self._tokens > total:  # almost always
+            self._tokens -= total
+            return len(packets)
+        for count, packet in enumerate(packets):
             if self._tokens <= 0:
                 return count
-            self._tokens -= size
-        return len(sizes)
+            self._tokens -= len(packet)
+        return len(packets)

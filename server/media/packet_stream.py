@@ -79,7 +79,8 @@ class PacketStream:
         # A peer that changes its tier gets one picture of both: a frame of its own needs a time of its own.
         self._media_time = max(self._media_time + 1, frame.media_time)
         timestamp = (self._timestamp_offset + self._media_time) & 0xFFFFFFFF
-        self._history.append(SentFrame(self._sent, payloads, extension, timestamp, frame.marker), send_time)
+        octets = sum(map(len, payloads))
+        self._history.append(SentFrame(self._sent, payloads, extension, timestamp, frame.marker, octets, send_time))
         self._last = timestamp, frame.capture_time
         number = self._sequence_origin + self._sent
         self._sent += len(payloads)
@@ -91,7 +92,7 @@ class PacketStream:
         ]
         self.stats.frames += 1
         self.stats.packets += len(packets)
-        self.stats.octets += sum(map(len, payloads))
+        self.stats.octets += octets
         return packets
 
     def retransmission(self, sequence_number: int, now: float) -> bytes | None:

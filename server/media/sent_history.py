@@ -22,6 +22,8 @@ class SentFrame(NamedTuple):
     extension: bytes  # the whole extension block, stamp included
     timestamp: int  # RTP
     marker: bool
+    octets: int  # of all payloads
+    sent_at: float  # s, on any clock
 
 
 class SentHistory:
@@ -29,26 +31,26 @@ class SentHistory:
 
     def __init__(self) -> None:
         self._frames: deque[SentFrame] = deque()
-        self._sent_at: deque[float] = deque()
         self._next = 0
         self._bytes = 0
         self._budget = float(RETRANSMIT_BURST)
         self._budget_at = 0.0
         self._repeated: dict[int, float] = {}  # number to the time of its last retransmission, oldest first
 
-    def append(self, frame: SentFrame, now: float) -> None:
-        """`now` is on any clock, the same for all calls."""
-        self._frames.append(frame)
-        self._sent_at.append(now)
+    def append(self, frame: SentFrame) -> None:
+        frames = self._frames
+        frames.append(frame)
         self._next = frame.first + len(frame.payloads)
-        self._bytes += sum(map(len, frame.payloads))
-        while len(self._frames) > 1 and (
-            now - self._sent_at[0] > KEEP_SECONDS
-            or self._next - self._frames[0].first > KEEP_PACKETS
+        self._bytes += frame.octets
+        oldest = frames[0]
+        while len(frames) > 1 and (
+            frame.sent_at - oldest.sent_at > KEEP_SECONDS
+            or self._next - oldest.first > KEEP_PACKETS
             or self._bytes > KEEP_BYTES
         ):
-            self._sent_at.popleft()
-            self._bytes -= sum(map(len, self._frames.popleft().payloads))
+            self._bytes -= oldest.octets
+            frames.popleft()
+            oldest = frames[0]
 
     def find(self, sequence_number: int, origin: int) -> tuple[SentFrame, int] | None:
         """The frame and index of the packet with this 16-bit number, where packet 0 had `origin`; None if forgotten."""

@@ -81,6 +81,9 @@ class QualityDesk:
                 self._metrics.lowered(reason)
         self._plan_operator(leaders, now)
         observers = [peer for peer in self._peers if peer not in leaders]
+        for peer in observers:
+            if peer.tier == "operator":  # it drove until now
+                self._step_back(peer, now)
         for i, peer in enumerate(observers):
             if (i + self._ticks) % OBSERVER_TICKS == 0:
                 peer.decide(now)
@@ -90,8 +93,6 @@ class QualityDesk:
         for peer in leaders:
             self._settle(peer, "operator", "operator")
         for i, peer in enumerate(observers):
-            if peer.tier == "operator":  # it drove until now
-                peer.tier = peer.choice.tier
             self._settle(peer, peer.tier, "operator" if shared and peer.tier == "high" else peer.tier)
             if (i + self._ticks) % OBSERVER_TICKS == 0:
                 self._tell(peer)
@@ -104,6 +105,12 @@ class QualityDesk:
     def leaders(self) -> list[PeerQuality]:
         """Whom the operator's tier is for."""
         return [peer for peer in self._peers if peer.drives] or [peer for peer in self._peers if peer.operator]
+
+    def _step_back(self, peer: PeerQuality, now: float) -> None:
+        """An operator becomes one who watches; where its path has shown no limit, on trial with everything."""
+        if not peer.path.limited:
+            peer.path.assume(self._needs(peer), now)
+        peer.tier = peer.choice.decide(peer.path, self._needs(peer), now)
 
     def _needs(self, peer: PeerQuality) -> float:
         return len(peer.cameras) * float(self._settings.video_bitrate_bps)

@@ -3,7 +3,7 @@ from hypothesis import strategies as st
 
 from server.media.pacer import BURST_BYTES, FREE_BPS, HEADROOM, Pacer
 
-PACKET = 1200
+PACKET = bytes(1200)
 
 
 def seconds_for(pacer: Pacer, packets: int) -> float:
@@ -26,12 +26,12 @@ def test_an_ordinary_picture_leaves_at_once() -> None:
 def test_a_keyframe_is_spread_at_a_multiple_of_the_rate() -> None:
     pacer = Pacer()
     pacer.limit(400_000)
-    spread = (50 * PACKET - BURST_BYTES) * 8 / (400_000 * HEADROOM)
+    spread = (50 * len(PACKET) - BURST_BYTES) * 8 / (400_000 * HEADROOM)
     assert 0.9 * spread < seconds_for(pacer, 50) < 1.1 * spread
 
 
 def test_without_a_limit_a_keyframe_takes_milliseconds() -> None:
-    assert 0 < seconds_for(Pacer(), 50) < 50 * PACKET * 8 / FREE_BPS
+    assert 0 < seconds_for(Pacer(), 50) < 50 * len(PACKET) * 8 / FREE_BPS
 
 
 @given(st.lists(st.tuples(st.floats(0, 0.1), st.integers(1, 1500)), max_size=200), st.floats(50_000, 1e7))
@@ -42,5 +42,5 @@ def test_no_more_leaves_than_the_rate_and_one_burst(packets: list[tuple[float, i
     pacer.admit([], now)
     for passed, size in packets:
         now += passed
-        sent += size * pacer.admit([size], now)
+        sent += size * pacer.admit([bytes(size)], now)
     assert sent <= BURST_BYTES + now * rate * HEADROOM / 8 + 1500

@@ -16,7 +16,7 @@ def history(frames: list[int], interval: float = 0.0) -> SentHistory:
     """A history of frames with these numbers of packets; each payload is the number of its packet."""
     result, first = SentHistory(), 0
     for i, size in enumerate(frames):
-        result.append(SentFrame(first, [b"%d" % (first + i) for i in range(size)], b"", 0, True), i * interval)
+        result.append(SentFrame(first, [b"%d" % (first + i) for i in range(size)], b"", 0, True, size, i * interval))
         first += size
     return result
 
@@ -54,15 +54,15 @@ def test_the_history_is_bounded_by_packets() -> None:
 
 def test_the_history_is_bounded_by_bytes() -> None:
     past = SentHistory()
-    past.append(SentFrame(0, [bytes(KEEP_BYTES)], b"", 0, True), 0.0)
+    past.append(SentFrame(0, [bytes(KEEP_BYTES)], b"", 0, True, KEEP_BYTES, 0.0))
     assert past.find(0, 0) is not None
-    past.append(SentFrame(1, [b"more"], b"", 0, True), 0.0)
+    past.append(SentFrame(1, [b"more"], b"", 0, True, 4, 0.0))
     assert past.find(0, 0) is None
 
 
 def test_a_number_that_was_used_again_means_the_newest_packet() -> None:
     past = SentHistory()
-    past.append(SentFrame(65536 * 3 + 5, [b"new"], b"", 0, True), 0.0)
+    past.append(SentFrame(65536 * 3 + 5, [b"new"], b"", 0, True, 3, 0.0))
     assert found(past, 5, 0) == b"new"
 
 
