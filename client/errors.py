@@ -26,7 +26,9 @@ __all__ = [
 ]
 
 ADVICE = {
-    "unauthorized": "use a link that the running console printed; links end with the console that printed them",
+    "unauthorized": "use a link of this console: one that it printed, or that `lockstep invite` made",
+    "link_expired": "ask for a new link",
+    "link_revoked": "ask whoever invited you",
     "not_allowed": "this link's role does not permit it; use the operator's link",
     "robot_unreachable": "start the robot bridge, or give the console its address",
     "too_many_peers": "close another connection first",

@@ -186,7 +186,7 @@ async def test_paced_by_media_every_event_is_seen(stack: Stack) -> None:
 
 
 async def test_a_wrong_token_is_refused_with_advice(stack: Stack) -> None:
-    with pytest.raises(SignallingRefused, match="use a link that the running console printed"):
+    with pytest.raises(SignallingRefused, match="use a link of this console"):
         async with Console(f"{stack.console}/#token=wrong"):
             pass
 

@@ -220,6 +220,29 @@ def test_an_event_voided_by_a_rest_is_used_up_by_a_neutral_command_first() -> No
     assert [outcome.ticket for outcome in pilot.outcomes()] == [ticket]
 
 
+def test_new_in_the_seat_the_first_command_is_neutral_and_the_intention_follows() -> None:
+    pilot = new_pilot()
+    pilot.seated()
+    ticket = pilot.intend(FAST, 0.0)
+    assert pilot.due(0.0) == [Command(event=2, issue=1, values=NEUTRAL)]
+    assert pilot.due(INITIAL) == [Command(event=2, issue=1, values=NEUTRAL)], "its repeat as well"
+    pilot.feedback(feedback(2), INITIAL)
+    assert pilot.outcomes() == [], "the neutral one was nobody's"
+    assert [(each.event, each.values) for each in commands(pilot.due(INITIAL))] == [(3, FAST)]
+    pilot.feedback(feedback(3), 0.3)
+    assert [each.ticket for each in pilot.outcomes()] == [ticket]
+
+
+def test_a_console_that_asks_for_a_neutral_command_first_gets_one() -> None:
+    pilot = new_pilot()
+    flying(pilot)
+    pilot.refusal(refusal(2, "not_neutral"))
+    assert pilot.armed
+    assert pilot.due(0.01) == [Command(event=2, issue=1, values=NEUTRAL)]
+    pilot.feedback(feedback(2), 0.02)
+    assert [(each.event, each.values) for each in commands(pilot.due(0.02))] == [(3, FAST)]
+
+
 def test_rest_leaves_at_once_past_the_shut_gate_and_names_the_event_in_flight() -> None:
     pilot = new_pilot()
     flying(pilot)

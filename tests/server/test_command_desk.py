@@ -62,6 +62,54 @@ def test_the_next_command_passes_once_and_its_repeat_is_absorbed() -> None:
     assert bench.desk.command("me", _command(9)) == Forward(_command(9))
 
 
+NEUTRAL = [0.0, 0.0]
+
+
+def test_a_new_holder_sends_a_neutral_command_before_a_moving_one() -> None:
+    bench = Bench()
+    bench.seat.take("next", "supervisor", 0.0)
+    assert _reason(bench.desk.command("next", _command(8))) == "not_neutral"
+    assert bench.desk.in_flight is None
+    assert bench.desk.command("next", _command(8, NEUTRAL)) == Forward(_command(8, NEUTRAL))
+    assert bench.desk.command("next", _command(8)) == Absorbed(), "a repeat with a newer intention under the same event"
+    bench.hear(_feedback(8))
+    assert bench.desk.command("next", _command(9)) == Forward(_command(9))
+    bench.seat.take("last", "supervisor", 0.0)
+    bench.seat.take("next", "supervisor", 0.0)
+    bench.hear(_feedback(9))
+    assert _reason(bench.desk.command("next", _command(10))) == "not_neutral", "also one who drove before"
+
+
+def test_a_neutral_command_that_is_refused_proves_nothing() -> None:
+    bench = Bench()
+    bench.seat.take("next", "supervisor", 0.0)
+    bench.desk.command("next", _command(20, NEUTRAL))
+    bench.desk.command("other", _command(8, NEUTRAL))
+    assert _reason(bench.desk.command("next", _command(8))) == "not_neutral"
+
+
+def test_what_the_last_holder_executed_is_not_taken_for_the_new_ones() -> None:
+    bench = Bench()
+    bench.desk.command("me", _command(8))
+    bench.seat.take("next", "supervisor", 0.0)
+    bench.desk.abandon()
+    assert _reason(bench.desk.command("next", _command(8, NEUTRAL))) == "out_of_order", "it is in flight still"
+    bench.hear(_feedback(8))
+    assert _reason(bench.desk.command("next", _command(8, NEUTRAL))) == "out_of_order", "it was the other's"
+    assert bench.desk.command("next", _command(9, NEUTRAL)) == Forward(_command(9, NEUTRAL))
+
+
+def test_a_repeat_after_the_link_was_lost_is_answered_if_it_was_executed() -> None:
+    bench = Bench()
+    bench.desk.command("me", _command(8))
+    bench.desk.link_down()
+    bench.desk.link_up(ROBOT)
+    bench.hear(_feedback(8))
+    assert bench.desk.command("me", _command(8)) == Answer(_feedback(8))
+    bench.desk.epoch_ends()
+    assert _reason(bench.desk.command("me", _command(8))) == "out_of_order", "references of another epoch"
+
+
 def test_values_are_clamped_to_the_limits() -> None:
     outcome = Bench().desk.command("me", _command(8, [-5.0, 5.0]))
     assert outcome == Forward(_command(8, [-1.0, 2.0]))

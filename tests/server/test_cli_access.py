@@ -1,0 +1,148 @@
+"""`lockstep invite`, `invitations`, `revoke` and `audit`, beside a running console and without one."""
+
+import asyncio
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from client import Console, ConsoleLost, SignallingRefused
+from server.access import Identity
+from server.audit import AuditRecord
+from server.audit_file import AuditFile
+from server.cli import app
+from server.settings import Settings
+from server.state import open_state
+from tests.support.stack import SECRET, running_stack
+
+LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
+PATIENCE = 30.0  # s
+
+
+def _lockstep(directory: Path, *arguments: str) -> Result:
+    """The command in this process, with a state directory of its own."""
+    environment = {"LOCKSTEP_STATE_DIR": str(directory), "LOCKSTEP_SECRET": SECRET, "LOCKSTEP_PUBLIC_URL": ""}
+    return CliRunner().invoke(app, arguments, env=environment)
+
+
+def _identity(directory: Path, link: str) -> Identity:
+    settings = Settings(state_dir=directory, secret=SECRET)  # type: ignore[arg-type]
+    return open_state(settings).access.verify(link.strip().partition("#token=")[2])
+
+
+async def test_a_link_opens_the_running_console_until_it_is_revoked(tmp_path: Path) -> None:
+    async with running_stack(tmp_path) as stack:
+        state = tmp_path / "state"
+        made = await asyncio.to_thread(
+            _lockstep, state, "invite", "--role", "observer", "--expires", "1h", "--name", "Ada"
+        )
+        link = made.stdout.strip()
+        assert link.startswith(f"{stack.console}/#token="), made.output
+        async with Console(link, video=False, audio=False, name="") as console:
+            async with asyncio.timeout(PATIENCE):
+                async for _ in console.feedbacks():
+                    if console.participants:
+                        break
+            assert [(each.name, each.role) for each in console.participants] == [("Ada", "observer")]
+            revoked = await asyncio.to_thread(_lockstep, state, "revoke", _identity(state, link).token_id)
+            assert "Ada" in revoked.stdout, revoked.output
+            with pytest.raises(ConsoleLost):
+                await asyncio.wait_for(_until_lost(console), PATIENCE)
+        with pytest.raises(SignallingRefused, match="link_revoked"):
+            async with Console(link, video=False, audio=False):
+                pass
+        listed = await asyncio.to_thread(_lockstep, state, "invitations")
+        assert "revoked" in listed.stdout
+        assert listed.stdout.count("at start") == 3
+        follower = await asyncio.create_subprocess_exec(
+            *(LOCKSTEP, "audit", "--follow", "--json"),
+            stdout=asyncio.subprocess.PIPE,
+            env=os.environ | {"LOCKSTEP_STATE_DIR": str(state)},
+        )
+        try:
+            async with asyncio.timeout(PATIENCE), Console(stack.observer, video=False, audio=False) as console:
+                await console.stop("seen by the one who follows")
+                assert follower.stdout is not None
+                found = [json.loads(line) async for line in _until_stop(follower.stdout)]
+        finally:
+            follower.terminate()
+            await follower.wait()
+    kinds = [record["kind"] for record in found]
+    assert kinds[0] == "start"
+    assert kinds[-1] == "stop"
+    assert {"joined", "left", "invitation", "revocation"} <= set(kinds)
+    assert [record["n"] for record in found] == list(range(1, len(found) + 1))
+
+
+async def _until_lost(console: Console) -> None:
+    async for _ in console.feedbacks():
+        pass
+
+
+async def _until_stop(lines: asyncio.StreamReader):  # type: ignore[no-untyped-def]
+    async for line in lines:
+        yield line
+        if b'"kind":"stop"' in line:
+            return
+
+
+def test_without_a_console_the_settings_say_where_it_will_be(tmp_path: Path) -> None:
+    made = _lockstep(tmp_path, "invite", "--role", "supervisor", "--expires", "30m", "--json")
+    answer = json.loads(made.stdout)
+    assert answer["link"].startswith("http://127.0.0.1:8000/#token=")
+    assert (answer["role"], answer["good"], answer["revoked"]) == ("supervisor", True, False)
+    assert _identity(tmp_path, answer["link"]).token_id == answer["id"]
+    elsewhere = _lockstep(tmp_path, "invite", "--url", "https://robot.example/")
+    assert elsewhere.stdout.startswith("https://robot.example/#token=")
+    listed = json.loads(_lockstep(tmp_path, "invitations", "--json").stdout)
+    assert {each["role"] for each in listed} == {"supervisor", "observer"}
+    assert all("link" not in each for each in listed)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("invite", "--role", "admin"), "observer, operator or supervisor"),
+        (("invite", "--expires", "soon"), "not a time"),
+        (("invite", "--expires", "1s"), "good for 60"),
+        (("revoke", "nothing"), "no such invitation"),
+        (("audit",), "no audit log"),
+    ],
+)
+def test_what_cannot_work_is_said_in_one_line(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
+    result = _lockstep(tmp_path, *arguments)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert words in result.stderr
+
+
+def test_a_state_directory_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    result = _lockstep(tmp_path / "file", "invite")
+    assert result.exit_code == 2
+    assert "LOCKSTEP_STATE_DIR" in result.stderr
+
+
+def test_revoking_twice_is_no_error(tmp_path: Path) -> None:
+    made = json.loads(_lockstep(tmp_path, "invite", "--json").stdout)
+    assert made["id"] in _lockstep(tmp_path, "revoke", made["id"]).stdout
+    again = _lockstep(tmp_path, "revoke", made["id"])
+    assert (again.exit_code, again.stdout) == (0, "")
+
+
+def test_the_audit_is_shown_for_people_and_from_a_number_on(tmp_path: Path) -> None:
+    file = AuditFile(tmp_path / "audit.jsonl", 10_000, 2)
+    records = [
+        AuditRecord(n=1, time=0.0, kind="joined", who="Ada", role="operator"),
+        AuditRecord(n=2, time=0.0, kind="refusal", who="Ada", role="operator", event=7, what="late", count=3),
+    ]
+    file.write(records)
+    file.close()
+    shown = _lockstep(tmp_path, "audit").stdout.splitlines()
+    assert len(shown) == 2
+    for part in ("s=7", "refusal", "Ada (operator)", "late", "x3"):
+        assert part in shown[1]
+    assert len(_lockstep(tmp_path, "audit", "--after", "1").stdout.splitlines()) == 1
+    assert json.loads(_lockstep(tmp_path, "audit", "--after", "1", "--json").stdout)["n"] == 2
