@@ -7,10 +7,16 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import LEFT_Y, RB, open_console
+from bench.browsers.console_page import LEFT_Y, RB, ConsolePage, open_console
 from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+
+
+async def _nothing_wrong(console: ConsolePage) -> None:
+    """Still the same page, and nothing was rendered against the rule."""
+    assert await console.page.evaluate("window.notReloaded")
+    assert all(stream["violations"] == 0 for stream in (await console.stats())["streams"].values())
 
 
 async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch(
@@ -22,6 +28,7 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
         await console.drive_forward()
         await console.until("s.event > 10")
         epoch = (await console.stats())["epoch"]
+        await console.page.evaluate("window.notReloaded = true")
         os.kill(stack.bridge_pid(), signal.SIGKILL)
         await console.until("!s.armed")
         await console.press(RB, False)
@@ -30,6 +37,7 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
         assert (await console.stats())["event"] < 10, "references start anew with the epoch"
         await console.arm()
         await console.drive_forward()
+        await _nothing_wrong(console)
 
 
 async def test_a_frozen_bridge_counts_as_a_dead_link_and_resumes_in_the_same_epoch(
@@ -60,9 +68,9 @@ async def test_a_restarted_console_is_found_again_without_a_reload(tmp_path: Pat
         await console.page.evaluate("window.notReloaded = true")
         async with running_stack(tmp_path, port=port):
             await console.until_live()
-            assert await console.page.evaluate("window.notReloaded")
             await console.arm()
             await console.drive_forward()
+            await _nothing_wrong(console)
             await console.press(RB, False)
     finally:
         await page.__aexit__(None, None, None)

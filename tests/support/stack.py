@@ -15,7 +15,6 @@ __all__ = ["Stack", "running_stack"]
 
 START_SECONDS = 40.0  # a loaded two-core machine importing everything and opening GL
 STOP_SECONDS = 15.0
-SECRET = "only for tests, only on loopback, 32 bytes or more"
 
 
 @dataclass
@@ -88,12 +87,8 @@ async def running_stack(
         *(str(Path(sys.executable).with_name("lockstep")), "up", "--json", "--robot", robot),
         *("--port", str(port), "--robot-port", "0", "--event-log", str(event_log), *extra),
     ]
-    # One secret for all runs of a test, so that a page's token outlives a restart of the console.
-    environment = os.environ | {
-        "PYTHONWARNINGS": "default",
-        "LOCKSTEP_SECRET": SECRET,
-        "LOCKSTEP_STATE_DIR": str(directory / "state"),
-    }
+    # One state directory for all runs of a test: the key in it lets a page's token outlive a restart of the console.
+    environment = os.environ | {"PYTHONWARNINGS": "default", "LOCKSTEP_STATE_DIR": str(directory / "state")}
     process = await asyncio.create_subprocess_exec(
         *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, env=environment
     )

@@ -1,14 +1,16 @@
 import type { TimeChart } from "./time_chart";
 
 const MARGIN = 24;
-const HEAD = 44;
+const HEAD = 36; // the title
+const KEYS = 56; // a chart's name and keys
+const GAP = 20;
 const FONT = "Inter, system-ui, sans-serif";
 
 /** One picture of all charts with their names, line samples and figures; at the resolution of the screen. */
 export async function chartPicture(charts: readonly TimeChart[], title: string): Promise<Blob> {
   const scale = devicePixelRatio;
   const widest = Math.max(...charts.map((chart) => chart.canvas.width));
-  const heights = charts.map((chart) => chart.canvas.height + 2 * HEAD * scale);
+  const heights = charts.map((chart) => chart.canvas.height + (KEYS + GAP) * scale);
   const canvas = document.createElement("canvas");
   canvas.width = widest + 2 * MARGIN * scale;
   canvas.height = heights.reduce((sum, height) => sum + height, 0) + (HEAD + 2 * MARGIN) * scale;
@@ -44,7 +46,7 @@ function drawChart(drawing: CanvasRenderingContext2D, chart: TimeChart, top: num
     across += 44 * scale;
     across += write(drawing, line.label, across, top + 43 * scale, `${14 * scale}px ${FONT}`) + 24 * scale;
   }
-  drawing.drawImage(chart.canvas, left, top + 56 * scale);
+  drawing.drawImage(chart.canvas, left, top + KEYS * scale);
 }
 
 /** Returns how wide it is. */

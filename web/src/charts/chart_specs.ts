@@ -55,7 +55,7 @@ export function chartSpecs(streams: readonly ChartStream[]): ChartSpec[] {
     {
       name: "gap",
       title: "Gap",
-      unit: "events",
+      unit: "events · shaded: tolerance",
       digits: 0,
       fromZero: true,
       lines: streamLines(streams, "gap"),

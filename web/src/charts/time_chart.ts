@@ -145,7 +145,7 @@ function valueAxis(whole: boolean): uPlot.Axis {
     grid: GRID,
     ticks: TICKS,
     size: 62,
-    space: 26,
+    space: 20,
     values: (_plot, splits) =>
       splits.map((value) => value.toLocaleString("en", { maximumFractionDigits: 2 })),
   };
