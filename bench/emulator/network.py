@@ -9,6 +9,8 @@ from types import TracebackType
 from typing import Self
 from urllib.parse import urlsplit
 
+from aioice.ice import get_host_addresses
+
 from bench.emulator.client_paths import signalling_paths
 from bench.emulator.deliveries import Deliveries
 from bench.emulator.http_proxy import ConsoleProxy
@@ -18,7 +20,6 @@ from bench.emulator.profile import Profile, load_profile
 from bench.emulator.sessions import Sessions
 from bench.emulator.tcp_relay import TcpRelay
 from bench.emulator.udp_relay import LOOPBACK, UdpRelay
-from server.media.aiortc_private import own_addresses
 from server.serve import bind, running
 
 __all__ = ["Network"]
@@ -144,7 +145,7 @@ class Network:
 
 
 def _own_hosts() -> list[str]:
-    own = [each for each in own_addresses() if ":" not in each]
+    own = get_host_addresses(use_ipv4=True, use_ipv6=False)
     return [LOOPBACK, *(each for each in own if each != LOOPBACK and _ours(each))]
 
 

@@ -40,7 +40,6 @@ OFFER, ANSWER = "client", "console"
 
 async def measure(clients: int, seconds: float) -> dict[str, Any]:
     """What packets took besides the path's delay, in ms; the same without a relay; the relay's share of a core."""
-    preferred = prefer_this_process()
     command = [sys.executable, "-m", "bench.emulator.own_delay", "--clients", str(clients), "--seconds", str(seconds)]
     async with running_process(*command, "--ends") as (ends, _):
         direct = await ends.ask("[]", seconds + PATIENCE)
@@ -58,7 +57,6 @@ async def measure(clients: int, seconds: float) -> dict[str, Any]:
         "late_ms": _spread([each - DELAY * 1000 for each in relayed["took"]]),
         "direct_ms": _spread(direct["took"]),
         "relay_core_percent": round(100 * core, 1),
-        "preferred": preferred,
     }
 
 
@@ -151,13 +149,14 @@ async def _be_the_ends(clients: int, seconds: float) -> None:
 
 def _main(
     clients: Annotated[int, typer.Option(min=1, max=200)] = 3,
-    seconds: Annotated[float, typer.Option(min=1, max=600)] = 10,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600)] = 10,
     ends: Annotated[bool, typer.Option("--ends", hidden=True)] = False,
 ) -> None:
     if ends:
         uvloop.run(_be_the_ends(clients, seconds))
         return
-    print(json.dumps(uvloop.run(measure(clients, seconds))))
+    preferred = prefer_this_process()
+    print(json.dumps(uvloop.run(measure(clients, seconds)) | {"preferred": preferred}))
 
 
 if __name__ == "__main__":

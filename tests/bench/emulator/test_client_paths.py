@@ -1,0 +1,75 @@
+from bench.emulator.client_paths import ClientPaths, signalling_paths
+from bench.emulator.network_statistics import collect
+from bench.emulator.outages import Outages
+from bench.emulator.packets import Kind
+from bench.emulator.profile import Profile, load_profile
+
+BURSTY, NARROW = load_profile("bursty-loss"), load_profile("narrow-uplink")
+
+
+def client(seed: str, profile: Profile = BURSTY) -> ClientPaths:
+    return ClientPaths(profile, seed, Outages())
+
+
+def fates(paths: ClientPaths, kind: Kind, count: int = 300) -> list[bool]:
+    return [paths.admit(kind, "to_robot", number * 0.01, 100) is None for number in range(count)]
+
+
+def test_a_seed_repeats_and_clients_and_kinds_and_directions_differ() -> None:
+    assert fates(client("1 client 1"), "control") == fates(client("1 client 1"), "control")
+    assert fates(client("1 client 1"), "control") != fates(client("1 client 2"), "control")
+    assert fates(client("1 client 1"), "control") != fates(client("1 client 1"), "media")
+    back = client("1 client 1")
+    assert fates(back, "control") != [back.admit("control", "to_operator", 9 + n, 100) is None for n in range(300)]
+
+
+def test_how_many_checks_ice_makes_does_not_change_what_happens_to_commands() -> None:
+    checked = client("1 client 1")
+    fates(checked, "stun", 77)
+    assert fates(checked, "control") == fates(client("1 client 1"), "control")
+
+
+def test_media_and_control_share_the_bottleneck_of_their_direction() -> None:
+    paths = client("1", NARROW)
+    for _ in range(10):
+        paths.admit("media", "to_operator", 0.0, 1172)
+    arrives = paths.admit("control", "to_operator", 0.0, 100)
+    assert arrives is not None
+    assert arrives > 10 * 1200 * 8 / 512_000
+    other = paths.admit("control", "to_robot", 0.0, 100)
+    assert other is not None
+    assert other < 0.03
+
+
+def test_the_first_packet_starts_the_schedule_of_outages_and_later_ones_do_not() -> None:
+    outages = Outages(load_profile("wifi-handover").client_outages)
+    paths = ClientPaths(load_profile("wifi-handover"), "1", outages)
+    paths.admit("stun", "to_robot", 100.0, 100)
+    paths.admit("stun", "to_robot", 101.0, 100)
+    assert outages.at(108.5) is not None
+    assert paths.admit("control", "to_robot", 108.5, 100) is None
+
+
+def test_http_never_loses_anything_and_waits_at_its_own_bottleneck() -> None:
+    paths = signalling_paths(NARROW, "1", Outages())
+    assert paths["to_operator"].admit(0.0, 64_000) > 1.0
+    assert paths["to_operator"].admit(0.0, 64_000) > 2.0
+    assert paths["to_robot"].admit(0.0, 100) < 0.03
+
+
+def test_statistics_of_all_clients_add_up() -> None:
+    clients = [client("1", NARROW), client("2", NARROW)]
+    for number, each in enumerate(clients):
+        for _ in range(100 * (number + 1)):
+            each.admit("media", "to_operator", 0.0, 972)
+    found = collect(clients, {}, {}, 0.0)
+    assert found.clients == 2
+    assert found.paths["media"]["to_operator"].offered == 300
+    queue = found.queues["to_operator"]
+    assert queue.passed + queue.dropped == 300
+    assert queue.dropped == found.paths["media"]["to_operator"].queue_dropped > 0
+    assert 0 < queue.mean < queue.longest <= 1.0
+    assert queue.now > 0.9
+    fields = found.fields()
+    assert isinstance(fields["paths"], dict)
+    assert fields["paths"]["media"]["to_operator"]["mean_delay"] > 0
