@@ -103,7 +103,7 @@ class Peer:
         self.ice = ice
         self.identity = identity
         self.wanted_name = clean_name(identity.name, identity.role)
-        self.name = self.wanted_name  # what others see; `Peers` keeps it unique
+        self.name = ""  # what others see; `Peers` gives it
         self.report = Report()  # newest
         self._quality: Quality | None = None  # newest
         self.ended = ""  # why; "" while it lives

@@ -13,7 +13,7 @@ from server.access import Identity
 from server.channels import ChannelName
 from server.errors import NotFound, ShuttingDown, TooManyPeers, TooManyRequests
 from server.metrics import Metrics
-from server.names import unique_name
+from server.names import unique_names
 from server.peer import Peer
 
 __all__ = ["Peers"]
@@ -60,15 +60,10 @@ class Peers:
         return [peer for peer in self._sessions if peer.role == "observer"]
 
     def settle_names(self) -> list[Peer]:
-        """Give everyone the name they asked for, or that with a number; those who came first keep theirs.
-
-        Returns those whose name changed.
-        """
-        taken: list[str] = []
+        """Give everyone the name they asked for, or that with a number; those whose name changed."""
+        names = unique_names([(peer.wanted_name, peer.name) for peer in self._sessions])
         changed = []
-        for peer in self._sessions:
-            name = unique_name(peer.wanted_name, taken)
-            taken.append(name)
+        for peer, name in zip(self._sessions, names, strict=True):
             if peer.name != name:
                 peer.name = name
                 changed.append(peer)

@@ -16,7 +16,7 @@ from server.audit_file import AuditFile
 from server.cli import app
 from server.settings import Settings
 from server.state import open_state
-from tests.support.stack import SECRET, running_stack
+from tests.support.stack import running_stack
 
 LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
 PATIENCE = 30.0  # s
@@ -24,13 +24,12 @@ PATIENCE = 30.0  # s
 
 def _lockstep(directory: Path, *arguments: str) -> Result:
     """The command in this process, with a state directory of its own."""
-    environment = {"LOCKSTEP_STATE_DIR": str(directory), "LOCKSTEP_SECRET": SECRET, "LOCKSTEP_PUBLIC_URL": ""}
+    environment = {"LOCKSTEP_STATE_DIR": str(directory), "LOCKSTEP_PUBLIC_URL": ""}
     return CliRunner().invoke(app, arguments, env=environment)
 
 
 def _identity(directory: Path, link: str) -> Identity:
-    settings = Settings(state_dir=directory, secret=SECRET)  # type: ignore[arg-type]
-    return open_state(settings).access.verify(link.strip().partition("#token=")[2])
+    return open_state(Settings(state_dir=directory)).access.verify(link.strip().partition("#token=")[2])
 
 
 async def test_a_link_opens_the_running_console_until_it_is_revoked(tmp_path: Path) -> None:

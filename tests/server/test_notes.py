@@ -1,8 +1,10 @@
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from robot_bridge.protocol.console import SharedNote
 from server.audit import AuditRecord
-from server.names import MAX_NAME, clean_name, printable, unique_name
+from server.names import MAX_NAME, clean_name, printable, unique_names
 from server.notes import BOARD_BURST, BURST, KEPT, PEER_RATE, NoteBoard
 from server.token_bucket import TokenBucket
 
@@ -85,10 +87,28 @@ def test_names_are_bounded_and_can_be_printed(wanted: str, shown: str) -> None:
 
 
 def test_nobody_has_the_name_of_another() -> None:
-    assert unique_name("Ada", []) == "Ada"
-    assert unique_name("Ada", ["Grace"]) == "Ada"
-    assert unique_name("Ada", ["ada"]) == "Ada 2"
-    assert unique_name("Ada", ["Ada", "Ada 2", "ADA 3"]) == "Ada 4"
+    wanted = ["Ada 3", "Ada", "Grace", "ada", "Ada", "ADA", "Ada 2"]
+    names = unique_names([(each, "") for each in wanted])
+    assert names == ["Ada 3", "Ada", "Grace", "ada 2", "Ada 4", "ADA 5", "Ada 2 2"]
+    assert unique_names(list(zip(wanted, names, strict=True))) == names, "and keeps it"
+
+
+def test_nobody_takes_a_name_from_who_has_it() -> None:
+    assert unique_names([("Ada", "Grace"), ("Ada", "Ada")]) == ["Ada 2", "Ada"]
+    assert unique_names([("Ada", "Grace"), ("Ada", "Ada 2")]) == ["Ada 2", "Ada"]
+
+
+def test_who_leaves_makes_room_for_one_and_the_others_keep_their_numbers() -> None:
+    crowd = [("Ada", "Ada 2"), ("Ada", "Ada 3"), ("Ada", "Ada 4"), ("Ada", "")]
+    assert unique_names(crowd) == ["Ada", "Ada 3", "Ada 4", "Ada 2"]
+
+
+@given(st.lists(st.tuples(st.sampled_from(["Ada", "ada", "Ada 2", "B"]), st.sampled_from(["", "Ada", "Ada 2", "B"]))))
+def test_no_two_are_ever_called_the_same(people: list[tuple[str, str]]) -> None:
+    names = unique_names(people)
+    assert len({name.casefold() for name in names}) == len(people)
+    for name, (wanted, _) in zip(names, people, strict=True):
+        assert name == wanted or name.rpartition(" ")[0].casefold() == wanted.casefold()
 
 
 def test_a_bucket_gives_a_burst_and_then_its_rate() -> None:
