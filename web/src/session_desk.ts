@@ -16,7 +16,7 @@ export class SessionDesk {
     private name: string | null, // wanted; null: the link's own
     private readonly tell: (message: ClientMessage) => boolean,
   ) {
-    this.name = sessionStorage.getItem(NAME_KEY) ?? name;
+    this.name = storedName() ?? name;
   }
 
   /** An operator's page takes the seat if nobody has it, and disturbs nobody otherwise. */
@@ -74,7 +74,7 @@ export class SessionDesk {
     const name = wanted.trim().slice(0, NAME_LIMIT);
     if (name === "") return;
     this.name = name;
-    sessionStorage.setItem(NAME_KEY, name);
+    storeName(name);
     this.tell({ type: "rename", name });
   }
 
@@ -82,5 +82,22 @@ export class SessionDesk {
   writeNote(text: string): boolean {
     const note = text.trim().slice(0, NOTE_LIMIT);
     return note !== "" && this.tell({ type: "note", text: note });
+  }
+}
+
+/** A browser may refuse storage; the name then lasts as long as the page. */
+function storedName(): string | null {
+  try {
+    return sessionStorage.getItem(NAME_KEY);
+  } catch {
+    return null;
+  }
+}
+
+function storeName(name: string): void {
+  try {
+    sessionStorage.setItem(NAME_KEY, name);
+  } catch {
+    return;
   }
 }

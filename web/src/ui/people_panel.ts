@@ -1,8 +1,9 @@
-import { crowdWords, personWords, sortPeople, summarise, type People } from "../core/people";
 import { mayDrive } from "../core/console_state";
+import { crowdWords, sortPeople, summarise } from "../core/people";
 import type { ConsoleApp } from "../console_app";
 import type { Participant } from "../wire";
 import { button, h, setHidden, setText, type Panel } from "./dom";
+import { createPersonRow, type PersonRow } from "./person_row";
 import { createRenameForm } from "./rename_form";
 
 /** So few observers are shown without being asked for. */
@@ -16,78 +17,61 @@ export interface PeopleTools {
 
 /** Who is here, and how each of them does. */
 export function createPeoplePanel(app: ConsoleApp, tools: PeopleTools): Panel {
-  const leading = h("ul", "people");
-  const crowd = h("span", "crowd-words");
-  const watching = h("ul", "people");
-  const toggle = button("quiet-button", "Show all", () => {
-    open = !open;
-    shown = "";
-  });
-  const crowdHead = h("div", "crowd", {}, crowd, toggle);
-  const empty = h("p", "muted", {}, "Nobody is connected");
-  const rename = createRenameForm(app);
   const invite = button("field-button", "Invite…", () => tools.invite());
   const audit = button("field-button quiet", "Audit trail…", () => tools.audit());
   const toolRow = h("div", "people-tools", {}, invite, audit);
-  let open = false;
-  let shown = "";
+  const empty = h("p", "muted", {}, "Nobody is connected");
+  const leading = h("ul", "people");
+  const rename = createRenameForm(app);
+  const crowd = h("span", "crowd-words");
+  const toggle = button("quiet-button", "Show all", () => (showsAll = !showsAll));
+  const crowdHead = h("div", "crowd", {}, crowd, toggle);
+  const watching = h("ul", "people");
+  const rows = new Map<string, PersonRow>();
+  let showsAll = false;
+  let shown: readonly unknown[] = []; // what the lists were last made from
+  const element = h("section", "people-panel", { "aria-label": "People" });
+  element.append(toolRow, empty, leading, rename, crowdHead, watching);
+
   return {
-    element: h(
-      "section",
-      "people-panel",
-      { "aria-label": "People" },
-      toolRow,
-      empty,
-      leading,
-      rename,
-      crowdHead,
-      watching,
-    ),
+    element,
     update() {
       const { participants, seat, welcome } = app.state;
+      const made = [participants, seat, welcome, showsAll];
+      if (made.every((each, at) => each === shown[at])) return;
+      shown = made;
+      const people = sortPeople(participants, seat, welcome?.peer ?? null);
+      const crowded = people.watching.length > FEW;
       setHidden(toolRow, !mayDrive(app.state));
       setHidden(audit, welcome?.role !== "supervisor");
-      const key = JSON.stringify([
-        participants,
-        seat?.holder,
-        seat?.claims.map((claim) => claim.peer),
-        welcome?.peer,
-      ]);
-      if (key === shown) return;
-      shown = key;
-      const people = sortPeople(participants, seat, welcome?.peer ?? null);
       setHidden(empty, participants.length > 0);
       setHidden(rename, welcome === null);
-      leading.replaceChildren(...people.leading.map((person) => personLine(app, person)));
-      showCrowd(people);
+      setHidden(crowdHead, people.watching.length === 0);
+      setText(crowd, crowdWords(summarise(people.watching)));
+      setHidden(toggle, !crowded);
+      setText(toggle, showsAll ? "Show few" : "Show all");
+      forget(new Set(participants.map((person) => person.peer)));
+      place(leading, people.leading);
+      place(watching, showsAll ? people.watching : people.watching.slice(0, FEW));
     },
   };
 
-  function showCrowd({ watching: crowded }: People): void {
-    const all = open || crowded.length <= FEW;
-    setHidden(crowdHead, crowded.length === 0);
-    setText(crowd, crowdWords(summarise(crowded)));
-    setHidden(toggle, crowded.length <= FEW);
-    setText(toggle, open ? "Show few" : "Show all");
-    const rows = all ? crowded : crowded.slice(0, FEW);
-    watching.replaceChildren(...rows.map((person) => personLine(app, person)));
+  function place(list: HTMLElement, people: readonly Participant[]): void {
+    const { seat, welcome } = app.state;
+    const claims = new Set(seat?.claims.map((claim) => claim.peer));
+    const elements = people.map((person) => {
+      const row = rows.get(person.peer) ?? createPersonRow();
+      rows.set(person.peer, row);
+      const drives = person.peer === seat?.holder;
+      row.show(person, { isMe: person.peer === welcome?.peer, drives, asks: claims.has(person.peer) });
+      return row.element;
+    });
+    const isSame =
+      elements.length === list.children.length && elements.every((each, at) => each === list.children[at]);
+    if (!isSame) list.replaceChildren(...elements);
   }
-}
 
-function personLine(app: ConsoleApp, person: Participant): HTMLElement {
-  const { seat, welcome } = app.state;
-  const name = h("span", "person-name", {}, person.name);
-  const line = h("span", "person-line", {}, name);
-  if (person.peer === welcome?.peer) line.append(h("span", "person-tag you", {}, "you"));
-  if (person.peer === seat?.holder) line.append(h("span", "person-tag drives", {}, "drives"));
-  else if (seat?.claims.some((claim) => claim.peer === person.peer) === true)
-    line.append(h("span", "person-tag asks", {}, "asks for control"));
-  return h(
-    "li",
-    "person",
-    {},
-    line,
-    h("span", "person-role", {}, person.role),
-    h("span", "person-figures", {}, personWords(person)),
-  );
+  function forget(present: ReadonlySet<string>): void {
+    for (const peer of rows.keys()) if (!present.has(peer)) rows.delete(peer);
+  }
 }

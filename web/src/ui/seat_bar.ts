@@ -17,7 +17,8 @@ export function createSeatBar(app: ConsoleApp): Panel {
   const keep = seatButton("Keep control", "", () => app.session.keepSeat());
   const action = seatButton("", "", () => act(app));
   action.classList.add("seat-action");
-  const words = h("div", "seat-words", { role: "status" }, title, text);
+  const words = h("div", "seat-words", {}, title, text);
+  const spoken = h("span", "unseen", { role: "status" }); // without the seconds, which would be read out all the time
   const buttons = h("div", "seat-buttons", {}, keep, grant, decline, why, action);
   const element = h(
     "section",
@@ -26,6 +27,7 @@ export function createSeatBar(app: ConsoleApp): Panel {
     h("span", "seat-lamp"),
     words,
     buttons,
+    spoken,
   );
   let told: SeatNews | null = null;
   let toldMs = -Infinity;
@@ -53,6 +55,7 @@ export function createSeatBar(app: ConsoleApp): Panel {
       setData(element, "tone", found.tone);
       setText(title, found.title);
       setText(text, found.text);
+      setText(spoken, found.tone === "asked" || found.tone === "idle" ? found.title : (told?.words ?? ""));
       setHidden(grant, found.tone !== "asked");
       setHidden(decline, found.tone !== "asked");
       setHidden(keep, found.tone !== "idle");
