@@ -17,7 +17,7 @@ from robot_bridge.link_tls import LinkTls
 from robot_bridge.protocol.errors import LinkError, LinkLost, LinkRefused, SecretError
 from robot_bridge.protocol.framing import frame
 from robot_bridge.protocol.link_secret import LinkSecret
-from robot_bridge.protocol.messages import Feedback, Goodbye, Media, Stop, encode_message
+from robot_bridge.protocol.messages import Feedback, Goodbye, Hello, Media, Ping, Stop, encode_message
 from robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import PATIENCE, Operator, RecordingRobot, raw_link
 from tests.support.certificates import Authority
@@ -145,6 +145,25 @@ async def test_pictures_arrive_whole_over_tls(authority: Authority) -> None:
                     break
 
 
+async def test_a_media_link_over_tls_that_does_not_read_is_dropped_and_disturbs_nobody(authority: Authority) -> None:
+    trust = LinkTls(authority=authority.certificate)
+    tls = LinkTls(certificate=authority.issue("bridge"))
+    async with bridge_with(None, tls, media=True) as bridge, link_to(bridge, None, trust) as link:
+        _, writer = await asyncio.open_connection(*bridge.address, ssl=trust.client_context(), limit=1024)
+        try:
+            writer.write(frame(encode_message(Hello(role="media"))))
+            await happens(lambda: bridge.links == 2)
+            async with asyncio.timeout(PATIENCE):
+                while bridge.links == 2:
+                    writer.write(frame(encode_message(Ping(id=1))))  # it lives, but takes nothing
+                    await asyncio.sleep(0.1)
+            assert bridge.counters.endings == {"lost": 1}
+            assert sum(bridge.drops.values()) > 0
+            await drives(link)
+        finally:
+            writer.transport.abort()
+
+
 async def test_with_client_certificates_who_has_one_drives_and_who_has_none_does_not(authority: Authority) -> None:
     tls = LinkTls(certificate=authority.issue("bridge"), authority=authority.certificate)
     known = LinkTls(certificate=authority.issue("console"), authority=authority.certificate)
@@ -193,6 +212,7 @@ def test_it_all_holds_on_the_event_loop_that_the_bridge_runs_on(authority: Autho
         await test_with_client_certificates_who_has_one_drives_and_who_has_none_does_not(authority)
         await test_what_is_not_tls_is_counted_and_keeps_nobody_out(authority)
         await test_pictures_arrive_whole_over_tls(authority)
+        await test_a_media_link_over_tls_that_does_not_read_is_dropped_and_disturbs_nobody(authority)
         await test_strangers_that_say_nothing_keep_nobody_out()
 
     uvloop.run(scenario())
