@@ -80,7 +80,7 @@ def experiment_command(
         adapts=quality,
         watchers=not browser if watchers is None else watchers,
     )
-    session = _Session()
+    session = _Session(report)
     if profile == "outage":
         session.outage(replace(choices, seconds=seconds or OUTAGE_SECONDS))
     elif profile == "growth":
@@ -92,14 +92,18 @@ def experiment_command(
         session.outage(replace(choices, seconds=OUTAGE_SECONDS))
     else:
         session.drive(choices)
-    session.publish(json_to, report)
+    session.publish(json_to)
 
 
 class _Session:
-    """Runs one thing after the other; one that fails does not keep the others from being run."""
+    """Runs one thing after the other; one that fails does not keep the others from being run.
 
-    def __init__(self) -> None:
+    What was found is written down after each, so that an end before the last loses nothing but the page.
+    """
+
+    def __init__(self, folder: Path | None) -> None:
         self._findings = Findings(machine=machine_facts())
+        self._folder = folder
 
     def drive(self, choices: Choices) -> None:
         profile, choices = _fitted(choices)
@@ -107,15 +111,23 @@ class _Session:
         if run is not None:
             result = result_of(choices, media_of(profile, choices.adapts), run, round_trip_of(profile))
             self._findings.cells.append(Cell(choices, profile, result, run))
+            self._keep()
 
     def grow(self, choices: Choices) -> None:
         profile, choices = _fitted(replace(choices, profile=GROWTH_PROFILE))
         self._findings.growth = self._run("growth", run_growth(choices, profile, _say))
+        self._keep()
 
     def outage(self, choices: Choices) -> None:
         found = self._run("outage", run_outages(choices, _say))
         if found is not None:
             self._findings.outages.append(found)
+            self._keep()
+
+    def _keep(self) -> None:
+        if self._folder is not None:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            _write(self._findings.results(), str(self._folder / "results.json"))
 
     def _run(self, name: str, work: Coroutine[Any, Any, Found]) -> Found | None:
         try:
@@ -126,18 +138,17 @@ class _Session:
         self._findings.failed.append(why)
         return None
 
-    def publish(self, json_to: str, folder: Path | None) -> None:
+    def publish(self, json_to: str) -> None:
         findings = self._findings
         results = findings.results()
         text = render_table(cell.result for cell in findings.cells)
         if findings.cells:
             print(text, file=sys.stderr if json_to == "-" else sys.stdout)
         _write(results[0] if len(results) == 1 else results, json_to)
-        if folder is not None:
+        if self._folder is not None:
             from bench.experiment.report import write_report  # needs matplotlib, which only the tests install
 
-            _say(f"the report is {write_report(findings, folder)}")
-            _write(results, str(folder / "results.json"))
+            _say(f"the report is {write_report(findings, self._folder)}")
         if findings.failed:
             raise typer.Exit(EXIT_FAILED)
         if findings.broken:
