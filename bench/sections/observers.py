@@ -121,7 +121,7 @@ async def _count(stack: Stack, audiences: list[Running]) -> Counts:
         metrics, received = await asyncio.gather(stack.metrics(), _settled(audiences))
     finally:
         stack.bridge.process.go_on()
-    encoded = metrics.values("lockstep_media_frames_encoded_total", "stream", codec="VP8")
+    encoded = metrics.values("lockstep_media_pictures_taken_total", "stream")  # each once, for however many tiers
     dropped = metrics.values("lockstep_media_frames_dropped_total", "stream", stage="peer_busy")
     return Counts({camera: int(count) for camera, count in encoded.items()}, sum(dropped.values()), received)
 

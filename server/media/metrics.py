@@ -19,6 +19,7 @@ class MediaMetrics:
             return Counter(f"lockstep_media_{name}", text, labels, registry=registry)
 
         self.frames_in = counter("frames_in", "Pictures and sound segments from the robot", "stream")
+        self.taken = counter("pictures_taken", "Pictures that were encoded for some tier", "stream")
         self.encoded = counter("frames_encoded", "Frames that an encoder put out", "stream", "codec")
         self.dropped = counter("frames_dropped", "Frames that went no further than a stage", "stream", "stage")
         self.packets = counter("packets_sent", "RTP packets sent", "stream", "carrier")

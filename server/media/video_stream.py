@@ -93,6 +93,7 @@ class VideoStream(Stream[PictureJob]):
         self._orders: list[Output] = []  # that are still to be encoded from it
         self._began = 0.0  # when it came
         self._others_served = 0  # observers' tiers that were encoded from it
+        self._taken = metrics.taken.labels(camera.name)
         self._decoder = PictureDecoder()
         self._encoders: dict[Output, PictureEncoder] = {}
 
@@ -156,6 +157,7 @@ class VideoStream(Stream[PictureJob]):
         self._source = SourcePicture(media, capture_time, self._clock.timestamp(media.time))
         self._began, self._others_served = now, 0
         due = [output for output in self._outputs.values() if self._due(output, media.time, now)]
+        self._taken.inc(bool(due))
         self._orders = sorted(due, key=lambda output: (output.tier != "operator", output.encoded_at))
 
     def _due(self, output: Output, time: float, now: float) -> bool:

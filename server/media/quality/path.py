@@ -5,7 +5,7 @@ first needs to show: the round trip and half a second.
 
 | when | the rate becomes | reason |
 |---|---|---|
-| pictures leave and nothing was heard for 2 s and a round trip | 70 %, every second | no feedback |
+| pictures leave and nothing was heard for 2 s (at first 5 s) and a round trip | 70 %, every second | no feedback |
 | round trips grew beyond their spread | 85 % of what it carries, after a pause | round trip |
 | the peer's estimate fell, and a queue, loss or the gap confirms it | the estimate | bandwidth |
 | the gap nears the tolerance and was smaller before, in two reports running | 80 % | gap |
@@ -39,6 +39,7 @@ __all__ = ["PathController", "RateLimits", "Reason"]
 Reason = Literal["", "no feedback", "round trip", "bandwidth", "gap", "loss"]
 
 SILENCE = 2.0  # s
+FIRST_ANSWER = 5.0  # s; a browser takes its time to start
 SILENT_STEP = 1.0  # s between two decreases in silence
 REACTION = 0.5  # s on top of a round trip until a decrease shows
 FRESH = 0.3  # s after a decrease from which on a round trip tells what it did
@@ -86,6 +87,7 @@ class PathController:
         self._ceiling: float | None = None  # rate at which it did
         self._heard_at = now
         self._heard = False  # anything since the last increase
+        self._answered = False  # anything at all
         self._silent_from: float | None = None  # rate before the silence
         self._lowered_at = now - CALM
         self._raised_at = now
@@ -111,7 +113,7 @@ class PathController:
             self.rate = max(self.rate, min(self.limits.maximum, self._silent_from / 2))
             self._silent_from = None
         self._heard_at = now
-        self._heard = True
+        self._heard = self._answered = True
 
     def received(self, lost: int, expected: int, round_trip: float | None, now: float) -> None:
         """A receiver report: packets since the last one, and the round trip in s if it tells one."""
@@ -182,7 +184,8 @@ class PathController:
         self._raised_at = self._lowered_at = self._sign_at = now
 
     def _silent(self, now: float) -> bool:
-        return self.sent_bps > 0 and now - self._heard_at > SILENCE + self.round_trips.base
+        patience = SILENCE if self._answered else FIRST_ANSWER
+        return self.sent_bps > 0 and now - self._heard_at > patience + self.round_trips.base
 
     def _in_silence(self, now: float) -> None:
         if self._silent_from is None:
