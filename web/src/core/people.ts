@@ -13,6 +13,8 @@ export interface CrowdSummary {
   readonly onLowQuality: number;
 }
 
+const COLLATOR = new Intl.Collator("en", { numeric: true });
+
 export function sortPeople(
   participants: readonly Participant[],
   seat: Seat | null,
@@ -55,12 +57,17 @@ export function personWords(person: Participant): string {
   const words: string[] = person.carrier === "none" ? [] : [`gap ${person.gap}`];
   if (person.picture_delay_ms !== null) words.push(`${person.picture_delay_ms.toFixed(0)} ms`);
   else if (person.round_trip_ms !== null) words.push(`${person.round_trip_ms.toFixed(0)} ms RTT`);
-  if (person.loss !== null) words.push(`${(person.loss * 100).toFixed(person.loss < 0.0995 ? 1 : 0)} % lost`);
+  if (person.loss !== null) words.push(lossWords(person.loss));
   if (person.tier !== null) words.push(`${person.tier === "operator" ? "own" : person.tier} tier`);
   words.push(person.carrier === "none" ? "no stamps" : person.carrier);
   return words.join(" · ");
 }
 
+function lossWords(share: number): string {
+  if (share < 0.0005) return "no loss";
+  return `${(share * 100).toFixed(share < 0.0995 ? 1 : 0)} % lost`;
+}
+
 function byName(one: Participant, other: Participant): number {
-  return one.name.localeCompare(other.name, "en") || one.peer.localeCompare(other.peer, "en");
+  return COLLATOR.compare(one.name, other.name) || COLLATOR.compare(one.peer, other.peer);
 }

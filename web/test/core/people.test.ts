@@ -41,7 +41,9 @@ describe("people", () => {
     expect(watching.map((each) => each.name)).toEqual(["Abe", "Zoe"]);
   });
 
-  it("of one name stay in one order", () => {
+  it("watching are in the order of their names, and of one name in one order", () => {
+    const sites = ["Site 10", "Site 9"].map((name) => person(name, name, "observer"));
+    expect(sortPeople(sites, null, null).watching.map((each) => each.name)).toEqual(["Site 9", "Site 10"]);
     const twins = [person("b", "Twin", "observer"), person("a", "Twin", "observer")];
     expect(sortPeople(twins, null, null).watching.map((each) => each.peer)).toEqual(["a", "b"]);
   });
@@ -67,6 +69,7 @@ describe("people", () => {
     expect(personWords(person("a", "A", "operator", known))).toBe(
       "gap 2 · 64 ms · 0.4 % lost · own tier · capture-time",
     );
+    expect(personWords(person("a", "A", "observer", { loss: 0 }))).toBe("gap 0 · no loss · capture-time");
     const watching = { round_trip_ms: 40.2, loss: 0.25, tier: "low", carrier: "none" } as const;
     expect(personWords(person("a", "A", "observer", watching))).toBe(
       "40 ms RTT · 25 % lost · low tier · no stamps",
