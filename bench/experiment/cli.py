@@ -81,18 +81,25 @@ def experiment_command(
         watchers=not browser if watchers is None else watchers,
     )
     session = _Session(report)
-    if profile == "outage":
+    try:
+        _work(session, choices, seconds)
+    except KeyboardInterrupt:
+        _say("interrupted: this is what was found so far")
+    session.publish(json_to)
+
+
+def _work(session: "_Session", choices: Choices, seconds: float | None) -> None:
+    if choices.profile == "outage":
         session.outage(replace(choices, seconds=seconds or OUTAGE_SECONDS))
-    elif profile == "growth":
+    elif choices.profile == "growth":
         session.grow(replace(choices, seconds=seconds or GROWTH_SECONDS))
-    elif profile == "all":
+    elif choices.profile == "all":
+        session.grow(replace(choices, seconds=GROWTH_SECONDS))
         for each in matrix_of(choices):
             session.drive(each)
-        session.grow(replace(choices, seconds=GROWTH_SECONDS))
         session.outage(replace(choices, seconds=OUTAGE_SECONDS))
     else:
         session.drive(choices)
-    session.publish(json_to)
 
 
 class _Session:

@@ -1,7 +1,7 @@
 """Without a gate the gap has no bound: it grows with the event rate and with how late the pictures are.
 
-Somebody beside the robot drives at a fixed rate. Viewers look on through the profile's network; each player adds a
-delay of its own, as the players of the thesis did (its audio tool: up to 2 s).
+Somebody beside the robot drives at a fixed rate. Viewers look on through the profile's network (the robot's own link
+is short here); each player adds a delay of its own, as the players of the thesis did (its audio tool: up to 2 s).
 """
 
 import asyncio
@@ -98,7 +98,7 @@ async def run_growth(choices: Choices, profile: Profile, say: Callable[[str], No
     """`choices.seconds` at each event rate. Raises ProcessFailed, ConsoleError."""
     points: list[Point] = []
     async with (
-        running_stage(choices.robot, profile, MEDIA, choices.seed) as stage,
+        running_stage(choices.robot, profile, MEDIA, choices.seed, robot_link=False) as stage,
         Console(stage.near_link, video=False, audio=False, name="operator") as operator,
         _viewers(stage, choices, profile) as viewers,
     ):

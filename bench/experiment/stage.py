@@ -31,8 +31,10 @@ class Stage:
 
 
 @asynccontextmanager
-async def running_stage(robot: str, profile: Profile, media: MediaChoice, seed: int) -> AsyncIterator[Stage]:
-    """Raises ProcessFailed."""
+async def running_stage(
+    robot: str, profile: Profile, media: MediaChoice, seed: int, *, robot_link: bool = True
+) -> AsyncIterator[Stage]:
+    """`robot_link`: whether the robot's link passes the network too. Raises ProcessFailed."""
     lockstep = str(Path(sys.executable).with_name("lockstep"))
     with TemporaryDirectory(prefix="lockstep-experiment-") as directory:
         log = Path(directory) / "events.jsonl"
@@ -45,8 +47,9 @@ async def running_stage(robot: str, profile: Profile, media: MediaChoice, seed: 
         robot_command = (lockstep, "robot", robot, "--port", "0", "--event-log", str(log), "--json")
         async with running_process(*robot_command) as (bridge, ready):
             host, _, port = ready["robot"].removeprefix("tcp://").rpartition(":")
-            async with Network(profile, robot=(host, int(port)), seed=seed) as network:
-                serve = (lockstep, "serve", "--robot", network.robot_address, "--port", "0", "--json", "--quiet")
+            async with Network(profile, robot=(host, int(port)) if robot_link else None, seed=seed) as network:
+                address = network.robot_address or ready["robot"]
+                serve = (lockstep, "serve", "--robot", address, "--port", "0", "--json", "--quiet")
                 async with running_process(*serve, environment=environment) as (console, links):
                     await network.open_console(links["console"])
                     yield Stage(network, bridge, console, log, links["operator"])
