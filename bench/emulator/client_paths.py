@@ -1,15 +1,19 @@
 """All paths between one client and the console. No I/O."""
 
+from collections import OrderedDict
+from collections.abc import Hashable
+
 from bench.emulator.bottleneck import Bottleneck
 from bench.emulator.outages import Outages
 from bench.emulator.packets import Kind
-from bench.emulator.path import ImpairedPath
+from bench.emulator.path import ImpairedPath, PathStatistics
 from bench.emulator.profile import DIRECTIONS, Direction, Profile, TwoWay
 from bench.emulator.stream_path import StreamPath
 
-__all__ = ["ClientPaths", "signalling_paths"]
+__all__ = ["ClientPaths", "SignallingPaths"]
 
 IP_UDP_BYTES = 28  # headers that a bottleneck sends too
+KEPT = 1000  # connections
 
 
 class ClientPaths:
@@ -40,17 +44,43 @@ class ClientPaths:
         return self.paths[kind, direction].admit(now, size + IP_UDP_BYTES)
 
 
-def signalling_paths(profile: Profile, seed: str, outages: Outages) -> dict[Direction, StreamPath]:
-    """HTTP. It has a bottleneck of its own: what TCP and media do to each other at a shared one is not emulated."""
-    paths: dict[Direction, StreamPath] = {}
-    for direction in DIRECTIONS:
-        settings = profile.bottleneck(direction)
+class SignallingPaths:
+    """HTTP: each connection keeps its own order, and all share a bottleneck each way.
+
+    It is not the bottleneck of media and control: what TCP and they do to each other is not emulated.
+    """
+
+    def __init__(self, profile: Profile, seed: str, outages: Outages) -> None:
+        self.statistics: dict[Direction, PathStatistics] = {each: PathStatistics() for each in DIRECTIONS}
+        self._profile = profile
+        self._seed = seed
+        self._outages = outages
+        self._count = 0
+        self._connections: OrderedDict[Hashable, dict[Direction, StreamPath]] = OrderedDict()
+        self._bottlenecks = {
+            direction: Bottleneck(settings.rate)
+            for direction in DIRECTIONS
+            if (settings := profile.bottleneck(direction)) is not None
+        }
+
+    def of(self, connection: Hashable) -> dict[Direction, StreamPath]:
+        """Its two directions; `connection` is what tells it from others."""
+        found = self._connections.get(connection)
+        if found is None:
+            self._count += 1
+            found = self._connections[connection] = {direction: self._path(direction) for direction in DIRECTIONS}
+            if len(self._connections) > KEPT:
+                self._connections.popitem(last=False)
+        return found
+
+    def _path(self, direction: Direction) -> StreamPath:
         back: Direction = "to_robot" if direction == "to_operator" else "to_operator"
-        paths[direction] = StreamPath(
-            profile.signalling.towards(direction),
-            f"{seed} signalling {direction}",
-            back=profile.signalling.towards(back).delay.mean,
-            bottleneck=None if settings is None else Bottleneck(settings.rate),
-            outages=outages,
+        path = StreamPath(
+            self._profile.signalling.towards(direction),
+            f"{self._seed} signalling {self._count} {direction}",
+            back=self._profile.signalling.towards(back).delay.mean,
+            bottleneck=self._bottlenecks.get(direction),
+            outages=self._outages,
         )
-    return paths
+        path.statistics = self.statistics[direction]
+        return path

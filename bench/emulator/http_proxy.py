@@ -5,7 +5,7 @@ connections are taken as open. Each WHEP session gets a relay of its own that is
 """
 
 import time
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from contextlib import aclosing
 from urllib.parse import urlsplit
 
@@ -16,9 +16,9 @@ from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
+from bench.emulator.client_paths import SignallingPaths
 from bench.emulator.delayed import delayed, sleep_until
 from bench.emulator.errors import BadDescription
-from bench.emulator.profile import Direction
 from bench.emulator.sdp import without_candidates
 from bench.emulator.sessions import Sessions
 from bench.emulator.stream_path import StreamPath
@@ -43,7 +43,7 @@ class ConsoleProxy:
     `Host` and `Origin` pass unchanged: to the console its page comes from the proxy's address, and both agree.
     """
 
-    def __init__(self, console: str, sessions: Sessions, paths: Mapping[Direction, StreamPath]) -> None:
+    def __init__(self, console: str, sessions: Sessions, paths: SignallingPaths) -> None:
         self._console = console.rstrip("/")
         self._sessions = sessions
         self._paths = paths
@@ -60,7 +60,8 @@ class ConsoleProxy:
 
     async def _http(self, request: Request) -> Response:
         body = await request.body()
-        await sleep_until(self._paths["to_robot"].admit(time.monotonic(), HEADERS_SIZE + len(body)))
+        paths = self._paths.of(request.client)
+        await sleep_until(paths["to_robot"].admit(time.monotonic(), HEADERS_SIZE + len(body)))
         kind = request.headers.get("content-type", "").partition(";")[0].strip()
         try:
             if request.method == "POST" and request.url.path == "/whep" and kind == SDP:
@@ -71,7 +72,7 @@ class ConsoleProxy:
                 response = await self._forward(request, body)
         except httpx.TransportError as error:
             response = PlainTextResponse(f"the console does not answer: {error or type(error).__name__}", 502)
-        await sleep_until(self._paths["to_operator"].admit(time.monotonic(), HEADERS_SIZE))
+        await sleep_until(paths["to_operator"].admit(time.monotonic(), HEADERS_SIZE))
         if request.method == "DELETE":
             self._sessions.end(request.url.path)
         return response
@@ -116,12 +117,14 @@ class ConsoleProxy:
 
     async def _forward(self, request: Request, body: bytes) -> Response:
         answer = await self._ask(request, body)
-        response = StreamingResponse(self._body(answer), answer.status_code)
+        response = StreamingResponse(
+            self._body(answer, self._paths.of(request.client)["to_operator"]), answer.status_code
+        )
         self._copy_headers(answer, response, set())
         return response
 
-    async def _body(self, answer: httpx.Response) -> AsyncIterator[bytes]:
-        async with aclosing(answer), aclosing(delayed(answer.aiter_raw(), self._paths["to_operator"])) as chunks:
+    async def _body(self, answer: httpx.Response, path: StreamPath) -> AsyncIterator[bytes]:
+        async with aclosing(answer), aclosing(delayed(answer.aiter_raw(), path)) as chunks:
             async for chunk in chunks:
                 yield chunk
 
@@ -142,4 +145,4 @@ class ConsoleProxy:
             response.headers.append(name, value)
 
     async def _websocket(self, browser: WebSocket) -> None:
-        await join(browser, self._console, self._paths)
+        await join(browser, self._console, self._paths.of(browser.client))

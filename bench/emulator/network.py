@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from aioice.ice import get_host_addresses
 
-from bench.emulator.client_paths import signalling_paths
+from bench.emulator.client_paths import SignallingPaths
 from bench.emulator.deliveries import Deliveries
 from bench.emulator.http_proxy import ConsoleProxy
 from bench.emulator.network_statistics import NetworkStatistics, collect
@@ -63,7 +63,7 @@ class Network:
         self._listen = host, port
         self._client_outages = Outages(self.profile.client_outages)
         self._robot_outages = Outages(self.profile.robot_outages)
-        self._signalling = signalling_paths(self.profile, str(seed), self._client_outages)
+        self._signalling = SignallingPaths(self.profile, str(seed), self._client_outages)
         self._proxied = False
         self._relay: TcpRelay | None = None
         self._stack = AsyncExitStack()
@@ -141,7 +141,7 @@ class Network:
     def statistics(self) -> NetworkStatistics:
         """What has happened to everybody's packets so far."""
         robot = {} if self._relay is None else self._relay.statistics
-        return collect(self._sessions.all_paths, self._signalling, robot, time.monotonic())
+        return collect(self._sessions.all_paths, self._signalling.statistics, robot, time.monotonic())
 
 
 def _own_hosts() -> list[str]:

@@ -7,7 +7,6 @@ from bench.emulator.bottleneck import Bottleneck
 from bench.emulator.client_paths import ClientPaths
 from bench.emulator.path import PathStatistics
 from bench.emulator.profile import Direction
-from bench.emulator.stream_path import StreamPath
 
 __all__ = ["NetworkStatistics", "QueueStatistics", "collect", "count_queue"]
 
@@ -44,7 +43,7 @@ class NetworkStatistics:
 
 def collect(
     clients: Iterable[ClientPaths],
-    signalling: Mapping[Direction, StreamPath],
+    signalling: Mapping[Direction, PathStatistics],
     robot: Mapping[tuple[str, Direction], PathStatistics],
     now: float,
 ) -> NetworkStatistics:
@@ -55,8 +54,8 @@ def collect(
             found.count(kind, direction, path.statistics)
         for direction, bottleneck in client.bottlenecks.items():
             count_queue(found, direction, bottleneck, now)
-    for direction, stream in signalling.items():
-        found.count("signalling", direction, stream.statistics)
+    for direction, counts in signalling.items():
+        found.count("signalling", direction, counts)
     for (name, direction), statistics in robot.items():
         found.count(name, direction, statistics)
     return found

@@ -1,4 +1,4 @@
-from bench.emulator.client_paths import ClientPaths, signalling_paths
+from bench.emulator.client_paths import KEPT, ClientPaths, SignallingPaths
 from bench.emulator.network_statistics import collect
 from bench.emulator.outages import Outages
 from bench.emulator.packets import Kind
@@ -50,11 +50,28 @@ def test_the_first_packet_starts_the_schedule_of_outages_and_later_ones_do_not()
     assert paths.admit("control", "to_robot", 108.5, 100) is None
 
 
-def test_http_never_loses_anything_and_waits_at_its_own_bottleneck() -> None:
-    paths = signalling_paths(NARROW, "1", Outages())
+def test_http_waits_at_a_bottleneck_of_its_own() -> None:
+    paths = SignallingPaths(NARROW, "1", Outages()).of("a")
     assert paths["to_operator"].admit(0.0, 64_000) > 1.0
     assert paths["to_operator"].admit(0.0, 64_000) > 2.0
     assert paths["to_robot"].admit(0.0, 100) < 0.03
+
+
+def test_connections_of_http_do_not_wait_for_each_other_and_are_counted_together() -> None:
+    paths = SignallingPaths(BURSTY, "1", Outages())
+    first = [paths.of("a")["to_robot"].admit(0.0, 100) for _ in range(100)]
+    assert max(first) > 0.1, "a lost message held up what came behind it"
+    assert min(paths.of(number)["to_robot"].admit(0.0, 100) for number in range(10)) == 0.05
+    assert paths.of("a") is paths.of("a")
+    assert paths.statistics["to_robot"].offered == 110
+
+
+def test_only_so_many_connections_are_remembered() -> None:
+    paths = SignallingPaths(BURSTY, "1", Outages())
+    first = paths.of("a")
+    for number in range(KEPT):
+        paths.of(number)
+    assert paths.of("a") is not first
 
 
 def test_statistics_of_all_clients_add_up() -> None:
