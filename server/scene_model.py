@@ -9,6 +9,7 @@ import viser
 from robot_bridge.protocol.description import Geom, RobotDescription
 from robot_bridge.protocol.messages import Feedback
 from server.kinematics import body_pose, scene_paths, world_positions
+from server.scene_fences import SceneFences
 
 __all__ = ["SceneModel"]
 
@@ -48,6 +49,7 @@ class SceneModel:
         self.label = self._add_label()
         self.arrow = self._add_arrow()
         self.points = self._add_points()
+        self.fences = SceneFences(server, description)
 
     def pose(self, feedback: Feedback) -> None:
         joints = dict(zip(self._joint_names, feedback.joints, strict=False))
@@ -58,6 +60,7 @@ class SceneModel:
             self.label.text = f"s {feedback.event}{STOPPED if feedback.stop.stopped else ''}"
             self._pose_arrow(feedback.wrench)
             self._pose_points(feedback.ranges)
+            self.fences.show(feedback.limits)
 
     def _build_surroundings(self) -> None:
         scene, camera = self._server.scene, self._server.initial_camera
