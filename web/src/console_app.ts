@@ -21,6 +21,7 @@ import { parseServerMessage } from "./core/wire_parser";
 import { ARM_REFUSAL_WORDS } from "./core/words";
 import { Controls, type ControlSample } from "./input/controls";
 import { Disposal } from "./input/disposal";
+import { onNetworkChange } from "./input/network_change";
 import type { TouchSticks } from "./input/touch_sticks";
 import { AudioDesk } from "./media/audio_desk";
 import { MediaRoom } from "./media_room";
@@ -219,7 +220,7 @@ export class ConsoleApp {
     this.disposal.listen(window, "pageshow", (event) => {
       if (event.persisted) location.reload();
     });
-    this.disposal.listen(window, "online", () => this.connection.alarm());
+    this.disposal.add(onNetworkChange(() => this.connection.alarm()));
     const visibility = (): void => {
       if (document.hidden) this.disarm("hidden");
       this.room.listen();
