@@ -9,6 +9,7 @@ const NAME_KEY = "lockstep.name";
 /** What this page says to the other people: about the seat, its name, notes. */
 export class SessionDesk {
   role: Role | null = null; // of the last connection: the link has one and keeps it
+  private wantsSeat = true; // when it connects
   seatMs = 0; // when the console last spoke of the seat: its countdowns began then
 
   constructor(
@@ -19,21 +20,24 @@ export class SessionDesk {
     this.name = storedName() ?? name;
   }
 
-  /** An operator's page takes the seat if nobody has it, and disturbs nobody otherwise. */
+  /** An operator's page takes the seat if nobody has it, unless it gave it away, and disturbs nobody otherwise. */
   welcomed(welcome: Welcome): void {
     this.role = welcome.role;
     if (this.name !== null) this.tell({ type: "rename", name: this.name });
-    if (welcome.role === "operator") this.tell({ type: "seat_request", only_if_free: true });
+    if (welcome.role === "operator" && this.wantsSeat)
+      this.tell({ type: "seat_request", only_if_free: true });
   }
 
   /** A network that failed took the seat, not a person: back again, it is asked for unless somebody else has it. */
   lostSeat(): void {
     const { seat } = this.state;
+    this.wantsSeat = seat?.why === "heartbeat lost" || seat?.why === "disconnected";
     if (seat?.holder === "" && seat.why === "heartbeat lost")
       this.tell({ type: "seat_request", only_if_free: true });
   }
 
   requestSeat(): void {
+    this.wantsSeat = true;
     this.tell({ type: "seat_request" });
   }
 
@@ -43,6 +47,7 @@ export class SessionDesk {
   }
 
   takeSeat(): void {
+    this.wantsSeat = true;
     this.tell({ type: "seat_take" });
   }
 
