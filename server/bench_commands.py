@@ -19,6 +19,7 @@ COMMANDS = {
         "network_command",
         "Put a bad network between a console and whoever uses it.",
     ),
+    "hostile": ("bench.hostile.cli", "hostile_command", "Drive among peers that misbehave in every way."),
     "soak": ("bench.soak.cli", "soak_command", "Drive for a long time while everything fails now and then."),
 }
 

@@ -75,6 +75,8 @@ class IceSession:
         self._connect_timeout = connect_timeout
         self._on_refused = on_refused
         self._candidates = 0
+        self._closed = False
+        self._restarting = asyncio.Lock()
         self._next: Any = None  # the connection that is to take over
         self._taking_over: asyncio.Task[None] | None = None
         if self._transport is not None:
@@ -83,35 +85,39 @@ class IceSession:
 
     @property
     def connected(self) -> bool:
-        return self._transport is not None and self._transport.state == "completed"
+        return self._transport is not None and not self._closed and self._transport.state == "completed"
 
     async def restart(self, username: str, password: str, candidates: Sequence[RTCIceCandidate]) -> LocalIce:
         """Begin a new session with the peer's new credentials; a restart under way is given up for it.
 
-        Only while `connected`. Returns when our side is gathered; the change of paths follows by itself.
+        Returns when our side is gathered; the change of paths follows by itself.
+
+        Raises:
+            ConnectionError: not connected, or not any more.
         """
-        if self._transport is None:
-            raise RuntimeError("there is nothing to restart")
-        await self._give_up()
-        gatherer = self._gatherer()
-        connection: Any = gatherer._connection
-        guard_ice(connection, self._on_refused)
-        connection._queue = _DataOnly(_queue_of(self._transport))
-        self._next, self._candidates = connection, 0
-        try:
-            await gatherer.gather()
-            # The offerer keeps the role it has (RFC 8445 6.1.1); a conflict would repair itself.
-            connection.ice_controlling = self._transport._connection.ice_controlling
-            connection.remote_username, connection.remote_password = username, password
-            for candidate in candidates:
-                await self.add_candidate(candidate)
-        except BaseException:
+        async with self._restarting:  # aioice does not take being closed while it gathers
+            if self._transport is None or not self.connected:
+                raise ConnectionError("there is no ICE session that could be restarted")
             await self._give_up()
-            raise
-        self.tag, self.username = _new_tag(), username
-        local = gatherer.getLocalParameters()
-        self._taking_over = asyncio.get_running_loop().create_task(self._take_over(connection), name="ice restart")
-        return LocalIce(local.usernameFragment or "", local.password or "", gatherer.getLocalCandidates())
+            gatherer = self._gatherer()
+            connection: Any = gatherer._connection
+            guard_ice(connection, self._on_refused)
+            connection._queue = _DataOnly(_queue_of(self._transport))
+            self._next, self._candidates = connection, 0
+            try:
+                await gatherer.gather()
+                # The offerer keeps the role it has (RFC 8445 6.1.1); a conflict would repair itself.
+                connection.ice_controlling = self._transport._connection.ice_controlling
+                connection.remote_username, connection.remote_password = username, password
+                for candidate in candidates:
+                    await self.add_candidate(candidate)
+            except BaseException:
+                await self._give_up()
+                raise
+            self.tag, self.username = _new_tag(), username
+            local = gatherer.getLocalParameters()
+            self._taking_over = asyncio.get_running_loop().create_task(self._take_over(connection), name="ice restart")
+            return LocalIce(local.usernameFragment or "", local.password or "", gatherer.getLocalCandidates())
 
     async def add_candidate(self, candidate: RTCIceCandidate) -> bool:
         """One more candidate of the peer, for the newest session. False: it has too many already."""
@@ -126,7 +132,9 @@ class IceSession:
 
     async def close(self) -> None:
         """Idempotent; the connection that is current is the peer connection's to close."""
-        await self._give_up()
+        self._closed = True
+        async with self._restarting:
+            await self._give_up()
         for task in self._lingering:
             task.cancel()
         await asyncio.gather(*self._lingering, return_exceptions=True)

@@ -91,8 +91,8 @@ async def patch(resource: str, request: Request, identity: Annotated[Identity, D
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
             local = await peer.ice.restart(fragment.username, fragment.password, candidates)
-    except TimeoutError as error:
-        raise NotConnected("no candidates were gathered in time") from error
+    except (TimeoutError, ConnectionError) as error:
+        raise NotConnected("the ICE session ended, or gathered nothing in time") from error
     lines = [f"candidate:{candidate_to_sdp(each)}" for each in local.candidates]
     body = format_fragment(local.username, local.password, first.kind, first.rtp.muxId, lines)
     headers = {"ETag": peer.ice.tag, "Cache-Control": "no-store"}

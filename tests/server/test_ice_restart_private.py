@@ -33,7 +33,7 @@ async def test_a_connection_without_sections_has_nothing_to_restart() -> None:
     pc = RTCPeerConnection()
     session = IceSession(pc, "abcd", _gatherer, 1.0, lambda name: None)
     assert not session.connected
-    with pytest.raises(RuntimeError):
+    with pytest.raises(ConnectionError):
         await session.restart("other", "x" * 22, [])
     await session.close()
     await pc.close()
@@ -66,3 +66,17 @@ async def test_a_gatherer_that_fails_leaves_the_session_as_it_was() -> None:
             await session.restart("other", "x" * 22, [])
         assert session.tag == before
         assert peer.pc.connectionState == "connected"
+
+
+async def test_restarts_that_overlap_leave_no_socket_behind() -> None:
+    async with running_rig() as rig:
+        async with rig.peer("observer") as peer:
+            session = next(iter(rig.services.console.peers)).ice
+            answers = await asyncio.gather(*(session.restart(f"user{each}", "x" * 22, []) for each in range(4)))
+            assert len({each.username for each in answers}) == 4
+            assert session.username == "user3"
+            assert peer.pc.connectionState == "connected"
+            ending = asyncio.gather(session.restart("last", "x" * 22, []), session.close(), return_exceptions=True)
+            await ending
+        with pytest.raises(ConnectionError):
+            await session.restart("later", "x" * 22, [])

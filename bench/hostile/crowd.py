@@ -1,0 +1,98 @@
+"""The crowd, in a process of its own: `python -m bench.hostile.crowd LINK COUNT SEED`.
+
+It says in a JSON line that it has begun, answers each line on standard input with what it has seen, and ends at the end
+of its input.
+"""
+
+import asyncio
+import json
+import sys
+from collections import Counter
+from random import Random
+
+import httpx
+import uvloop
+
+from bench.hostile import over_http, over_webrtc
+from bench.hostile.target import Misbehaviour, Target
+from client.link import parse_link
+
+__all__ = ["KINDS", "Crowd", "main"]
+
+PAUSE = 0.2  # s between two attempts of one member, on average
+
+KINDS: tuple[Misbehaviour, ...] = (
+    over_http.garbage_bytes,
+    over_http.slow_requests,
+    over_http.forged_tokens,
+    over_http.many_requests,
+    over_http.giant_offers,
+    over_webrtc.half_open,
+    over_webrtc.garbage_datagrams,
+    over_webrtc.message_flood,
+    over_webrtc.garbage_messages,
+    over_webrtc.forged_commands,
+    over_webrtc.reset_spam,
+    over_webrtc.slow_reader,
+    over_webrtc.restart_flood,
+)
+
+
+class Crowd:
+    """Members take the kinds in turn; each attacks again and again until the task is cancelled."""
+
+    def __init__(self, link: str, count: int, seed: int, kinds: tuple[Misbehaviour, ...] = KINDS) -> None:
+        self.attempts: Counter[str] = Counter()
+        self.failures: Counter[str] = Counter()  # attempts that ended in an error of their own
+        self.seen: Counter[str] = Counter()
+        self._link = parse_link(link)
+        self._members = [(kinds[number % len(kinds)], Random(seed * 1000 + number)) for number in range(count)]
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        limits = httpx.Limits(max_connections=200)
+        async with httpx.AsyncClient(base_url=self._link.base, trust_env=False, limits=limits, timeout=10) as http:
+            target = Target(self._link.base, self._link.token, http, self.seen)
+            async with asyncio.TaskGroup() as tasks:
+                for kind, random in self._members:
+                    tasks.create_task(self._member(kind, target, random))
+
+    async def _member(self, kind: Misbehaviour, target: Target, random: Random) -> None:
+        await asyncio.sleep(random.uniform(0, 2 * PAUSE))
+        while True:
+            self.attempts[kind.__name__] += 1
+            try:
+                await kind(target, random)
+            except Exception as error:  # whoever breaks all rules breaks aiortc's own assumptions too
+                self.failures[f"{kind.__name__}: {type(error).__name__}"] += 1
+            await asyncio.sleep(random.uniform(0, 2 * PAUSE))
+
+    def summary(self) -> dict[str, dict[str, int]]:
+        return {"attempts": dict(self.attempts), "seen": dict(self.seen), "failures": dict(self.failures)}
+
+
+async def _run(link: str, count: int, seed: int) -> None:
+    crowd = Crowd(link, count, seed)
+    running = asyncio.create_task(crowd.run())
+    lines = asyncio.StreamReader()
+    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
+    _say({"members": count})
+    try:
+        async for _ in lines:
+            _say(crowd.summary())
+    finally:
+        running.cancel()
+        await asyncio.wait((running,))
+
+
+def _say(what: object) -> None:
+    sys.stdout.write(json.dumps(what) + "\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    uvloop.run(_run(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])))
+
+
+if __name__ == "__main__":
+    main()

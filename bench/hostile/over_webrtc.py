@@ -1,0 +1,226 @@
+"""What can be done to a console by who has an observer's link and speaks WebRTC."""
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from random import Random
+from typing import Any
+
+import httpx
+from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from aiortc.sdp import SessionDescription
+
+from bench.hostile.target import Target
+from client.aiortc_private import gather_only_on
+from robot_bridge.protocol.console import decode_server_message, encode_console_message
+from robot_bridge.protocol.messages import Command, Feedback, Ping, Reset, Rest
+
+__all__ = [
+    "forged_commands",
+    "garbage_datagrams",
+    "garbage_messages",
+    "half_open",
+    "message_flood",
+    "reset_spam",
+    "restart_flood",
+    "slow_reader",
+]
+
+SDP = "application/sdp"
+FRAGMENT = "application/trickle-ice-sdpfrag"
+STAY = 5.0  # s; longer than the console bears any of these
+CONNECT_SECONDS = 8.0
+BURST = 100
+
+
+class Peer:
+    """A connection that obeys no rule of ours."""
+
+    def __init__(self) -> None:
+        self.pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+        self.channels: dict[str, RTCDataChannel] = {}
+        self.closed = asyncio.Event()
+        self.event = 1  # the newest feedback's, for forging
+        self.issue = 1
+        self.location = ""
+
+    async def join(self, target: Target, *, video: bool = False) -> bool:
+        """False when the console refuses it."""
+        for label in ("control", "session", "stop"):
+            lossy = label == "control"
+            channel = self.pc.createDataChannel(label, ordered=not lossy, maxRetransmits=0 if lossy else None)
+            channel.on("message", self._heard)
+            channel.on("close", self.closed.set)
+            self.channels[label] = channel
+        if video:
+            self.pc.addTransceiver("video", direction="recvonly")
+        answer = await target.ask("POST", "/whep", await offer_of(self.pc), **{"Content-Type": SDP})
+        if answer.status_code != 201:
+            return False
+        self.location = answer.headers["location"]
+        opened = asyncio.Event()
+        self.channels["control"].on("open", opened.set)
+        await self.pc.setRemoteDescription(RTCSessionDescription(answer.text, "answer"))
+        async with asyncio.timeout(CONNECT_SECONDS):
+            await opened.wait()
+        return True
+
+    def send(self, label: str, data: str | bytes) -> None:
+        channel = self.channels[label]
+        if channel.readyState == "open" and channel.bufferedAmount < 1 << 20:
+            channel.send(data)
+
+    def _heard(self, data: str) -> None:
+        message = decode_server_message(data)
+        if isinstance(message, Feedback):
+            self.event, self.issue = message.event, message.issue
+
+
+async def offer_of(pc: RTCPeerConnection) -> str:
+    gather_only_on(pc, ["127.0.0.1"])
+    await pc.setLocalDescription(await pc.createOffer())
+    return pc.localDescription.sdp
+
+
+@asynccontextmanager
+async def joined(target: Target, *, video: bool = False) -> AsyncIterator[Peer | None]:
+    """None: the console refused it, which is counted."""
+    peer = Peer()
+    try:
+        yield peer if await peer.join(target, video=video) else None
+    finally:
+        await peer.pc.close()
+
+
+async def _until_thrown_out(peer: Peer, target: Target) -> None:
+    try:
+        async with asyncio.timeout(STAY):
+            await peer.closed.wait()
+        target.seen["thrown_out"] += 1
+    except TimeoutError:
+        target.seen["stayed"] += 1
+
+
+async def message_flood(target: Target, random: Random) -> None:
+    """Valid messages, many more than anybody needs."""
+    async with joined(target) as peer:
+        if peer is None:
+            return
+        ping = encode_console_message(Ping(id=1))
+        for _ in range(50):
+            for _ in range(BURST):
+                peer.send("control", ping)
+            await asyncio.sleep(0.01)
+            if peer.closed.is_set():
+                break
+        await _until_thrown_out(peer, target)
+
+
+async def garbage_messages(target: Target, random: Random) -> None:
+    """What is no message, on channels that exist and channels that do not."""
+    async with joined(target) as peer:
+        if peer is None:
+            return
+        for number in range(30):
+            peer.pc.createDataChannel(random.choice(("control", "root", "x" * 200, str(number))))
+        for _ in range(20):
+            for label in peer.channels:
+                size = random.choice((1, 30, 1000, 20_000))
+                data = random.randbytes(size)
+                peer.send(label, data if random.random() < 0.5 else data.hex()[:size])
+            await asyncio.sleep(0.02)
+        await _until_thrown_out(peer, target)
+
+
+async def forged_commands(target: Target, random: Random) -> None:
+    """Commands and rests for the newest event, without the seat."""
+    async with joined(target) as peer:
+        if peer is None:
+            return
+        for _ in range(300):
+            values = [random.uniform(-1, 1) for _ in range(3)]
+            peer.send("control", encode_console_message(Command(event=peer.event + 1, issue=peer.issue, values=values)))
+            peer.send("control", encode_console_message(Rest(event=peer.event + 1)))
+            await asyncio.sleep(0.01)
+            if peer.closed.is_set():
+                break
+        target.seen["forger_ended"] += 1
+
+
+async def reset_spam(target: Target, random: Random) -> None:
+    """An observer that wants to release the stop, on the channel and over HTTP."""
+    async with joined(target) as peer:
+        if peer is None:
+            return
+        for _ in range(100):
+            peer.send("stop", encode_console_message(Reset(by="the crowd")))
+            await asyncio.sleep(0.01)
+        await asyncio.gather(*(target.ask("POST", "/api/reset") for _ in range(5)))
+
+
+async def slow_reader(target: Target, random: Random) -> None:
+    """It asks for pictures and feedback, and takes nothing any more."""
+    async with joined(target, video=True) as peer:
+        if peer is None or peer.pc.sctp is None:
+            return
+        connection: Any = peer.pc.sctp.transport.transport._connection
+        connection.data_received = _ignore
+        await _until_thrown_out(peer, target)
+
+
+def _ignore(data: bytes, component: int) -> None:
+    """Not read."""
+
+
+async def half_open(target: Target, random: Random) -> None:
+    """The same offer again and again, never connected to."""
+    pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+    try:
+        pc.createDataChannel("control")
+        pc.addTransceiver("video", direction="recvonly")
+        offer = await offer_of(pc)
+        for _ in range(10):
+            await target.ask("POST", "/whep", offer, **{"Content-Type": SDP})
+    finally:
+        await pc.close()
+
+
+async def restart_flood(target: Target, random: Random) -> None:
+    """ICE restarts and candidates without end."""
+    async with joined(target) as peer:
+        if peer is None:
+            return
+        for number in range(40):
+            fragment = f"a=ice-ufrag:{number:08d}\r\na=ice-pwd:{random.randbytes(12).hex()}\r\n"
+            await target.ask("PATCH", peer.location, fragment, **{"Content-Type": FRAGMENT, "If-Match": "*"})
+
+
+async def garbage_datagrams(target: Target, random: Random) -> None:
+    """Random datagrams to the ports that an answer names: noise, and what looks like DTLS, RTP and STUN."""
+    pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+    try:
+        pc.createDataChannel("control")
+        answer = await target.ask("POST", "/whep", await offer_of(pc), **{"Content-Type": SDP})
+        if answer.status_code != 201:
+            return
+        await _shower(_ports(answer), random)
+    finally:
+        await pc.close()
+
+
+def _ports(answer: httpx.Response) -> list[int]:
+    sections = SessionDescription.parse(answer.text).media
+    return [candidate.port for section in sections for candidate in section.ice_candidates]
+
+
+async def _shower(ports: list[int], random: Random) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.setblocking(False)
+        for _ in range(40):
+            for _ in range(BURST // 2):
+                first = random.choice((b"", b"\x16\xfe\xfd", b"\x80\x60", b"\0\1\0\0\x21\x12\xa4\x42"))
+                data = first + random.randbytes(random.randrange(1, 1400))
+                with suppress(OSError):  # the peer was closed, or the socket is full
+                    sender.sendto(data, ("127.0.0.1", random.choice(ports)))
+            await asyncio.sleep(0.05)

@@ -1,0 +1,104 @@
+"""Drive a robot in peace, then among the crowd, then in peace again; compare what the operator feels."""
+
+import asyncio
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median, quantiles
+from typing import Any
+
+from bench.machine import busy_percent, machine_facts
+from bench.processes import Running, running_process
+from bench.stack import Stack, running_stack
+from client import Console
+
+__all__ = ["hostile", "memory_of"]
+
+WARM_UP = 3.0  # s
+INTERVAL = 0.05  # s between two commands
+ALLOWED = 1.2  # times the undisturbed median
+NICE = ("nice", "-n", "5")  # the crowd's processor time is not what is measured; it gives way to the console
+CROWD_SECONDS = 60.0  # for it to say something
+
+
+async def hostile(peers: int, seconds: float, seed: int, say: Callable[[str], None]) -> dict[str, Any]:
+    """The figures; `say` tells how it goes."""
+    before = await busy_percent(1.0)
+    async with running_stack("planar") as stack:
+        async with Console(stack.operator, video=1, audio=False, name="operator") as console:
+            await console.take_seat()
+            await _drive(console, WARM_UP)
+            say(f"driving in peace for {seconds / 2:g} s")
+            quiet = await _drive(console, seconds / 2)
+            memory = memory_of(stack.console)
+            command = (*NICE, sys.executable, "-m", "bench.hostile.crowd", stack.observer, str(peers), str(seed))
+            async with running_process(*command) as (crowd, _):
+                say(f"{peers} misbehaving peers for {seconds:g} s")
+                used = stack.console.cpu_seconds()
+                disturbed = await _drive(console, seconds)
+                used = stack.console.cpu_seconds() - used
+                seen = await crowd.ask("", CROWD_SECONDS)
+                memory_during = memory_of(stack.console)
+                places = await _peers(stack)
+            say(f"driving in peace for {seconds / 2:g} s")
+            await _drive(console, WARM_UP)
+            quiet += await _drive(console, seconds / 2)
+            await console.rest()
+        return {
+            "peers": peers,
+            "seconds": seconds,
+            "quiet_ms": _figures(quiet),
+            "disturbed_ms": _figures(disturbed),
+            "ratio": round(median(disturbed) / median(quiet), 3),
+            "allowed": ALLOWED,
+            "console_cpu_percent": round(100 * used / seconds, 1),
+            "memory_mib": {"before": memory, "among_them": memory_during, "after": memory_of(stack.console)},
+            "peers_at_the_end": places,
+            "refused": await _refused(stack),
+            "crowd": seen,
+            "machine": machine_facts() | {"busy_percent_before": round(before, 1)},
+        }
+
+
+async def _drive(console: Console, seconds: float) -> list[float]:
+    """Seconds from each command's first sending to its feedback."""
+    end, taken = time.monotonic() + seconds, list[float]()
+    values = [0.0] * len(console.description.axes)
+    while time.monotonic() < end:
+        began = time.perf_counter()
+        await console.drive(values)
+        taken.append(time.perf_counter() - began)
+        await asyncio.sleep(INTERVAL)
+    return taken
+
+
+def _figures(taken: list[float]) -> dict[str, float]:
+    cuts = quantiles(taken, n=100)
+    found = {"median": median(taken), "p95": cuts[94], "p99": cuts[98], "max": max(taken)}
+    return {name: round(1000 * value, 2) for name, value in found.items()} | {"commands": len(taken)}
+
+
+def memory_of(process: Running) -> float:
+    """Resident MiB (proc(5), /proc/pid/status)."""
+    for line in Path(f"/proc/{process.pid}/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return round(int(line.split()[1]) / 1024, 1)
+    return 0.0
+
+
+async def _refused(stack: Stack) -> dict[str, dict[str, float]]:
+    """By name, where; and why peers ended."""
+    metrics = await stack.metrics()
+    found = {
+        where: metrics.values("lockstep_bad_input_total", "reason", where=where)
+        for where in ("http", "control", "session", "stop", "other", "transport")
+    }
+    found["refusals"] = metrics.values("lockstep_refusals_total", "reason")
+    found["ended"] = metrics.values("lockstep_peers_ended_total", "why")
+    found["internal_errors"] = metrics.values("lockstep_internal_errors_total", "where")
+    return {name: values for name, values in found.items() if values}
+
+
+async def _peers(stack: Stack) -> float:
+    return sum((await stack.metrics()).values("lockstep_peers", "role").values())

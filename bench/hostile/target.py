@@ -1,0 +1,44 @@
+"""Whom the crowd attacks, and how one member of it does that."""
+
+from collections import Counter
+from collections.abc import Awaitable, Callable
+from random import Random
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+import httpx
+
+__all__ = ["Misbehaviour", "Target"]
+
+
+class Target(NamedTuple):
+    """A console, and an observer's token: the worst of the crowd are people with a link."""
+
+    url: str
+    token: str
+    http: httpx.AsyncClient
+    seen: Counter[str]  # what the console said, by name or status
+
+    @property
+    def address(self) -> tuple[str, int]:
+        parts = urlsplit(self.url)
+        return parts.hostname or "", parts.port or 80
+
+    @property
+    def headers(self) -> dict[str, str]:
+        return {"Authorization": f"Bearer {self.token}"}
+
+    async def ask(self, method: str, path: str, content: str | bytes = b"", **headers: str) -> httpx.Response:
+        """Ask with the token, and count the answer."""
+        answer = await self.http.request(method, path, content=content, headers={**self.headers, **headers})
+        self.note(answer)
+        return answer
+
+    def note(self, answer: httpx.Response) -> None:
+        name = str(answer.status_code)
+        if answer.status_code >= 400 and answer.headers.get("content-type", "").startswith("application/json"):
+            name = answer.json().get("error", name)
+        self.seen[name] += 1
+
+
+Misbehaviour = Callable[[Target, Random], Awaitable[None]]  # one attempt; the crowd makes the next

@@ -1,0 +1,66 @@
+"""A small crowd of every kind against a real console: who drives goes on, every refusal has a name, nobody is kept.
+
+What the operator's latency is among a hundred is a figure, not a test: `lockstep hostile`.
+"""
+
+import asyncio
+import sys
+
+import pytest
+
+from bench.hostile.crowd import KINDS
+from bench.hostile.run import memory_of
+from bench.processes import running_process
+from bench.stack import Stack, running_stack
+from client import Console
+
+SECONDS = 100.0  # a busy machine; never waited for in full
+MEMORY = 150.0  # MiB that the crowd may cost: 60 peers that have not connected yet, and the encoders of one more tier
+# Each follows from what a kind does, whatever the machine's speed.
+NAMED = [("http", "unauthorized"), ("http", "too_large"), ("http", "not_allowed"), ("control", "flood")]
+
+
+@pytest.mark.timeout(150)
+async def test_an_operator_drives_on_among_peers_that_misbehave(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"PEER_CONNECT_TIMEOUT": 5, "PEER_SILENCE": 60, "SEAT_TIMEOUT": 60, "SCENE": 0}.items():
+        monkeypatch.setenv(f"LOCKSTEP_{name}", str(value))
+    async with (
+        running_stack("planar") as stack,
+        Console(stack.operator, video=1, audio=False, silence_seconds=60) as console,
+        Console(stack.observer, video=False, audio=False, silence_seconds=60) as bystander,
+    ):
+        await console.take_seat()
+        rest = [0.0] * len(console.description.axes)
+        first = last = await console.drive(rest)
+        memory = memory_of(stack.console)
+        command = (sys.executable, "-m", "bench.hostile.crowd", stack.observer, str(len(KINDS)), "1")
+        async with asyncio.timeout(SECONDS):
+            async with running_process(*command) as (crowd, _):
+                while not await _all_of_it_was_refused(stack):
+                    for _ in range(5):
+                        last = await console.drive(rest)
+                said = await crowd.ask("", SECONDS)
+            async for feedback in bystander.feedbacks():
+                if feedback.event >= last.event:
+                    break
+            await _only_two_are_left(stack)
+        assert last.event > first.event
+        assert console.seat.holder == console.peer, "nobody else has got the seat"
+        assert not last.stop.stopped
+        metrics = await stack.metrics()
+        assert not metrics.values("lockstep_internal_errors_total", "where")
+        assert set(said["attempts"]) == {kind.__name__ for kind in KINDS}
+        assert not {"500", "http_error"} & said["seen"].keys(), said["seen"]
+        assert memory_of(stack.console) - memory < MEMORY
+
+
+async def _all_of_it_was_refused(stack: Stack) -> bool:
+    """Each by its name."""
+    metrics = await stack.metrics()
+    refused = (metrics.values("lockstep_bad_input_total", "reason", where=where).get(name) for where, name in NAMED)
+    return all(refused) and bool(metrics.values("lockstep_refusals_total", "reason").get("no_seat"))
+
+
+async def _only_two_are_left(stack: Stack) -> None:
+    while sum((await stack.metrics()).values("lockstep_peers", "role").values()) > 2:  # noqa: ASYNC110
+        await asyncio.sleep(0.2)
