@@ -82,7 +82,8 @@ class Stream:
             return False
         self._packets += 1
         for frame in assembler.add(packet, now):
-            self._assembled(frame, assembler)
+            if not self._assembled(frame, assembler):
+                break  # those behind it build on it
         return assembler.wants_keyframe(now)
 
     def missing(self) -> list[int]:
@@ -103,7 +104,8 @@ class Stream:
             self._assembler.round_trip = self._round_trip
         return self._assembler
 
-    def _assembled(self, frame: EncodedFrame, assembler: Assembler) -> None:
+    def _assembled(self, frame: EncodedFrame, assembler: Assembler) -> bool:
+        """Whether the decoder will get it."""
         self._frames += 1
         if self.carrier == "trailer":
             frame = _without_trailer(frame)
@@ -111,8 +113,9 @@ class Stream:
             self._unstamped += 1
         if len(self._encoded) >= ENCODED_BOUND:
             self._start_over(assembler)  # the decoder is too slow, and frames build on each other
-        else:
-            self._encoded.put(frame)
+            return False
+        self._encoded.put(frame)
+        return True
 
     def _start_over(self, assembler: Assembler) -> None:
         self._encoded.clear()

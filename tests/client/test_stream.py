@@ -109,6 +109,20 @@ async def test_a_decoder_that_is_too_slow_drops_everything_up_to_a_keyframe() ->
     assert stream.statistics().dropped == ENCODED_BOUND
 
 
+async def test_frames_that_come_together_behind_a_dropped_one_are_dropped_with_it() -> None:
+    """A lost packet that comes at last completes many frames at once; those behind the overflow build on lost ones."""
+    stream = new_stream(Shown())
+    stream.feedback(1)
+    keyframe = ENCODED_BOUND + 4
+    pictures = encode("VP8", keyframe + 1, every=keyframe)
+    async with running(stream) as reader:
+        stream.packet(VP8, packet(0, pictures[0], 1))
+        assert (await reader.get()).timestamp == 0
+        for number in [*range(2, keyframe), 1, keyframe]:
+            stream.packet(VP8, packet(number, pictures[number], 1))
+        assert (await reader.get()).timestamp == 3000 * keyframe
+
+
 async def test_packets_of_an_unknown_payload_type_are_left_out() -> None:
     stream = new_stream(Shown())
     assert not stream.packet(55, packet(0, b"x", 1))
