@@ -212,7 +212,7 @@ def _profile_section(name: str, cells: Sequence[Cell]) -> str:
                 [[_text(each) for each in row[1:]] for cell in cells for row in rows_of(cell.result)],
             ),
             _comparison_figures(cells),
-            *(_cell_figures(cell) for cell in cells),
+            *(_cell_figures(cell) for cell in _drawn(cells)),
             "</section>",
         ]
     )
@@ -251,6 +251,11 @@ def _comparison_figures(cells: Sequence[Cell]) -> str:
         for what in ("video", "audio")
         if (svg := _compared(cells, what)) is not None
     )
+
+
+def _drawn(cells: Sequence[Cell]) -> Sequence[Cell]:
+    """Those whose own figures are drawn: without and with, as in the thesis; all, when these were not run."""
+    return [cell for cell in cells if cell.choices.mode in ("off", "feedback")] or cells
 
 
 def _cell_figures(cell: Cell) -> str:
