@@ -2,7 +2,8 @@
 
 import asyncio
 import time
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, TypeVar
 
 import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
@@ -11,16 +12,18 @@ from robot_bridge.protocol.console import Role
 from server.access import Identity, require_role
 from server.audit import AuditRecord
 from server.body import read_json
-from server.errors import NotAllowed
-from server.invitations import Invitation, may_invite
+from server.errors import NotAllowed, StateUnavailable
+from server.invitations import Invitation, Invitations, may_invite
 from server.links import console_link
 from server.services import Services, authorized, services
+from server.state_dir import StateDirUnusable
 
 __all__ = ["AuditPage", "InvitationInfo", "InvitationList", "InvitationRequest", "NewInvitation", "router"]
 
 router = APIRouter()
 Caller = Annotated[Identity, Depends(authorized)]
 
+Result = TypeVar("Result")
 DEFAULT_SECONDS = 8 * 3600.0
 MAX_RECORDS = 500  # of the audit in one answer
 
@@ -84,10 +87,7 @@ async def invite(request: Request, caller: Caller) -> Response:
     wanted = await read_json(request, InvitationRequest)
     _require_inviter(caller)
     now = time.time()
-    made = await asyncio.to_thread(
-        here.state.invitations.update,
-        lambda known: known.invite(caller, wanted.role, wanted.name, wanted.seconds, now),
-    )
+    made = await _update(here, lambda known: known.invite(caller, wanted.role, wanted.name, wanted.seconds, now))
     here.warden.enforce([made], caller.actor)
     base = here.settings.public_url or str(request.base_url).rstrip("/")
     link = console_link(base, here.access.sign(made.identity, made.created))
@@ -100,9 +100,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     here = services(request)
     _require_inviter(caller)
     now = time.time()
-    revoked = await asyncio.to_thread(
-        here.state.invitations.update, lambda known: known.revoke(caller, invitation_id, now)
-    )
+    revoked = await _update(here, lambda known: known.revoke(caller, invitation_id, now))
     here.warden.enforce(revoked, caller.actor)
     return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
 
@@ -118,6 +116,14 @@ async def audit(
     require_role(caller, "supervisor")
     log = services(request).audit
     return _json(AuditPage(records=log.tail.after(after, limit), last=log.next_number - 1, trouble=log.trouble))
+
+
+async def _update(here: Services, change: Callable[[Invitations], Result]) -> Result:
+    """Waits for the disk in a thread."""
+    try:
+        return await asyncio.to_thread(here.state.invitations.update, change)
+    except StateDirUnusable as error:
+        raise StateUnavailable(f"nothing was changed: {error.reason}") from error
 
 
 def _require_inviter(caller: Identity) -> None:

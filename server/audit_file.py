@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -37,10 +38,9 @@ class AuditFile:
             self._write_all(handle, data)
             os.fsync(handle)
         except OSError:
-            try:
+            with suppress(OSError):  # the first error is the one that says why
                 os.ftruncate(handle, self._size)
-            finally:
-                self.close()  # what is on disk is looked at anew before the next attempt
+            self.close()  # what is on disk is looked at anew before the next attempt
             raise
         self._size += len(data)
 

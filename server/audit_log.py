@@ -2,16 +2,16 @@
 
 import asyncio
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import structlog
 
 from server.audit import AuditRecord
 from server.audit_file import AuditFile, last_records
 from server.audit_tail import AuditTail
-from server.audit_writer import AuditWriter
+from server.audit_writer import AuditWriter, RecordFile
 from server.settings import Settings
-from server.state_dir import StateDir
+from server.state_dir import StateDir, StateDirUnusable
 
 __all__ = ["AuditLog", "open_audit_log"]
 
@@ -27,7 +27,7 @@ class AuditLog:
         on_trouble: called on the loop whenever `trouble` changes
     """
 
-    def __init__(self, file: AuditFile, earlier: list[AuditRecord]) -> None:
+    def __init__(self, file: RecordFile, earlier: list[AuditRecord]) -> None:
         self.tail = AuditTail(earlier)
         self.trouble = ""
         self.on_trouble: Callable[[str], None] = _ignore
@@ -76,13 +76,29 @@ class AuditLog:
 
 @contextmanager
 def open_audit_log(directory: StateDir, settings: Settings) -> Iterator[AuditLog]:
-    """Continues the numbers of the last run."""
-    with directory.own_log("audit") as path:
-        found = AuditLog(AuditFile(path, settings.audit_bytes, settings.audit_files), last_records(path))
+    """Continues the numbers of the last run. Without a place for it, records stay in memory; `trouble` says why."""
+    with ExitStack() as opened:
         try:
-            yield found
-        finally:
-            found.close()
+            path = opened.enter_context(directory.own_log("audit"))
+        except StateDirUnusable as error:
+            found = AuditLog(_Nowhere(error.reason), [])
+        else:
+            found = AuditLog(AuditFile(path, settings.audit_bytes, settings.audit_files), last_records(path))
+        opened.callback(found.close)
+        yield found
+
+
+class _Nowhere:
+    """Stands in for a file that cannot be had."""
+
+    def __init__(self, reason: str) -> None:
+        self._reason = reason
+
+    def write(self, records: list[AuditRecord]) -> None:
+        raise OSError(self._reason)
+
+    def close(self) -> None:
+        pass
 
 
 def _ignore(trouble: str) -> None:

@@ -251,7 +251,8 @@ async def _serve(
             watching = None if bridge is None else tasks.create_task(bridge.watch())
             url = listening_url(settings, listener)
             links = console_links(settings, url, state)
-            write_address(state.directory, url)
+            with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
+                write_address(state.directory, url)
             announcing = tasks.create_task(_announce(application.state.services, links, as_json))
             await stopping
             for task in (watching, announcing):

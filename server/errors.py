@@ -37,6 +37,7 @@ ConsoleError
     ├── RobotUnreachable
     ├── SceneUnavailable
     ├── ShuttingDown
+    ├── StateUnavailable    the state directory cannot be written
     └── TooManyPeers
 """
 
@@ -73,6 +74,7 @@ __all__ = [
     "RobotUnreachable",
     "SceneUnavailable",
     "ShuttingDown",
+    "StateUnavailable",
     "TokenInvalid",
     "TokenMissing",
     "TooManyInvitations",
@@ -249,6 +251,10 @@ class ShuttingDown(Unavailable):
     pass
 
 
+class StateUnavailable(Unavailable):
+    pass
+
+
 class TooManyPeers(Unavailable):
     pass
 
@@ -286,6 +292,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     RobotUnreachable: HttpError(503, "robot_unreachable", {"Retry-After": "1"}),
     SceneUnavailable: HttpError(503, "scene_unavailable", {"Retry-After": "5"}),
     ShuttingDown: HttpError(503, "shutting_down", {"Retry-After": "5"}),
+    StateUnavailable: HttpError(503, "state_unavailable", {"Retry-After": "5"}),
     TooManyPeers: HttpError(503, "too_many_peers", {"Retry-After": "5"}),
 }
 

@@ -4,11 +4,17 @@ import socket
 import time
 from typing import NamedTuple, get_args
 
+import structlog
+
 from robot_bridge.protocol.console import Role
+from server.invitations import Invitation, Invitations
 from server.settings import Settings
 from server.state import ConsoleState
+from server.state_dir import StateDirUnusable
 
 __all__ = ["ConsoleLinks", "console_link", "console_links", "listening_url"]
+
+log = structlog.get_logger(__name__)
 
 ANY = ("0.0.0.0", "::")
 
@@ -48,9 +54,15 @@ def listening_url(settings: Settings, listener: socket.socket) -> str:
 def console_links(settings: Settings, console: str, state: ConsoleState) -> ConsoleLinks:
     """One link for each role: the same as at the last start, while they are good for long enough."""
     now = time.time()
-    made = state.invitations.update(
-        lambda known: {role: known.for_start(role, settings.token_seconds, now) for role in get_args(Role)}
-    )
+
+    def for_start(known: Invitations) -> dict[Role, Invitation]:
+        return {role: known.for_start(role, settings.token_seconds, now) for role in get_args(Role)}
+
+    try:
+        made = state.invitations.update(for_start)
+    except StateDirUnusable as error:
+        log.error("the links that are printed cannot be revoked and end with this console", detail=str(error))
+        made = for_start(Invitations(state.invitations.known.all))
     links = {role: console_link(console, state.access.sign(each.identity, each.created)) for role, each in made.items()}
     return ConsoleLinks(console=console, robot=settings.robot, **links)
 

@@ -15,7 +15,7 @@ from robot_bridge.protocol.messages import Stop
 from server.access import Identity
 from server.invitation_store import InvitationStore
 from server.invitations import MAX_LIVE
-from server.state_dir import StateDir
+from server.state_dir import StateDir, StateDirUnusable
 from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_console, running_rig
 
 NOWHERE = 1  # a port where no robot bridge is
@@ -93,6 +93,32 @@ async def test_there_are_only_so_many() -> None:
         rig.services.state.invitations.update(fill)
         answer = await _invite(rig, "operator")
         assert (answer.status_code, answer.json()["error"]) == (409, "too_many_invitations")
+
+
+async def test_a_disk_that_is_full_is_said_by_name_and_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise StateDirUnusable(Path("state"), "No space left on device")
+
+    async with running_console(NOWHERE) as rig:
+        made = (await _invite(rig, "operator")).json()
+        monkeypatch.setattr(rig.services.state.directory, "write", full)
+        refused = await _invite(rig, "operator")
+        assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
+        refused = await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
+        assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
+        assert (await rig.http.get("/api/session", headers=_bearer(made["link"]))).status_code == 200
+        monkeypatch.undo()
+        assert (await _invite(rig, "operator")).status_code == 201
+
+
+async def test_a_console_without_a_place_for_its_audit_goes_on_and_says_so(tmp_path: Path) -> None:
+    (tmp_path / "audit.lock").mkdir()
+    async with running_rig(state_dir=tmp_path) as rig, rig.peer("operator") as peer:
+        notice = await peer.until(lambda each: isinstance(each, Notice) and "audit" in each.text)
+        assert isinstance(notice, Notice)
+        page = (await rig.http.get("/api/audit", headers=rig.token("supervisor"))).json()
+        assert page["trouble"]
+        assert page["records"][0]["kind"] == "start"
 
 
 async def test_revoking_closes_the_peers_at_once_and_the_link_says_so_by_name() -> None:
@@ -177,7 +203,7 @@ async def test_the_audit_has_pages_and_the_event_references() -> None:
         for _ in range(20):
             await rig.http.post("/api/stop", headers=observer)
             await asyncio.sleep(0.01)
-        await eventually(lambda: any(record.kind == "stop" and record.count > 1 for record in rig.services.audit))
+        await eventually(lambda: any(record.what == "http, again" for record in rig.services.audit))
         headers = rig.token("supervisor")
         page = (await rig.http.get("/api/audit?after=0&limit=2", headers=headers)).json()
         assert [record["n"] for record in page["records"]] == [1, 2]

@@ -8,6 +8,7 @@ from server.links import console_links, listening_url
 from server.serve import PortTaken, bind
 from server.settings import Settings
 from server.state import ConsoleState, open_state
+from server.state_dir import StateDirUnusable
 
 
 @pytest.fixture
@@ -48,6 +49,18 @@ def test_the_next_start_prints_the_same_links_until_one_is_revoked(state: Consol
     again = console_links(Settings(), "http://here", state)
     assert again.observer != links.observer
     assert again.operator == links.operator
+
+
+def test_a_full_disk_does_not_keep_the_links_from_being_printed(
+    state: ConsoleState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise StateDirUnusable(Path("state"), "No space left on device")
+
+    monkeypatch.setattr(state.directory, "write", full)
+    links = console_links(Settings(), "http://here", state)
+    assert state.access.verify(links.supervisor.partition("=")[2]).role == "supervisor"
+    assert state.invitations.known.all == []
 
 
 def test_people_get_the_links_and_are_told_what_they_are_for(state: ConsoleState) -> None:
