@@ -73,7 +73,7 @@ class ConsoleProxy:
         except httpx.TransportError as error:
             response = PlainTextResponse(f"the console does not answer: {error or type(error).__name__}", 502)
         await sleep_until(paths["to_operator"].admit(time.monotonic(), HEADERS_SIZE))
-        if request.method == "DELETE":
+        if request.method == "DELETE" and response.status_code < 400:
             self._sessions.end(request.url.path)
         return response
 

@@ -33,6 +33,7 @@ class Console:
         self.headers: list[dict[str, str]] = []
         self.answer = ANSWER
         self.status = 201
+        self.delete_status = 200
 
     async def any(self, request: Request) -> Response:
         query = f"?{request.url.query}" if request.url.query else ""
@@ -42,6 +43,8 @@ class Console:
             return Response(
                 self.answer, self.status, {"Location": "/whep/1", "ETag": '"e"'}, media_type="application/sdp"
             )
+        if request.method == "DELETE":
+            return Response(None, self.delete_status)
         if request.url.path == "/stream":
             return StreamingResponse(self._chunks(), media_type="text/plain")
         if request.url.path == "/moved":
@@ -136,6 +139,10 @@ async def test_a_session_is_led_through_a_relay_that_ends_with_it() -> None:
         assert door != 4000
         assert is_taken(door)
         assert network.statistics().clients == 1
+        console.delete_status = 404
+        await browser.delete("/whep/1")
+        assert is_taken(door), "a refused request ends nothing"
+        console.delete_status = 200
         await browser.delete("/whep/1")
         assert not is_taken(door)
 
