@@ -98,7 +98,7 @@ def last_records(path: Path) -> list[AuditRecord]:
         try:
             with open(each, "rb") as file:
                 file.seek(max(0, os.fstat(file.fileno()).st_size - TAIL_BYTES))
-                found += _parsed(file)
+                found += _parsed(iter(file.read(TAIL_BYTES).splitlines()))
         except OSError:
             continue
     return found
