@@ -1,0 +1,48 @@
+"""docs/security.md names only what exists, and every setting of the limits with its true default."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from server.limit_settings import LimitSettings
+from server.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "security.md").read_text()
+NAMED = sorted(set(re.findall(r"`(tests/[\w/.]+)::(\w+)`", TEXT)))
+LIMITS = TEXT.split("## Limits")[1].split("\n## ")[0]
+
+
+def test_every_threat_has_a_measure_and_a_test() -> None:
+    rows = re.findall(r"^\| (.+) \| (.+) \| (.+) \|$", TEXT.split("## Threats")[1].split("\n## ")[0], re.MULTILINE)
+    assert len(rows) > 20
+    for threat, measure, tests in rows[1:]:
+        assert measure
+        assert "::" in tests, threat
+
+
+@pytest.mark.parametrize(("path", "name"), NAMED, ids=lambda value: str(value))
+def test_every_test_that_is_named_exists(path: str, name: str) -> None:
+    assert re.search(rf"^(?:async )?def {name}\(", (ROOT / path).read_text(), re.MULTILINE)
+
+
+def test_every_limit_is_in_the_table_with_its_default() -> None:
+    for name in LimitSettings.model_fields:
+        row = next((line for line in LIMITS.splitlines() if f"`{name.upper()}`" in line), None)
+        assert row is not None, name
+        default = Settings.model_fields[name].default
+        assert re.search(rf"\b{default:g}\b", row.split("|")[2]), f"{name} is {default:g}"
+
+
+def test_the_check_looks_up_every_locked_package() -> None:
+    recipe = re.search(r"^check:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert recipe is not None
+    assert "scripts.audit" in recipe[1]
+    assert "requirements-dev.lock" in (ROOT / "scripts" / "audit.py").read_text()
+    assert all("--hash=" in part for part in _packages(ROOT / "requirements-dev.lock"))
+
+
+def _packages(lock: Path) -> list[str]:
+    """The text of each package: it begins at the start of a line, what belongs to it is indented."""
+    return re.findall(r"^[a-zA-Z0-9][^\n]*(?:\n[ \t][^\n]*)*", lock.read_text(), re.MULTILINE)
