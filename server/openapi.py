@@ -34,6 +34,7 @@ from server.errors import (
     RobotUnreachable,
     SceneUnavailable,
     ShuttingDown,
+    StateUnavailable,
     TokenInvalid,
     TokenMissing,
     TooManyInvitations,
@@ -126,12 +127,12 @@ OPERATIONS: tuple[Operation, ...] = (
     Operation("get", "/api/invitations", "Whom one has invited.", 200, InvitationList, (NotAllowed,)),
     Operation(
         *("post", "/api/invitations", "Invite a person.", 201, NewInvitation),
-        errors=(NotAllowed, BadParameter, TooManyInvitations, *WITH_JSON),
+        errors=(NotAllowed, BadParameter, TooManyInvitations, StateUnavailable, *WITH_JSON),
         body=InvitationRequest,
     ),
     Operation(
         *("delete", "/api/invitations/{invitation_id}", "Revoke, and end whoever came with it.", 200, InvitationList),
-        errors=(NotAllowed, NotFound),
+        errors=(NotAllowed, NotFound, StateUnavailable),
         parameters=(INVITATION,),
     ),
     Operation(
