@@ -95,7 +95,9 @@ class VideoAssembler:
         self._start: int | None = None  # sequence number that begins the next frame
         self._end = 0  # the first one after `_start` that is not there
         self._highest = 0
-        self._gap_since: float | None = None
+        self._gap_since: float | None = None  # since when the first missing packet has held up all others
+        self._gap_at = 0  # that packet
+        self._open_since: float | None = None  # since when packets have been missing at all
         self._asked_at = float("-inf")
         self._needs_keyframe = True
         self._keyframe_due = float("inf")
@@ -120,8 +122,8 @@ class VideoAssembler:
         """Sequence numbers to ask for once more; the first request is made when a gap opens."""
         if (
             self._start is None
-            or self._gap_since is None
-            or now - max(self._gap_since, self._asked_at) < max(RETRY, 1.1 * self.round_trip)
+            or self._open_since is None
+            or now - max(self._open_since, self._asked_at) < max(RETRY, 1.1 * self.round_trip)
         ):
             return []
         self._asked_at = now
@@ -147,7 +149,7 @@ class VideoAssembler:
     def _begin_at(self, sequence: int) -> None:
         self._packets.clear()
         self._start = self._end = self._highest = sequence
-        self._gap_since = None
+        self._gap_since = self._open_since = None
 
     def _give_up(self, sequence: int) -> None:
         """Start again at `sequence`, with a keyframe."""
@@ -165,9 +167,12 @@ class VideoAssembler:
     def _note_gap(self, now: float) -> None:
         waiting = self._offset(self._end) < len(self._packets)
         if not waiting:
-            self._gap_since = None
-        elif self._gap_since is None:
-            self._gap_since = now
+            self._gap_since = self._open_since = None
+            return
+        if self._open_since is None:
+            self._open_since = now
+        if self._gap_since is None or self._gap_at != self._end:  # over a long path one gap opens before another closes
+            self._gap_since, self._gap_at = now, self._end
 
     def _complete(self) -> list[EncodedFrame]:
         frames: list[EncodedFrame] = []

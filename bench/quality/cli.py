@@ -1,4 +1,4 @@
-"""`python -m bench.quality delay` and `python -m bench.quality freezes`: the controller and the repair of losses."""
+"""`python -m bench.quality delay | freezes | repair`: the controller and the repair of losses."""
 
 import asyncio
 import json
@@ -10,6 +10,7 @@ import typer
 
 from bench.emulator import Profile, load_profile, parse_profile
 from bench.machine import busy_percent
+from bench.quality.repair import simulate
 from bench.quality.stage import driving, running_console
 from bench.quality.summary import summarise, timeline
 
@@ -86,6 +87,32 @@ def freezes(
         found = asyncio.run(_drive(parse_profile(text, "--loss"), True, seconds, tolerance, seed, robot, codec))
         results[f"{percent:g} %"] = found["summary"]
         print(f"{percent:g} % lost: {_line(found['summary'])}", file=sys.stderr, flush=True)
+    _publish(results, json_to)
+
+
+@app.command()
+def repair(
+    losses: Annotated[list[float] | None, typer.Argument(help="Percent; 1, 3, 5 and 10 unless set.")] = None,
+    seconds: Seconds = 600.0,
+    seed: Seed = 1,
+    round_trip_ms: Annotated[float, typer.Option(min=0, help="Of the network.")] = 60.0,
+    burst: Annotated[float, typer.Option(min=1, help="Packets that are lost together, on average.")] = 1.0,
+    json_to: JsonTo = "",
+) -> None:
+    """Freezes per minute by packet loss in both directions, with and without retransmission, in simulated time."""
+    results: dict[str, Any] = {}
+    for percent in losses or [1.0, 3.0, 5.0, 10.0]:
+        for retransmit, name in ((False, "keyframes only"), (True, "repaired")):
+            found = simulate(
+                loss=percent / 100,
+                round_trip=round_trip_ms / 1000,
+                seconds=seconds,
+                seed=seed,
+                burst=burst,
+                retransmit=retransmit,
+            ).figures(seconds)
+            results.setdefault(f"{percent:g} %", {})[name] = found
+            print(f"{percent:g} % lost, {name}: {_line(found)}", file=sys.stderr, flush=True)
     _publish(results, json_to)
 
 

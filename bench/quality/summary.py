@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 
+from bench.quality.freezes import freezes
 from bench.quality.stage import Drive
 from bench.samples import quantile
 
 __all__ = ["summarise", "timeline"]
-
-FREEZE_EXTRA, FREEZE_TIMES = 0.150, 3.0  # W3C webrtc-stats, freezeCount: longer than max(3 d, d + 150 ms)
-WINDOW = 30  # pictures over which the usual interval d is taken
 
 
 def summarise(drive: Drive, seconds: float) -> dict[str, float | int | None]:
@@ -34,18 +32,6 @@ def summarise(drive: Drive, seconds: float) -> dict[str, float | int | None]:
         "frozen_seconds_per_minute": round(sum(frozen) * 60 / seconds, 2),
         "largest_gap": max((abs(picture.gap) for picture in drive.pictures), default=None),
     }
-
-
-def freezes(times: Sequence[float]) -> list[float]:
-    """Lengths in s of the intervals between pictures that count as freezes."""
-    found = []
-    for i in range(1, len(times)):
-        before = times[max(0, i - WINDOW) : i]
-        usual = (before[-1] - before[0]) / (len(before) - 1) if len(before) > 1 else 0.033
-        interval = times[i] - times[i - 1]
-        if interval > max(FREEZE_TIMES * usual, usual + FREEZE_EXTRA):
-            found.append(interval)
-    return found
 
 
 def timeline(drive: Drive, seconds: float, step: float = 0.5) -> dict[str, list[float | None]]:

@@ -4,7 +4,7 @@ __all__ = ["KeyframeScheduler"]
 
 JOIN_BURST = 3
 BACKOFF = 1.6  # times the spacing, for each request that comes soon after it could be served
-MOST_SPACING = 3.0  # s
+MOST_SPACING = 1.0  # s
 SOON = 2.0  # spacings
 
 

@@ -158,3 +158,13 @@ def test_over_a_satellite_a_lost_packet_is_asked_for_once_a_round_trip_and_waite
     assert len(assembler.add(lost, 11.25)) == 2
     assert assembler.lost == 0
     assert not assembler.wants_keyframe(11.3)
+
+
+def test_gaps_that_follow_one_another_over_a_long_path_are_not_one_long_gap() -> None:
+    assembler = VideoAssembler(is_keyframe)
+    assembler.round_trip = 0.6
+    packets = packets_of([1] * 120)  # 4 s at 30 Hz, of which every tenth comes a round trip late
+    arrivals = [(i / 30 + (0.6 if i % 10 == 9 else 0.0), packet) for i, packet in enumerate(packets)]
+    frames = [frame for at, packet in sorted(arrivals, key=lambda each: each[0]) for frame in assembler.add(packet, at)]
+    assert len(frames) == 120
+    assert assembler.lost == 0

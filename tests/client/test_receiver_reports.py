@@ -1,6 +1,6 @@
 import pytest
 from aiortc.rtp import RtcpPacket, RtcpReceiverInfo, RtcpRrPacket
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from client.receiver_reports import ReceiverReports
@@ -85,6 +85,7 @@ def test_every_stream_has_a_block_and_strangers_have_none() -> None:
     assert [block.ssrc for block in blocks(reports)] == [VIDEO, SOUND]
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=60))
 def test_no_control_packet_breaks_it(data: bytes) -> None:
     watching().control(data, 0.0)

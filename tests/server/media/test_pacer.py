@@ -1,4 +1,4 @@
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.media.pacer import BURST_BYTES, FREE_BPS, HEADROOM, Pacer
@@ -34,6 +34,7 @@ def test_without_a_limit_a_keyframe_takes_milliseconds() -> None:
     assert 0 < seconds_for(Pacer(), 50) < 50 * len(PACKET) * 8 / FREE_BPS
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(0, 0.1), st.integers(1, 1500)), max_size=200), st.floats(50_000, 1e7))
 def test_no_more_leaves_than_the_rate_and_one_burst(packets: list[tuple[float, int]], rate: float) -> None:
     pacer = Pacer()

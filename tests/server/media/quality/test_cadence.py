@@ -1,5 +1,5 @@
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.media.quality.cadence import Cadence
@@ -18,6 +18,7 @@ def test_pictures_come_at_the_wanted_rate(wanted: float, count: int) -> None:
     assert len(taken(wanted, 30.0, 10.0)) == pytest.approx(count, abs=1)
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-0.01, 0.01), min_size=1, max_size=7))
 def test_a_camera_that_jitters_is_thinned_all_the_same(jitter: list[float]) -> None:
     assert len(taken(10.0, 30.0, 10.0, jitter)) == pytest.approx(100, abs=2)

@@ -1,4 +1,4 @@
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.media.quality.expected_loss import PATIENCE, STEPS, ExpectedLoss
@@ -22,6 +22,7 @@ def test_less_loss_is_expected_a_step_at_a_time() -> None:
     assert expected.update(0.0, 9 * PATIENCE) == 5
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(0, 1), st.floats(0, 100)), max_size=50))
 def test_it_is_always_one_of_the_steps(reports: list[tuple[float, float]]) -> None:
     expected, now = ExpectedLoss(10), 0.0

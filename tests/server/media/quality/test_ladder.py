@@ -1,4 +1,4 @@
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.media.quality.ladder import MIN_FRAME_RATE, SCALES, UP_AFTER, PictureLadder
@@ -41,6 +41,7 @@ def test_a_small_camera_is_not_made_smaller_than_a_person_can_use() -> None:
     assert PictureLadder().plan(5_000, 15.0, (160, 80), 0.0).scale == 1.0
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(1_000, 2e7), st.floats(0.01, 20)), min_size=1, max_size=20), st.floats(1, 120))
 def test_plans_stay_within_what_the_camera_gives(steps: list[tuple[float, float]], frame_rate: float) -> None:
     ladder, now = PictureLadder(), 0.0
@@ -54,6 +55,7 @@ def test_plans_stay_within_what_the_camera_gives(steps: list[tuple[float, float]
         assert abs(width / height - 4 / 3) < 0.03
 
 
+@settings(deadline=None)
 @given(st.integers(8, 2000).map(lambda n: 2 * n), st.integers(8, 2000).map(lambda n: 2 * n), st.sampled_from(SCALES))
 def test_scaled_sizes_are_even_and_keep_the_aspect_ratio(width: int, height: int, scale: float) -> None:
     smaller = scaled_size(width, height, scale)

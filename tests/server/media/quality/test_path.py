@@ -178,6 +178,7 @@ def test_on_any_steady_path_the_queue_is_short_once_it_is_known(capacity: float,
     assert course.mean_sent(after=15) > 0.6 * useful
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.sampled_from("rselq"), st.floats(0, 1e9, allow_nan=False)), max_size=60))
 def test_no_report_breaks_it(inputs: list[tuple[str, float]]) -> None:
     path = PathController(LIMITS, 0.0)

@@ -1,0 +1,156 @@
+"""Losses and their repair in simulated time: the console's and the client's own cores on either end of a lossy path.
+
+What is measured does not depend on how busy the machine is, and a seed repeats it exactly. The pictures are sizes
+only: two packets each, keyframes of six, at 30 Hz, as of 640x480 at about 500 kbit/s.
+"""
+
+import heapq
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import count
+
+from aiortc.rtcrtpreceiver import NackGenerator
+from aiortc.rtp import RtpPacket
+
+from bench.quality.freezes import freezes
+from client.frame_assembler import MediaPacket, VideoAssembler
+from server.media.frame import EncodedFrame
+from server.media.header_extensions import ExtensionWriter
+from server.media.keyframes import KeyframeScheduler
+from server.media.packet_stream import PacketStream, StreamParameters
+
+__all__ = ["Repaired", "simulate"]
+
+FRAME_RATE = 30
+PACKETS, KEYFRAME_PACKETS = 2, 6
+MEDIA, AGAIN = 97, 98  # payload types
+PARAMETERS = StreamParameters(
+    ssrc=1, rtx_ssrc=2, payload_type=MEDIA, rtx_payload_type=AGAIN, clock_rate=90_000, cname="", trailer=False
+)
+
+
+@dataclass
+class Repaired:
+    """What came of it."""
+
+    shown: list[float] = field(default_factory=list)  # s; when each picture was complete
+    pictures: int = 0  # sent
+    keyframes: int = 0
+    packets: int = 0  # sent, without the repeated ones
+    repeated: int = 0
+    keyframe_requests: int = 0
+
+    def figures(self, seconds: float) -> dict[str, float | int]:
+        frozen = freezes(self.shown)
+        return {
+            "pictures_sent": self.pictures,
+            "pictures_shown_percent": round(len(self.shown) / self.pictures * 100, 2),
+            "freezes_per_minute": round(len(frozen) * 60 / seconds, 2),
+            "frozen_seconds_per_minute": round(sum(frozen) * 60 / seconds, 2),
+            "longest_freeze_s": round(max(frozen, default=0.0), 2),
+            "keyframes_per_minute": round(self.keyframes * 60 / seconds, 1),
+            "keyframe_requests": self.keyframe_requests,
+            "packets_repeated_percent": round(self.repeated / self.packets * 100, 2),
+        }
+
+
+def simulate(
+    *, loss: float, round_trip: float, seconds: float, seed: int, burst: float = 1.0, retransmit: bool = True
+) -> Repaired:
+    """Send pictures for so long; `burst` is how many packets are lost together, on average."""
+    simulation = _Simulation(loss, round_trip, random.Random(seed), burst, retransmit)
+    return simulation.run(seconds)
+
+
+class _Simulation:
+    def __init__(self, loss: float, round_trip: float, draw: random.Random, burst: float, retransmit: bool) -> None:
+        self._one_way = round_trip / 2
+        self._draw = draw
+        self._enter = loss / (1 - loss) / burst  # chance that a spell of loss begins with a packet
+        self._leave = 1 / burst
+        self._losing = {"down": False, "up": False}
+        self._retransmit = retransmit
+        self._agenda: list[tuple[float, int, Callable[[float], None]]] = []
+        self._order = count()
+        self._server = PacketStream(PARAMETERS, ExtensionWriter({}, ""))
+        self._server.stats.round_trip_ms = round_trip * 1000
+        self._keyframes = KeyframeScheduler(10.0, 0.3)
+        self._client = VideoAssembler(lambda data: data[:1] == b"K")
+        self._client.round_trip = round_trip
+        self._nacks = NackGenerator()
+        self._found = Repaired()
+
+    def run(self, seconds: float) -> Repaired:
+        for number in range(int(seconds * FRAME_RATE)):
+            self._at(number / FRAME_RATE, self._picture)
+        while self._agenda:
+            now, _, action = heapq.heappop(self._agenda)
+            action(now)
+        self._found.packets = self._server.stats.packets
+        self._found.repeated = self._server.stats.retransmitted
+        return self._found
+
+    def _at(self, when: float, action: Callable[[float], None]) -> None:
+        heapq.heappush(self._agenda, (when, next(self._order), action))
+
+    def _pass(self, direction: str, now: float, action: Callable[[float], None]) -> None:
+        """Over the path, unless it is lost: a two-state chain (Gilbert)."""
+        losing = self._losing[direction]
+        chance = self._leave if losing else self._enter
+        if self._draw.random() < chance:
+            self._losing[direction] = losing = not losing
+        if not losing:
+            self._at(now + self._one_way, action)
+
+    # at the console
+
+    def _picture(self, now: float) -> None:
+        keyframe = self._keyframes.take(now)
+        size = KEYFRAME_PACKETS if keyframe else PACKETS
+        kind = b"K" if keyframe else b"D"
+        frame = EncodedFrame(
+            b"",
+            lambda data, trailer: [kind] * size,
+            keyframe=keyframe,
+            marker=True,
+            stamp=1,
+            capture_time=now,
+            media_time=round(now * 90_000),
+        )
+        self._found.pictures += 1
+        self._found.keyframes += keyframe
+        for packet in self._server.packets(frame, now):
+            self._send(packet, now)
+
+    def _send(self, packet: bytes, now: float) -> None:
+        self._pass("down", now, lambda then: self._arrived(packet, then))
+
+    def _nacked(self, missing: list[int], now: float) -> None:
+        for sequence in missing if self._retransmit else ():
+            packet = self._server.retransmission(sequence, now)
+            if packet is not None:
+                self._send(packet, now)
+
+    def _asked_for_keyframe(self, now: float) -> None:
+        self._found.keyframe_requests += 1
+        self._at(now + self._server.repair_time(now), lambda then: self._keyframes.request())
+
+    # at the client
+
+    def _arrived(self, data: bytes, now: float) -> None:
+        packet = RtpPacket.parse(data)
+        payload = packet.payload
+        if packet.payload_type == AGAIN:
+            packet.sequence_number, payload = int.from_bytes(payload[:2], "big"), payload[2:]
+        if self._nacks.add(packet):
+            self._ask(sorted(self._nacks.missing), now)
+        medium = MediaPacket(packet.sequence_number, packet.timestamp, bool(packet.marker), payload, 1)
+        self._found.shown += [now] * len(self._client.add(medium, now))
+        if missing := self._client.missing(now):
+            self._ask(missing, now)
+        if self._client.wants_keyframe(now):
+            self._pass("up", now, self._asked_for_keyframe)
+
+    def _ask(self, missing: list[int], now: float) -> None:
+        self._pass("up", now, lambda then: self._nacked(missing, then))

@@ -1,0 +1,49 @@
+"""What `python -m bench.quality` counts, and the repair of losses in simulated time."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from bench.quality.cli import app
+from bench.quality.freezes import freezes
+from bench.quality.repair import simulate
+
+
+def test_an_interval_much_longer_than_usual_is_a_freeze() -> None:
+    times = [i / 30 for i in range(60)] + [2.5 + i / 30 for i in range(30)]
+    assert freezes(times) == [pytest.approx(2.5 - 59 / 30)]
+    assert freezes([i / 5 for i in range(50)]) == []
+    assert freezes([]) == []
+
+
+@pytest.mark.parametrize(("loss", "most"), [(0.01, 2), (0.03, 6), (0.05, 12), (0.10, 30)])
+def test_lost_packets_are_repaired_before_a_person_sees_much_of_it(loss: float, most: float) -> None:
+    figures = simulate(loss=loss, round_trip=0.06, seconds=60, seed=3).figures(60)
+    assert figures["pictures_shown_percent"] > 99
+    assert figures["freezes_per_minute"] <= most
+    assert figures["longest_freeze_s"] < 0.7
+    assert figures["keyframes_per_minute"] < 8  # six come by themselves
+
+
+def test_over_a_satellite_pictures_are_late_but_not_given_up() -> None:
+    figures = simulate(loss=0.05, round_trip=0.6, seconds=60, seed=3).figures(60)
+    assert figures["pictures_shown_percent"] > 85
+    assert figures["keyframe_requests"] < 10
+
+
+def test_without_retransmission_keyframes_are_no_storm() -> None:
+    found = simulate(loss=0.1, round_trip=0.06, seconds=60, seed=3, retransmit=False)
+    assert found.repeated == 0
+    assert found.keyframes <= 62
+
+
+def test_a_seed_repeats_a_simulation() -> None:
+    first, again = (simulate(loss=0.05, round_trip=0.1, seconds=20, seed=5, burst=4) for _ in range(2))
+    assert first == again
+
+
+def test_the_command_writes_json() -> None:
+    result = CliRunner().invoke(app, ["repair", "5", "--seconds", "10", "--json", "-"])
+    assert result.exit_code == 0
+    assert set(json.loads(result.stdout)["5 %"]) == {"keyframes only", "repaired"}
