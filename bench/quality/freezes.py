@@ -11,9 +11,9 @@ WINDOW = 30  # pictures over which the usual interval d is taken
 def freezes(times: Sequence[float]) -> list[float]:
     """Lengths in s of the intervals between pictures that count as freezes."""
     found = []
-    for i in range(1, len(times)):
+    for i in range(2, len(times)):  # of the first interval it cannot be told
         before = times[max(0, i - WINDOW) : i]
-        usual = (before[-1] - before[0]) / (len(before) - 1) if len(before) > 1 else 0.033
+        usual = (before[-1] - before[0]) / (len(before) - 1)
         interval = times[i] - times[i - 1]
         if interval > max(TIMES * usual, usual + EXTRA):
             found.append(interval)
