@@ -9,6 +9,13 @@ from tests.support.stack import Stack
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
 
+# What can have the focus while a dialogue is open: it, and what has to stay in reach.
+REACHABLE = """(() => {
+  const focused = document.activeElement;
+  return focused === document.body || focused.closest("dialog, .seat, .banner, .stop") !== null;
+})()"""
+
+
 async def _tab(console: ConsolePage, name: str) -> None:
     await console.page.get_by_role("tab", name=name).click()
 
@@ -129,6 +136,11 @@ async def test_an_operator_invites_observers_and_operators_only(stack: Stack, ch
         await dee.until("s.connected")
         await _invite(ann, "Operator", "Ben")
         assert await _dialogue(ann).get_by_role("button", name="Supervisor", exact=True).count() == 0
+        for _ in range(12):
+            await ann.page.keyboard.press("Tab")
+            assert await ann.page.evaluate(REACHABLE), "focus left the dialogue for something that it covers"
+        await _dialogue(ann).get_by_role("button", name="Close").click()
+        assert await ann.page.evaluate("document.activeElement.textContent") == "Invite…"
         await _tab(dee, "People")
         assert await dee.page.get_by_role("button", name="Invite…").count() == 0
 

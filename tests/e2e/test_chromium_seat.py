@@ -3,6 +3,7 @@
 The robot rests in between.
 """
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,12 @@ def _seat(console: ConsolePage) -> Locator:
 
 
 async def _says(console: ConsolePage, words: str) -> None:
-    await _seat(console).get_by_text(words).first.wait_for(timeout=10_000)
+    await _seat(console).get_by_text(words).first.wait_for(timeout=30_000)
+
+
+async def _all_say(*expected: tuple[ConsolePage, str]) -> None:
+    """News stand only for a while, so all pages are watched at once."""
+    await asyncio.gather(*(_says(console, words) for console, words in expected))
 
 
 async def _drives(console: ConsolePage) -> None:
@@ -61,10 +67,12 @@ async def test_a_granted_request_hands_over_a_robot_at_rest_and_events_go_on(sta
         assert (await ann.stats())["driving"], "being asked disturbs nobody"
         before = (await ann.stats())["event"]
         await ann.page.keyboard.press("F8")
+        await _all_say(
+            (ann, "You handed control to Ben"),
+            (ben, "Ann handed control to you. Arm to drive"),
+            (watcher, "Ann handed control to Ben"),
+        )
         await _lost_the_seat(ann)
-        await _says(ann, "You handed control to Ben")
-        await _says(ben, "Ann handed control to you. Arm to drive")
-        await _says(watcher, "Ann handed control to Ben")
         await _drives_after_arming(ben)
         assert (await ben.stats())["event"] > before
     executed = [record["event"] for record in stack.events("executed")]
@@ -98,9 +106,8 @@ async def test_a_supervisor_takes_control_with_one_click_and_drives_after_arming
         assert not (await sue.stats())["seat"]["mine"], "a supervisor's page takes nothing by itself"
         assert await sue.page.get_by_role("button", name="Arm", exact=True).count() == 0
         await _button(sue, "Take control").click()
+        await _all_say((ann, "Sue took control from you"), (sue, "You took control from Ann. Arm to drive"))
         await _lost_the_seat(ann)
-        await _says(ann, "Sue took control from you")
-        await _says(sue, "You took control from Ann. Arm to drive")
         await _drives_after_arming(sue)
         await sue.press(RB, False)
         await sue.until("s.at_rest === true")
