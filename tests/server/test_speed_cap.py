@@ -6,6 +6,7 @@ from robot_bridge.protocol.console import Report, SpeedCapMode, SpeedCapState
 from robot_bridge.protocol.description import Axis
 from robot_bridge.protocol.messages import Command, Feedback
 from server.speed_cap import REMEMBERED, STALE, WINDOW, SpeedCap, within_share
+from tests.client.vectors import load_vectors
 
 AXIS = Axis(name="grip", label="Grip", unit="m/s", minimum=-1.0, maximum=2.0, slew=1, brake=10, rest=0.5)
 
@@ -25,11 +26,9 @@ def answer(cap: SpeedCap, *, left_at: float, came_at: float, holder: str = "ada"
     cap.answered(holder, event, Command(event=event + 1, issue=1, values=[0.0]), came_at)
 
 
-@pytest.mark.parametrize(
-    ("delay_ms", "share"), [(0.0, 1.0), (50.0, 1.0), (200.0, 1.0), (400.0, 0.5), (1000.0, 0.2), (10_000.0, 0.02)]
-)
-def test_the_speed_falls_with_the_reported_delay_beyond_0_2_s(delay_ms: float, share: float) -> None:
-    assert cap_with(delay_ms).share(0.1) == pytest.approx(share)
+@pytest.mark.parametrize("case", load_vectors("speed_cap.json")["shares"], ids=lambda case: str(case["delay_ms"]))
+def test_the_speed_falls_with_the_reported_delay_beyond_0_2_s(case: dict[str, float]) -> None:
+    assert cap_with(case["delay_ms"]).share(0.1) == pytest.approx(case["share"])
 
 
 @pytest.mark.parametrize("delay_ms", [None, -1.0, math.nan])

@@ -2,6 +2,11 @@ import { describe, expect, it } from "vitest";
 import { createLatency, noteCommandSent, notePicture, type Latency } from "../../src/core/latency";
 import { capHolds, capIsChoice, cappedShare, speedShare, viewDelay } from "../../src/core/speed_cap";
 import type { SpeedCapState } from "../../src/wire";
+import { readVectors } from "../vectors";
+
+const vectors = readVectors("speed_cap") as {
+  readonly shares: readonly { readonly delay_ms: number | null; readonly share: number }[];
+};
 
 function console(mode: SpeedCapState["mode"], rest: Partial<SpeedCapState> = {}): SpeedCapState {
   return { type: "speed_cap", mode, holds: mode === "on", share: 1, delay_ms: null, why: "", ...rest };
@@ -16,9 +21,12 @@ function shown(count: number, delayMs: number): Latency {
 }
 
 describe("the speed cap", () => {
-  it("slows down with the delay beyond 0.2 s, and a delay that is not known counts as one second", () => {
-    expect([0, 50, 200, 400, 2000, null].map(speedShare)).toEqual([1, 1, 1, 0.5, 0.1, 0.2]);
-  });
+  it.each(vectors.shares)(
+    "leaves $share of the speed with a delay of $delay_ms ms",
+    ({ delay_ms, share }) => {
+      expect(speedShare(delay_ms)).toBeCloseTo(share);
+    },
+  );
 
   it("goes by the pictures of late", () => {
     const latency = shown(20, 30);
