@@ -28,6 +28,7 @@ class SceneFences:
                 thickness_units="screen",
             )
             for number, fence in enumerate(description.geofences)
+            if len(fence.polygon) > 1  # the bridge checks it; a bridge of somebody else's may not
         }
         self._acting: frozenset[str] = frozenset()
 

@@ -1,9 +1,11 @@
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 import rich
 import viser
 
+from robot_bridge.protocol.description import Geofence
 from robot_bridge.protocol.messages import Feedback
 from robot_bridge.robots.planar.description import DESCRIPTION
 from robot_bridge.robots.planar.room import CHARGER
@@ -33,3 +35,10 @@ def test_every_zone_is_drawn_and_gets_thick_while_it_acts(server: viser.ViserSer
         model.pose(Feedback(**feedback, limits=acting))  # type: ignore[arg-type]
         assert lines["charger"].thickness == width
         assert lines["room"].thickness == CALM
+
+
+def test_a_zone_without_corners_is_left_out(server: viser.ViserServer) -> None:
+    empty = Geofence(name="empty", label="", kind="keep_in", polygon=())
+    model = SceneModel(server, msgspec.structs.replace(DESCRIPTION, geofences=(empty,)))
+    assert model.fences.lines == {}
+    model.fences.show(["empty"])
