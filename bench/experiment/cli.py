@@ -140,7 +140,7 @@ class _Session:
         try:
             return uvloop.run(work)
         except* (ProcessFailed, ConsoleError, TimeoutError) as errors:
-            why = f"{name}: {type(errors.exceptions[0]).__name__} {errors.exceptions[0]}"
+            why = f"{name}: {_reason(errors)}"
         _say(why)
         self._findings.failed.append(why)
         return None
@@ -160,6 +160,13 @@ class _Session:
             raise typer.Exit(EXIT_FAILED)
         if findings.broken:
             raise typer.Exit(EXIT_BROKEN)
+
+
+def _reason(error: BaseException) -> str:
+    """The first cause; task groups wrap what went wrong."""
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return f"{type(error).__name__} {error}".strip()
 
 
 def _fitted(choices: Choices) -> tuple[Profile, Choices]:
