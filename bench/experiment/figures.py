@@ -175,5 +175,6 @@ def growth_figure(growth: Growth) -> str:
             axes.set_title({"off": "no gate", "age": "gate by age (0.5 s)", "event": "event gate"}[gate])
             axes.set_xlabel("events a second")
             axes.set_ylabel("largest gap rendered (events)")
-        row[0].legend(title="delay added by the player", title_fontsize=8.5, loc="upper left")
+        handles, labels = row[0].get_legend_handles_labels()  # the last panel has room: its lines stay low
+        row[2].legend(handles, labels, title="delay added by the player", title_fontsize=8.5, loc="upper right")
         return _svg(figure)
