@@ -6,6 +6,7 @@ JOIN_BURST = 3
 BACKOFF = 1.6  # times the spacing, for each request that comes soon after it could be served
 MOST_SPACING = 1.0  # s
 SOON = 2.0  # spacings
+SPARING = 6.0  # times the interval
 
 
 class KeyframeScheduler:
@@ -19,6 +20,7 @@ class KeyframeScheduler:
     """
 
     def __init__(self, interval_seconds: float, spacing_seconds: float) -> None:
+        self.sparing = False  # keyframes that nobody asked for come six times more rarely: the path has no room
         self._interval = interval_seconds
         self._least_spacing = spacing_seconds
         self._spacing = spacing_seconds
@@ -53,7 +55,8 @@ class KeyframeScheduler:
             self._spacing = max(self._least_spacing, self._spacing / BACKOFF)
 
     def _wanted(self, now: float) -> bool:
-        if self._last is None or now - self._last >= self._interval:
+        interval = self._interval * (SPARING if self.sparing else 1)
+        if self._last is None or now - self._last >= interval:
             return True
         spacing = self._least_spacing if self._joined else self._spacing
         if (self._joined or self._requested) and now - self._last >= spacing:

@@ -122,11 +122,13 @@ class QualityDesk:
         tightest = min(leaders, key=lambda peer: peer.path.rate)
         streams = _streams(leaders)
         self._plan("operator", streams, tightest.path.rate, now)
+        limited = any(peer.path.limited for peer in leaders)
         pause = max(peer.path.paused_until for peer in leaders)
         for stream in streams:
             for output in stream.outputs_of("operator"):
                 output.paused_until = pause
-        whole = not any(peer.path.limited for peer in leaders) and all(
+                output.keyframes.sparing = limited
+        whole = not limited and all(
             plan.scale == 1.0 and plan.frame_rate >= stream.frame_rate
             for stream in streams
             if (plan := self._plans.get(("operator", stream.name))) is not None

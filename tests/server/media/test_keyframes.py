@@ -88,3 +88,13 @@ def test_after_some_rest_requests_are_served_soon_again() -> None:
         assert scheduler.take(30.0 + 10 * i)
     scheduler.request()
     assert any(scheduler.take(80.0 + i / FPS) for i in range(12))
+
+
+def test_a_path_without_room_is_spared_keyframes_that_nobody_asked_for() -> None:
+    scheduler = KeyframeScheduler(10, 0.3)
+    scheduler.sparing = True
+    scheduler.take(0.0)
+    assert taken(scheduler, 1.0, 58 * FPS) == []
+    assert scheduler.take(60.0)
+    scheduler.request()
+    assert scheduler.take(61.0)
