@@ -6,7 +6,7 @@ from playwright.async_api import Browser, Locator
 from tests.e2e.console_page import ConsolePage, open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
 
 
 # What can have the focus while a dialogue is open: it, and what has to stay in reach.

@@ -12,7 +12,7 @@ from playwright.async_api import Browser, Locator
 from bench.browsers.console_page import RB, ConsolePage, open_console
 from tests.support.stack import Stack, running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
 
 
 def _button(console: ConsolePage, name: str) -> Locator:

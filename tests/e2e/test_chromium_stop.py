@@ -6,7 +6,7 @@ from playwright.async_api import Browser
 from bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
 
 SCENE = '<input style="margin: 30vh 30vw">'  # takes the focus as viser does
 
