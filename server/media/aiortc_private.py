@@ -1,7 +1,8 @@
 """Private parts of aiortc and aioice under media and ICE; tests pin every one of them.
 
 Those under the data channels are in `server/data_transport_private.py`; what peers send is
-guarded in `server/media/receive_guard_private.py`; nothing else in the server touches any.
+guarded in `server/media/receive_guard_private.py` and `server/peer_guards_private.py`, ICE restarts are in
+`server/ice_restart_private.py`; nothing else in the server touches any.
 
 What is used and why:
 

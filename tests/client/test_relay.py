@@ -57,3 +57,25 @@ async def test_expired_and_forged_credentials_are_refused(tmp_path: Path, monkey
                 async with Console(link, relay_only=True, connect_seconds=1.5):
                     pass
         assert turn.says("401"), "and it was the credential that it refused"
+
+
+async def test_the_console_can_be_reached_by_a_relay_of_its_own_and_says_which_servers_there_are(
+    tmp_path: Path,
+) -> None:
+    async with running_turn_server(tmp_path) as turn:
+        stun = turn.uri.replace("turn:", "stun:").partition("?")[0]
+        settings = {"turn": turn.uri, "turn_secret": TURN_SECRET, "stun": stun, "ice_hosts": "127.0.0.1"}
+        async with running_rig(**settings, relay_console=True) as rig, rig.peer("observer") as peer:
+            assert "typ relay" in peer.pc.remoteDescription.sdp
+            told = (await rig.http.get("/api/ice", headers=peer.headers)).json()
+            assert [each["urls"] for each in told["ice_servers"]] == [[stun], [turn.uri]]
+            assert told["expires"] > time.time()
+            links = peer.answer_headers["link"]
+            assert f'<{stun}>; rel="ice-server", <{turn.uri}>; rel="ice-server"; username="' in links
+
+
+async def test_without_settings_there_are_no_servers() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        told = (await rig.http.get("/api/ice", headers=peer.headers)).json()
+        assert told == {"ice_servers": [], "expires": None}
+        assert "link" not in peer.answer_headers

@@ -87,6 +87,7 @@ class TestPeer:
         self.location = ""
         self.tag = ""  # of its ICE session
         self.headers: dict[str, str] = {}  # with its token
+        self.answer_headers = httpx.Headers()
         self._news = asyncio.Event()
 
     async def join(self, rig: Rig, headers: dict[str, str], labels: tuple[str, ...]) -> None:
@@ -101,6 +102,7 @@ class TestPeer:
         offer = await self.offer()
         answer = await rig.http.post("/whep", content=offer, headers={**headers, "Content-Type": "application/sdp"})
         assert answer.status_code == 201, answer.text
+        self.answer_headers = answer.headers
         self.headers, self.location, self.tag = headers, answer.headers["location"], answer.headers["etag"]
         await self.pc.setRemoteDescription(RTCSessionDescription(answer.text, "answer"))
         async with asyncio.timeout(PATIENCE):
