@@ -32,6 +32,7 @@ export function createPeoplePanel(app: ConsoleApp, tools: PeopleTools): Panel {
   let shown: readonly unknown[] = []; // what the lists were last made from
   const element = h("section", "people-panel", { "aria-label": "People" });
   element.append(toolRow, empty, leading, rename, crowdHead, watching);
+  for (const part of [toolRow, rename, crowdHead]) setHidden(part, true); // until it is known who may
 
   return {
     element,

@@ -43,6 +43,7 @@ export class Tabs implements Panel {
       tab.button.tabIndex = at === index ? 0 : -1;
       setHidden(tab.page, at !== index);
     }
+    if (this.element.isConnected) this.update(performance.now());
   }
 
   /** Only what is shown is kept current. */
