@@ -7,10 +7,10 @@ from contextlib import asynccontextmanager
 
 from playwright.async_api import Error
 
+from bench.browsers.chromium import open_page, running_chromium
+from bench.browsers.console_page import LEFT_Y, RB, START, ConsolePage
 from bench.experiment.browser import robot_description
 from robot_bridge.protocol.description import RobotDescription
-from tests.e2e.console_page import LEFT_Y, RB, START, ConsolePage
-from tests.support.chromium import open_page, running_chromium
 
 __all__ = ["BrowserStick", "browser_stick"]
 
