@@ -68,6 +68,8 @@ async def _plain(link: str) -> AsyncIterator[Callable[[], Counts]]:
         audio=False,
         codec="VP8",
         route=None,
+        tls_ca=None,
+        relay_only=False,
         on_message=lambda _: None,
     )
 

@@ -88,12 +88,16 @@ class BaselineServer:
     def _app(self) -> FastAPI:
         app = FastAPI()
         app.add_api_route("/", self._page, methods=["GET"])
+        app.add_api_route("/api/ice", self._ice_servers, methods=["GET"])  # the headless client asks first
         app.add_api_route("/whep", self._offer, methods=["POST"])
         app.add_api_route("/whep/{name}", self._delete, methods=["DELETE"])
         return app
 
     async def _page(self) -> FileResponse:
         return FileResponse(PAGE)
+
+    async def _ice_servers(self) -> dict[str, object]:
+        return {"ice_servers": [], "expires": None}
 
     async def _offer(self, request: Request) -> Response:
         offer = RTCSessionDescription((await request.body()).decode(), "offer")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, Download, expect
 
-from tests.e2e.console_page import open_console
+from bench.browsers.console_page import open_console
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]

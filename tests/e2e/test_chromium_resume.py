@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.async_api import Browser, expect
 
-from tests.e2e.console_page import LEFT_Y, RB, ConsolePage, open_console
+from bench.browsers.console_page import LEFT_Y, RB, ConsolePage, open_console
 from tests.support.movable_path import movable_path
 from tests.support.stack import Stack
 

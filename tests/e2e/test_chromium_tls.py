@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
+from bench.browsers.chromium import PAD
+from bench.browsers.console_page import RB, ConsolePage
 from server.media.aiortc_private import own_addresses
-from tests.e2e.console_page import RB, ConsolePage
-from tests.support.chromium import PAD
 from tests.support.stack import running_stack
 
 pytestmark = pytest.mark.browser

@@ -3,8 +3,8 @@
 import pytest
 from playwright.async_api import Browser
 
+from bench.browsers.console_page import open_console
 from bench.emulator import Network
-from tests.e2e.console_page import open_console
 from tests.support.firefox import Firefox
 from tests.support.stack import Stack
 

@@ -8,7 +8,15 @@ from pathlib import Path
 
 import msgspec
 
-from robot_bridge.protocol.console import Rename, Report, SeatRelease, SeatRequest, StreamReport, encode_console_message
+from robot_bridge.protocol.console import (
+    ClientMessage,
+    Rename,
+    Report,
+    SeatRelease,
+    SeatRequest,
+    StreamReport,
+    encode_console_message,
+)
 from robot_bridge.protocol.messages import Command, Ping, Reset, Rest, Stop
 from tests.server.offers import offer, section
 
@@ -87,7 +95,7 @@ def channel_seeds() -> dict[str, bytes]:
     report = Report(
         event=5, armed=True, streams=[StreamReport(stream="overview", carrier="native", gap=1, stamp=4)] * 3
     )
-    messages = {
+    messages: dict[str, ClientMessage] = {
         "command": Command(event=2, issue=1, values=[0.1, -0.2, 0.0]),
         "rest": Rest(event=2),
         "ping": Ping(id=7),

@@ -1,1 +1,0 @@
-from bench.browsers.console_page import *  # noqa: F403

@@ -1,1 +1,0 @@
-from bench.browsers.chromium import *  # noqa: F403

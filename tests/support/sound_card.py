@@ -1,1 +1,0 @@
-from bench.browsers.sound_card import *  # noqa: F403
