@@ -182,6 +182,7 @@ async def test_a_stop_key_works_inside_the_3d_scene(stack: Stack, chromium: Brow
 
 async def _reset(console: ConsolePage) -> None:
     """Hold the button until the robot says that it is no longer stopped."""
+    await console.page.locator(".banner").wait_for(state="hidden")  # its row goes, and the button moves up
     box = await console.page.get_by_role("button", name="Hold to reset").bounding_box()
     assert box is not None
     await console.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
