@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 # RFC 7065 3.1, without the rest of RFC 3986's hosts
-TURN_URI = re.compile(r"(turns?):(\[[0-9A-Fa-f:.]+\]|[^\s:?\[\]]+)(?::(\d{1,5}))?(?:\?transport=(udp|tcp))?")
+TURN_URI = re.compile(r"(turns?):(\[[0-9A-Fa-f:.]+\]|[^\s:?/\[\]]+)(?::(\d{1,5}))?(?:\?transport=(udp|tcp))?")
 
 
 class TurnUri(NamedTuple):

@@ -100,7 +100,7 @@ async def test_after_the_path_is_cut_a_restart_brings_commands_and_pictures_back
                 assert console.seat.holder == peer, "and nobody else could drive meanwhile"
                 assert len(rig.services.console.peers) == 1
                 await console.rest()
-                assert paths.forwarders[1].passed > 10
+                assert paths.forwarders[1].passed > 0
         finally:
             paths.close()
     assert rig.count("lockstep_rests_total", why="disconnected") == 0

@@ -1,6 +1,7 @@
 """The HTTP interface against its own description: a live console, requests made by schemathesis."""
 
 import asyncio
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -103,11 +104,18 @@ def _fragments() -> st.SearchStrategy[str]:
 def test_the_description_names_every_route_and_no_other() -> None:
     routes = {
         (method.lower(), str(getattr(route, "path", "")))
-        for route in create_app(Settings()).routes
+        for route in _routes(create_app(Settings()))
         for method in getattr(route, "methods", None) or ()
         if method != "HEAD" and getattr(route, "path", "").startswith(("/api", "/whep", "/healthz", "/metrics"))
     }
     assert routes == {(each.method, each.path) for each in OPERATIONS}
+
+
+def _routes(router: Any) -> Iterator[Any]:
+    """Those of included routers too."""
+    for route in router.routes:
+        included = getattr(route, "original_router", None)
+        yield from [route] if included is None else _routes(included)
 
 
 async def test_the_console_serves_it_to_anyone() -> None:
