@@ -17,6 +17,7 @@ __all__ = ["DEFAULT_ROBOT", "Bridge", "Metrics", "Stack", "available_robots", "r
 
 DEFAULT_ROBOT = "mobile-manipulator"
 ROBOTS = (DEFAULT_ROBOT, "planar")
+MAX_PEERS = 300  # more than any section needs
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,8 @@ async def running_stack(robot: str) -> AsyncIterator[Stack]:
     async with running_bridge(robot) as bridge:
         lockstep = str(Path(sys.executable).with_name("lockstep"))
         command = (lockstep, "serve", "--robot", bridge.address, "--port", "0", "--json", "--quiet")
-        async with running_process(*command) as (console, links):
+        settings = {"LOCKSTEP_STATE_DIR": str(bridge.event_log.parent / "state"), "LOCKSTEP_MAX_PEERS": str(MAX_PEERS)}
+        async with running_process(*command, environment=settings) as (console, links):
             yield Stack(bridge, console, links["console"], links["operator"], links["observer"])
 
 
