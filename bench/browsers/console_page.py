@@ -13,7 +13,7 @@ __all__ = ["LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
 START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
 LEFT_X, LEFT_Y = 0, 1
 
-# The true event, read out of the strip that the planar robot draws into its pictures (robots/planar/event_strip.py),
+# The true event, read out of the strip that the planar robot draws into its pictures (robots/event_strip.py),
 # together with the stamp that the page believes it has. One expression: no picture is drawn in between.
 READ_STRIP = """(name) => {
   const canvas = document.querySelector(`canvas[data-stream="${name}"]`);

@@ -16,7 +16,7 @@ from bench.experiment.record import Arrival, ClientRecord, Rendered
 from client import Console, ConsoleLost, Picture
 from client.command_gate import Pacing
 from client.media_gate import GateMode
-from robot_bridge.robots.planar.event_strip import read_event_strip
+from robot_bridge.robots.event_strip import read_event_strip
 
 __all__ = ["HeadlessClient", "headless_client"]
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from robot_bridge.robots.event_strip import draw_event_strip, strip_height
 from robot_bridge.robots.planar.description import RADIUS
-from robot_bridge.robots.planar.event_strip import draw_event_strip, strip_height
 from robot_bridge.robots.planar.room import CHARGER, HALF_LENGTH, HALF_WIDTH, PILLARS, ray_hits
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ import pytest
 
 from robot_bridge.protocol.messages import Media
 from robot_bridge.robots.base import MediaSource, Stamp
+from robot_bridge.robots.event_strip import read_event_strip
 from robot_bridge.robots.planar.cameras import FrontCamera, OverviewCamera
 from robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW
 from robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
-from robot_bridge.robots.planar.event_strip import read_event_strip
 from robot_bridge.robots.planar.microphone import SEGMENT_SAMPLES, TONE_HZ, PlanarMicrophone, Synthesiser
 from robot_bridge.robots.planar.robot import PlanarState
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_bridge.protocol.serial import MAX_EVENT
-from robot_bridge.robots.planar.event_strip import CELLS, draw_event_strip, read_event_strip, strip_height
+from robot_bridge.robots.event_strip import CELLS, draw_event_strip, read_event_strip, strip_height
 from tests.robot_bridge.protocol.strategies import events
 
 sizes = st.sampled_from([(480, 640), (240, 320), (720, 1280), (120, 160), (360, 642)])
