@@ -7,6 +7,15 @@ export interface SeatWords {
   readonly text: string;
 }
 
+/** What keeps a holder from driving now. */
+export type Obstacle = "silent" | "robot_down" | "stopped";
+
+const OBSTACLE_WORDS: Readonly<Record<Obstacle, string>> = {
+  silent: "The console is silent, and frees the seat of somebody it does not hear",
+  robot_down: "The robot cannot be reached",
+  stopped: "Reset the robot, then arm to drive",
+};
+
 export interface SeatView {
   readonly role: Role | null; // null while not connected
   readonly standing: SeatStanding;
@@ -15,6 +24,7 @@ export interface SeatView {
   readonly me: string | null;
   readonly idleSeconds: number | null;
   readonly armed: boolean;
+  readonly obstacle: Obstacle | null;
   readonly news: string | null; // the last hand-over, while it is fresh
 }
 
@@ -42,6 +52,8 @@ function holderWords(view: SeatView): SeatWords {
       text: `${first.secondsLeft} s to answer${others}`,
     };
   }
+  if (view.obstacle === "silent")
+    return { tone: "off", title: "You had control", text: OBSTACLE_WORDS.silent };
   if (view.idleSeconds !== null) {
     return {
       tone: "idle",
@@ -49,7 +61,7 @@ function holderWords(view: SeatView): SeatWords {
       text: `Control is given back in ${view.idleSeconds} s`,
     };
   }
-  const next = view.armed ? "" : "Arm to drive";
+  const next = view.obstacle === null ? (view.armed ? "" : "Arm to drive") : OBSTACLE_WORDS[view.obstacle];
   return { tone: "mine", title: "You have control", text: [view.news, next].filter(Boolean).join(". ") };
 }
 

@@ -45,7 +45,7 @@ export function overlayWords(app: ConsoleApp, now: number): OverlayWords | null 
     return {
       tone: "bad",
       title: "Robot unreachable",
-      text: detail || "The console tries to reach it again.",
+      text: `${detail === "" ? "" : `${sentence(detail)} `}The console keeps trying. Look after the robot and its bridge.`,
     };
   }
   return app.state.stop.stopped ? stopWords(app) : null;

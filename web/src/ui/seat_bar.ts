@@ -1,5 +1,6 @@
 import { seatAction, seatStanding, type SeatAction } from "../core/seat_standing";
-import { seatWords } from "../core/seat_words";
+import { robotIsUp } from "../core/console_state";
+import { seatWords, type Obstacle } from "../core/seat_words";
 import type { SeatNews } from "../core/seat_news";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
@@ -50,6 +51,7 @@ export function createSeatBar(app: ConsoleApp): Panel {
         me,
         idleSeconds: session.idleSecondsLeft(now),
         armed: app.isArmed(),
+        obstacle: obstacleOf(app, now),
         news: told !== null && now - toldMs < NEWS_MS ? told.words : null,
       });
       setData(element, "tone", found.tone);
@@ -62,6 +64,12 @@ export function createSeatBar(app: ConsoleApp): Panel {
       showAction(action, why, actionOf(app));
     },
   };
+}
+
+function obstacleOf(app: ConsoleApp, now: number): Obstacle | null {
+  if (!app.hears(now)) return "silent";
+  if (!robotIsUp(app.state)) return "robot_down";
+  return app.state.stop.stopped ? "stopped" : null;
 }
 
 function actionOf(app: ConsoleApp): SeatAction | null {

@@ -9,6 +9,7 @@ const VIEW: SeatView = {
   me: "me",
   idleSeconds: null,
   armed: false,
+  obstacle: null,
   news: null,
 };
 const CLAIMS = [
@@ -31,6 +32,17 @@ describe("the seat's bar", () => {
   it("warns the holder who is idle", () => {
     const words = seatWords({ ...VIEW, standing: "mine", idleSeconds: 24 });
     expect(words).toMatchObject({ tone: "idle", text: "Control is given back in 24 s" });
+  });
+
+  it("does not promise control to a holder who cannot drive now", () => {
+    const mine = { ...VIEW, standing: "mine", idleSeconds: 9 } as const;
+    expect(seatWords({ ...mine, obstacle: "silent" })).toMatchObject({
+      tone: "off",
+      title: "You had control",
+    });
+    const holding = { ...mine, idleSeconds: null };
+    expect(seatWords({ ...holding, obstacle: "robot_down" }).text).toBe("The robot cannot be reached");
+    expect(seatWords({ ...holding, obstacle: "stopped" }).text).toBe("Reset the robot, then arm to drive");
   });
 
   it("tells a new holder to arm, and stops telling it when armed", () => {
