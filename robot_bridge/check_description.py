@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from robot_bridge.check_limits import check_limits
 from robot_bridge.errors import DescriptionError
-from robot_bridge.protocol.description import Axis, RobotDescription
+from robot_bridge.protocol.description import Axis, Camera, RobotDescription
 
 __all__ = ["check_description"]
 
@@ -30,6 +30,8 @@ def check_description(description: RobotDescription) -> None:
     _check_unique(
         "stream", [camera.name for camera in description.cameras] + [source.name for source in description.microphones]
     )
+    for camera in description.cameras:
+        _check_scale(camera)
     _check_references(description)
     check_limits(description)
 
@@ -48,6 +50,12 @@ def _check_axis(axis: Axis, hold: float) -> None:
             f"axis {axis.name}: braking from {furthest:g} {axis.unit} takes {furthest / axis.brake:.3f} s,"
             f" longer than hold ({hold:g} s); raise brake or lower the limits"
         )
+
+
+def _check_scale(camera: Camera) -> None:
+    scale = camera.metres_per_pixel
+    if scale is not None and not (math.isfinite(scale) and scale > 0):
+        raise DescriptionError(f"camera {camera.name}: metres_per_pixel must be positive, not {scale}")
 
 
 def _check_references(description: RobotDescription) -> None:

@@ -136,6 +136,7 @@ class Camera(msgspec.Struct, frozen=True, kw_only=True):
     width: int
     height: int
     frame_rate: float  # Hz
+    metres_per_pixel: float | None = None  # m, of a camera that looks at one plane: a scale bar; None: it has no scale
 
 
 class Microphone(msgspec.Struct, frozen=True, kw_only=True):

@@ -54,6 +54,10 @@ def test_the_planar_robots_description_is_sound() -> None:
         (with_change(microphones=(Microphone(name="front", label="F", sample_rate=8000),)), "stream name 'front'"),
         (with_change(cameras=DESCRIPTION.cameras * 2), "stream name"),
         (
+            with_change(cameras=(msgspec.structs.replace(DESCRIPTION.cameras[0], metres_per_pixel=0.0),)),
+            "metres_per_pixel must be positive",
+        ),
+        (
             with_change(layers=(ControlLayer(name="l", label="L", bindings=(Binding(axis="arm"),)),)),
             "layer l names the axis 'arm'",
         ),

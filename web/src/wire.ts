@@ -53,6 +53,7 @@ export interface Camera {
   readonly width: number;
   readonly height: number;
   readonly frame_rate: number;
+  readonly metres_per_pixel: number | null;
 }
 
 export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | Rename | Note | Stop | Reset;
@@ -86,6 +87,7 @@ export interface Feedback {
   readonly stop: StopState;
   readonly faults: readonly (string)[];
   readonly limits: readonly (string)[];
+  readonly unknown: readonly (string)[];
 }
 
 /** A zone on the floor that the whole base stays inside of, or outside of. */
