@@ -17,6 +17,8 @@ from robot_bridge.counters import BridgeCounters
 from robot_bridge.errors import RobotFailed
 from robot_bridge.event_core import Answered, EventCore, Executed, Refused
 from robot_bridge.event_log import EventKind, EventLog
+from robot_bridge.event_times import EventTimes
+from robot_bridge.last_known import LastKnown
 from robot_bridge.link_server import LinkPeer, LinkServer
 from robot_bridge.link_session import BadInput
 from robot_bridge.metronome import Metronome
@@ -66,6 +68,8 @@ class Bridge:
             tls=None if settings.tls is None else settings.tls.bridge_context(),
         )
         self._log: EventLog | None = None
+        self._times = EventTimes()
+        self._last_known = LastKnown(self.description)
         self._acting: frozenset[str] = frozenset()  # limits that slowed the robot in the last tick
         self._acted: set[str] = set()  # and since the last feedback
         self._source_faults: list[str] = []  # "camera overview: ..."
@@ -256,12 +260,13 @@ class Bridge:
             self._issue(time.monotonic())
 
     def _issue(self, now: float) -> None:
-        measured = self._robot.measure()
+        measured, unknown = self._last_known.settle(self._robot.measure())
         if self._source_faults or self._limits.blind:
             blind = [f"no motion: the position is unknown ({name})" for name in sorted(self._limits.blind)]
             measured = measured._replace(faults=[*measured.faults, *self._source_faults, *blind])
         measured = measured._replace(at_rest=measured.at_rest and self._shaper.at_rest)
-        feedback = self._core.issue(measured, now, sorted(self._acted | self._acting))
+        feedback = self._core.issue(measured, now, sorted(self._acted | self._acting), unknown)
+        self._times.changed(feedback.event, feedback.time)
         self._acted.clear()
         self.counters.issued += 1
         self._record("feedback", feedback.event, issue=feedback.issue, at_rest=feedback.at_rest)
@@ -279,14 +284,11 @@ class Bridge:
     async def _run_source(self, source: MediaSource) -> None:
         """A source that breaks is a fault of the robot, not the end of the bridge."""
         try:
-            await source.run(self._stamp, self._emit)
+            await source.run(_Stamper(self._core, self._times), self._emit)
         except Exception as error:
             _logger.error("a media source failed: %s", error, exc_info=error)
             self._source_faults.append(f"media: {type(error).__name__}: {error}"[:200])
             self._core.want_issue()
-
-    def _stamp(self) -> Stamp:
-        return Stamp(self._core.current, time.monotonic())
 
     def _emit(self, media: Media) -> None:
         self.counters.media += 1
@@ -321,3 +323,15 @@ class Bridge:
     def _record(self, kind: EventKind, event: int, **fields: str | float | bool | list[float] | list[str]) -> None:
         if self._log is not None:
             self._log.record(kind, time.monotonic(), event, **fields)
+
+
+class _Stamper:
+    def __init__(self, core: EventCore, times: EventTimes) -> None:
+        self._core = core
+        self._times = times
+
+    def __call__(self) -> Stamp:
+        return Stamp(self._core.current, time.monotonic())
+
+    def at(self, time: float) -> Stamp | None:
+        return self._times.at(time)

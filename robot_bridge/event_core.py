@@ -166,7 +166,9 @@ class EventCore:
             return True
         return now - self._feedback.time >= self._refresh_interval
 
-    def issue(self, measured: Measurement, now: float, limits: Sequence[str] = ()) -> Feedback:
+    def issue(
+        self, measured: Measurement, now: float, limits: Sequence[str] = (), unknown: Sequence[str] = ()
+    ) -> Feedback:
         """The feedback of the pending event, which thereby becomes current, or of the current event again."""
         if self._pending is not None:
             self._current, self._pending = self._pending, None
@@ -187,6 +189,7 @@ class EventCore:
             stop=self._stop,
             faults=measured.faults,
             limits=list(limits),
+            unknown=list(unknown),
         )
         return self._feedback
 

@@ -117,6 +117,7 @@ class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     stop: StopState = StopState()
     faults: list[str] = []
     limits: list[str] = []  # names of the position limits and geofences that slowed the robot since the last feedback
+    unknown: list[str] = []  # names of axes and joints that could not be measured: their values are old
 
 
 class Refusal(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="refusal"):

@@ -2,16 +2,19 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Media
 
-__all__ = ["Measurement", "MediaSource", "Robot", "Stamp"]
+__all__ = ["Measurement", "MediaSource", "Robot", "Stamp", "Stamper"]
 
 
 class Measurement(NamedTuple):
-    """State of the robot, in the order and units of its description."""
+    """State of the robot, in the order and units of its description.
+
+    What cannot be measured now is NaN (axes and joints) or empty (wrench and ranges), and a fault says why.
+    """
 
     axes: list[float]  # measured value of each axis
     joints: list[float]
@@ -28,15 +31,26 @@ class Stamp(NamedTuple):
     time: float
 
 
+class Stamper(Protocol):
+    """Says which event held. Called from the event loop."""
+
+    def __call__(self) -> Stamp:
+        """Now."""
+
+    def at(self, time: float) -> Stamp | None:
+        """At an earlier time of the bridge's monotonic clock; None when that is too long ago to be known."""
+
+
 class MediaSource(ABC):
     """A camera or microphone captured beside the robot."""
 
     @abstractmethod
-    async def run(self, stamp: Callable[[], Stamp], emit: Callable[[Media], None]) -> None:
+    async def run(self, stamp: Stamper, emit: Callable[[Media], None]) -> None:
         """Capture until cancelled.
 
         Call `stamp` at the instant of capture (the start of a sound segment), on the event loop, together with
-        reading the state that the medium will show: a stamp may be older than the truth, never newer. Slow work
+        reading the state that the medium will show: a stamp may be older than the truth, never newer. A medium that
+        reaches the bridge some time after its capture is stamped with `stamp.at` the time of capture. Slow work
         (rendering, encoding) runs in a thread. `emit` never blocks; the newest picture wins if the link is busy.
         """
 

@@ -14,6 +14,7 @@ export function feedbackOf(event: number, rest: Partial<Feedback> = {}): Feedbac
     stop: { stopped: false, by: "", reason: "" },
     faults: [],
     limits: [],
+    unknown: [],
     ...rest,
   };
 }

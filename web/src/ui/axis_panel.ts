@@ -45,7 +45,9 @@ function showBars(app: ConsoleApp, bars: readonly AxisBar[]): void {
   const names = new Set(layer?.bindings.map((binding) => binding.axis));
   for (const [index, bar] of bars.entries()) {
     setHidden(bar.element, names.size > 0 && !names.has(bar.axis.name));
-    bar.show(app.state.feedback?.axes[index], app.values[index]);
+    const feedback = app.state.feedback;
+    const known = feedback?.unknown.includes(bar.axis.name) === false;
+    bar.show(known ? feedback.axes[index] : undefined, app.values[index]);
   }
 }
 
