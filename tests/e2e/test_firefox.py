@@ -5,6 +5,7 @@ import json
 import pytest
 
 from bench.browsers.sound_card import SoundCard
+from bench.emulator import Network
 from tests.support.firefox import Firefox
 from tests.support.stack import Stack
 
@@ -54,4 +55,21 @@ async def test_the_trailer_carries_pictures_and_sound_and_nothing_outside_the_to
     await _until(firefox, "s.at_rest === true")
     assert {name: stream["violations"] for name, stream in statistics["streams"].items()} == dict.fromkeys(streams, 0)
     assert statistics["streams"]["overview"]["rendered"] > 20, json.dumps(statistics)
+    assert await firefox.errors() == []
+
+
+async def test_after_an_outage_the_same_page_goes_on_at_the_present_event(stack: Stack, firefox: Firefox) -> None:
+    async with Network("micro-lan", console_url=stack.console) as network:
+        await _connected(firefox, network.link(stack.operator))
+        await firefox.evaluate("window.notReloaded = true")
+        before = await firefox.evaluate(STATS)
+        network.outage(4.0)
+        stale = "document.querySelector('.console').dataset.stale === '{}'"
+        await _until(firefox, stale.format("true"))
+        shown = before["streams"]["overview"]["rendered"]
+        await _until(firefox, f"{stale.format('false')} && s.streams.overview.rendered > {shown} + 30", 60)
+        after = await firefox.evaluate(STATS)
+        assert (after["epoch"], await firefox.evaluate("window.notReloaded")) == (before["epoch"], True)
+        assert after["event"] >= before["event"]
+        assert all(stream["violations"] == 0 for stream in after["streams"].values())
     assert await firefox.errors() == []
