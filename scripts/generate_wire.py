@@ -1,4 +1,4 @@
-"""Write the JSON Schemas of the console's and the robot link's messages to docs/schemas/.
+"""Write the JSON Schemas of the console's and the robot link's messages and of recordings to docs/schemas/.
 
 The page's TypeScript types (web/src/wire.ts) are made from the first by `npm run generate` in web/.
 With `--check` nothing is written and a difference ends with status 1.
@@ -14,6 +14,7 @@ import msgspec
 from robot_bridge.protocol.console import ClientMessage, ServerMessage
 from robot_bridge.protocol.messages import LinkMessage
 from server.openapi import openapi_document
+from server.recording.records import OWN_RECORDS
 
 SCHEMAS = Path(__file__).resolve().parent.parent / "docs" / "schemas"
 
@@ -44,6 +45,18 @@ def _schema(title: str, unions: dict[str, Any], received_only: frozenset[str] = 
     return json.dumps(document, indent=2) + "\n"
 
 
+def _recording_schema() -> str:
+    """Lockstep's own records, as properties by the names of MCAP's schemas."""
+    _, components = msgspec.json.schema_components(OWN_RECORDS.values(), ref_template="#/$defs/{name}")
+    document = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Lockstep recordings",
+        "properties": {name: {"$ref": f"#/$defs/{kind.__name__}"} for name, kind in OWN_RECORDS.items()},
+        "$defs": dict(sorted(components.items())),
+    }
+    return json.dumps(document, indent=2) + "\n"
+
+
 def generated() -> dict[Path, str]:
     """Every generated file with the text it should have."""
     console = {"ClientMessage": ClientMessage, "ServerMessage": ServerMessage}
@@ -52,6 +65,7 @@ def generated() -> dict[Path, str]:
         SCHEMAS / "console.schema.json": _schema("Lockstep console messages", console, received),
         SCHEMAS / "console-openapi.json": json.dumps(openapi_document(), indent=2) + "\n",
         SCHEMAS / "robot-link.schema.json": _schema("Lockstep robot link messages", {"LinkMessage": LinkMessage}),
+        SCHEMAS / "recording.schema.json": _recording_schema(),
     }
 
 

@@ -1,0 +1,36 @@
+"""What can go wrong with recordings.
+
+RecordingError
+├── RecordingDamaged    not a recording, or not readable to its end
+├── RecordingTampered   its checksums do not fit what it holds
+└── DiskTrouble         it cannot be written
+"""
+
+__all__ = ["DiskTrouble", "RecordingDamaged", "RecordingError", "RecordingTampered"]
+
+
+class RecordingError(Exception):
+    """Base of all.
+
+    Attributes:
+        detail: what exactly, for a person
+    """
+
+    def __init__(self, detail: str) -> None:
+        super().__init__(detail)
+        self.detail = detail
+
+    def __str__(self) -> str:
+        return self.detail
+
+
+class RecordingDamaged(RecordingError):
+    pass
+
+
+class RecordingTampered(RecordingError):
+    pass
+
+
+class DiskTrouble(RecordingError):
+    pass

@@ -1,0 +1,153 @@
+"""The index of a recording by event: which chunk has what. No I/O."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+import msgspec
+
+from robot_bridge.protocol.serial import event_gap, is_newer
+from server.recording.errors import RecordingDamaged
+from server.recording.marks import Mark
+
+__all__ = ["INDEX_NAME", "ChunkEntry", "EventEntry", "EventIndex", "IndexBuilder", "TopicEntry", "decode_index"]
+
+INDEX_NAME = "lockstep-index.json"
+EVENT_SPACING = 100_000  # µs between two events of the index
+MAX_MARKS = 20_000
+
+
+class TopicEntry(msgspec.Struct, frozen=True):
+    id: int  # MCAP's channel
+    topic: str
+    schema: str
+    encoding: str
+
+
+class ChunkEntry(msgspec.Struct, array_like=True):
+    offset: int  # bytes, where the chunk's record begins
+    first_event: int  # smallest of its records
+    last_event: int
+    started: int  # µs since 1970, arrival of its first record
+    ended: int
+
+
+class EventEntry(msgspec.Struct, frozen=True, array_like=True):
+    event: int
+    arrived: int  # µs since 1970
+    chunk: int
+
+
+class EventIndex(msgspec.Struct, kw_only=True):
+    """See docs/recording.md, "The index"."""
+
+    version: Literal[1] = 1
+    epoch: str = ""
+    recording: str = ""
+    part: int = 1
+    started: int = 0
+    ended: int = 0
+    first_event: int = 0  # 0: no feedback
+    last_event: int = 0
+    topics: list[TopicEntry] = []
+    chunks: list[ChunkEntry] = []
+    events: list[EventEntry] = []
+    keyframes: dict[str, list[EventEntry]] = {}
+    marks: list[Mark] = []
+    counts: dict[str, int] = {}
+    lost: int = 0
+
+    def chunks_with(self, first_event: int, last_event: int) -> Iterator[int]:
+        """Numbers of the chunks that can hold records of these events."""
+        for number, chunk in enumerate(self.chunks):
+            if not is_newer(chunk.first_event, last_event) and not is_newer(first_event, chunk.last_event):
+                yield number
+
+    def keyframe_before(self, topic: str, event: int) -> EventEntry | None:
+        """The newest keyframe stamped `event` or earlier; None: there is none."""
+        entries = self.keyframes.get(topic, [])
+        low, high = 0, len(entries)
+        while low < high:
+            middle = (low + high) // 2
+            if event_gap(entries[middle].event, event) <= 0:
+                low = middle + 1
+            else:
+                high = middle
+        # Of several stamped alike the first: pictures of an event begin there.
+        while low > 1 and entries[low - 2].event == event:
+            low -= 1
+        return entries[low - 1] if low else None
+
+
+_decoder = msgspec.json.Decoder(EventIndex)
+
+
+def decode_index(data: bytes) -> EventIndex:
+    """Raises RecordingDamaged."""
+    try:
+        return _decoder.decode(data)
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise RecordingDamaged(f"the index cannot be read: {error}") from error
+
+
+class IndexBuilder:
+    """Grows with the file: `add` every record in the order of the file, `chunk_written` after each chunk."""
+
+    def __init__(self, index: EventIndex) -> None:
+        self.index = index
+        self._chunk: ChunkEntry | None = None  # that is being filled
+
+    def add(self, topic: str, event: int, arrived: int, *, keyframe: bool, feedback: bool) -> None:
+        """`arrived` in µs; `keyframe` of a picture; `feedback`: it is one."""
+        index = self.index
+        if not index.started:
+            index.started = arrived
+        index.ended = arrived
+        index.counts[topic] = index.counts.get(topic, 0) + 1
+        chunk = self._chunk
+        if chunk is None:
+            chunk = self._chunk = ChunkEntry(0, event, event, arrived, arrived)
+        chunk.ended = arrived
+        if is_newer(chunk.first_event, event):
+            chunk.first_event = event
+        elif is_newer(event, chunk.last_event):
+            chunk.last_event = event
+        if keyframe:
+            index.keyframes.setdefault(topic, []).append(EventEntry(event, arrived, len(index.chunks)))
+        if feedback:
+            self._add_event(event, arrived)
+
+    def _add_event(self, event: int, arrived: int) -> None:
+        index = self.index
+        if not index.first_event:
+            index.first_event = event
+        new = event != index.last_event
+        index.last_event = event
+        if new and (not index.events or arrived - index.events[-1].arrived >= EVENT_SPACING):
+            index.events.append(EventEntry(event, arrived, len(index.chunks)))
+
+    def mark(self, mark: Mark) -> None:
+        if len(self.index.marks) < MAX_MARKS:
+            self.index.marks.append(mark)
+
+    def chunk_written(self, offset: int) -> None:
+        """All that was added since the last time is one chunk, at `offset`."""
+        if self._chunk is not None:
+            self._chunk.offset = offset
+            self.index.chunks.append(self._chunk)
+            self._chunk = None
+
+    def written(self) -> EventIndex:
+        """The index of what is in the file by now: a copy, whose lists grow no more."""
+        index = self.index
+        count = len(index.chunks)
+        return msgspec.structs.replace(
+            index,
+            ended=index.chunks[-1].ended if index.chunks else index.started,
+            chunks=list(index.chunks),
+            events=[each for each in index.events if each.chunk < count],
+            keyframes={
+                topic: [each for each in entries if each.chunk < count] for topic, entries in index.keyframes.items()
+            },
+            marks=list(index.marks),
+            counts=dict(index.counts),
+        )

@@ -1,0 +1,33 @@
+"""What a recording says of itself at its beginning: MCAP metadata. No I/O."""
+
+from collections.abc import Mapping
+
+import msgspec
+
+from server.recording.errors import RecordingDamaged
+
+__all__ = ["METADATA_NAME", "RecordingInfo"]
+
+METADATA_NAME = "lockstep"
+
+
+class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """The same in all parts of a recording, but for part and epoch."""
+
+    recording: str  # common to all parts
+    part: int = 1
+    epoch: str = ""
+    robot: str = ""  # the description's label
+    name: str = ""  # that somebody gave it
+    by: str = ""  # who started it; "" when it was the command line
+
+    def metadata(self) -> dict[str, str]:
+        return {name: str(value) for name, value in msgspec.structs.asdict(self).items()}
+
+    @classmethod
+    def parse(cls, metadata: Mapping[str, str]) -> "RecordingInfo":
+        """Raises RecordingDamaged."""
+        try:
+            return msgspec.convert(dict(metadata), cls, strict=False)
+        except msgspec.ValidationError as error:
+            raise RecordingDamaged(f"not a recording of Lockstep: {error}") from error

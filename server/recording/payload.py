@@ -1,0 +1,67 @@
+"""What stands in a record: the bare picture or sound, or one of Lockstep's own records. No I/O."""
+
+from typing import TypeVar
+
+import msgspec
+from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from foxglove_schemas_protobuf.RawAudio_pb2 import RawAudio
+from google.protobuf.message import DecodeError
+
+from server.recording.errors import RecordingDamaged
+from server.recording.records import OWN_RECORDS, OwnRecord
+
+__all__ = ["has_idr", "own_record", "own_record_of", "payload_of"]
+
+MEDIA: dict[str, type[CompressedVideo | CompressedAudio | RawAudio]] = {
+    "foxglove.CompressedVideo": CompressedVideo,
+    "foxglove.CompressedAudio": CompressedAudio,
+    "foxglove.RawAudio": RawAudio,
+}
+IDR, SLICE = 5, 1  # ITU-T H.264 table 7-1
+NAL_KIND = 0x1F
+START_CODE = b"\x00\x00\x01"
+
+Kind = TypeVar("Kind", bound=OwnRecord)
+_decoders = {kind: msgspec.json.Decoder(kind) for kind in OWN_RECORDS.values()}
+
+
+def payload_of(schema: str, data: bytes) -> bytes:
+    """The bare encoded picture or sound; of every other schema the message itself.
+
+    Raises:
+        RecordingDamaged: it is not what the schema says.
+    """
+    kind = MEDIA.get(schema)
+    if kind is None:
+        return data
+    try:
+        return kind.FromString(data).data
+    except DecodeError as error:
+        raise RecordingDamaged(f"not a {schema}") from error
+
+
+def own_record(kind: type[Kind], data: bytes) -> Kind:
+    """Raises RecordingDamaged."""
+    try:
+        found: Kind = _decoders[kind].decode(data)  # type: ignore[assignment]
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise RecordingDamaged(f"not a {kind.__name__}: {error}") from error
+    return found
+
+
+def own_record_of(schema: str, data: bytes) -> OwnRecord | None:
+    """None: the schema is not one of Lockstep's own. Raises RecordingDamaged."""
+    kind = OWN_RECORDS.get(schema)
+    return None if kind is None else own_record(kind, data)
+
+
+def has_idr(picture: bytes) -> bool:
+    """Whether an H.264 access unit in Annex B is a keyframe: its first slice is one of an IDR picture."""
+    at = picture.find(START_CODE)
+    while 0 <= at < len(picture) - len(START_CODE):
+        kind = picture[at + len(START_CODE)] & NAL_KIND
+        if kind in (SLICE, IDR):
+            return kind == IDR
+        at = picture.find(START_CODE, at + len(START_CODE))
+    return False

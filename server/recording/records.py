@@ -1,0 +1,175 @@
+"""What Lockstep itself writes into a recording: JSON, with a published JSON Schema for each kind.
+
+The JSON Schemas are generated from this file (scripts/generate_wire.py). Pictures, sound, joints and so on have
+Foxglove's schemas; see `server.recording.topics`.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from robot_bridge.protocol.console import Participant, Report
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import EventReference, RefusalReason, StopState
+
+__all__ = [
+    "OWN_RECORDS",
+    "CommandOutcome",
+    "CommandRecord",
+    "Degraded",
+    "FeedbackRecord",
+    "NoteRecord",
+    "OwnRecord",
+    "ParticipantsRecord",
+    "RefusalRecord",
+    "ReportRecord",
+    "RestRecord",
+    "RobotRecord",
+    "SeatRecord",
+    "StopRecord",
+    "Vector",
+    "WrenchRecord",
+]
+
+Count = Annotated[int, msgspec.Meta(ge=0)]
+
+# What became of a command at the console. Only a forwarded one reached the robot bridge.
+CommandOutcome = Literal["forwarded", "repeated", "refused", "undelivered"]
+
+
+class OwnRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """What all of them have."""
+
+    epoch: str  # run of the robot bridge; references of different epochs are never compared
+    event: EventReference
+
+
+class RobotRecord(OwnRecord, frozen=True, kw_only=True):
+    """The robot link, at the start of every file and whenever it changes."""
+
+    link: Literal["up", "down"]
+    detail: str = ""  # why it is down
+    description: RobotDescription
+
+
+class CommandRecord(OwnRecord, frozen=True, kw_only=True):
+    """A command that somebody sent; `event` is the one that it is to become."""
+
+    issue: Annotated[int, msgspec.Meta(ge=1)]  # of the feedback that it answers
+    values: list[float]  # one per axis, in its unit; what was forwarded, else what was asked
+    peer: str
+    name: str
+    outcome: CommandOutcome
+    reason: RefusalReason | Literal[""] = ""  # why it was refused
+
+
+class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
+    """Measured state after command `event`, as the robot bridge sent it (docs/robot-link.md)."""
+
+    issue: Annotated[int, msgspec.Meta(ge=1)]
+    time: float  # s, the bridge's monotonic clock
+    axes: list[float]
+    joints: list[float] = []
+    wrench: list[float] = []
+    ranges: list[float] = []
+    at_rest: bool = True
+    stop: StopState = StopState()
+    faults: list[str] = []
+    limits: list[str] = []
+
+
+class RefusalRecord(OwnRecord, frozen=True, kw_only=True):
+    """Something was refused; `event` is the current one."""
+
+    refused: Count  # the refused command's event; 0 for what is no command
+    reason: RefusalReason
+    detail: str = ""
+    by: Literal["console", "robot"]
+    peer: str = ""  # who was told; "" for nobody
+    name: str = ""
+
+
+class RestRecord(OwnRecord, frozen=True, kw_only=True):
+    """A rest that went to the robot; `event` is the one that it names."""
+
+    peer: str = ""  # "" when the console sent it because the seat changed hands
+    why: str = ""
+
+
+class SeatRecord(OwnRecord, frozen=True, kw_only=True):
+    """Who may drive from now on; at the start of every file and whenever it changes."""
+
+    holder: str  # peer; "" when the seat is free
+    name: str = ""
+    role: str = ""
+    why: str = ""  # "request", "granted", "taken", "released", "disconnected", "heartbeat lost", "idle"
+
+
+class StopRecord(OwnRecord, frozen=True, kw_only=True):
+    """Somebody asked for a stop, or for its reset. When it took effect is in the feedback."""
+
+    kind: Literal["stop", "reset"]
+    by: str
+    where: str  # the channel, or "http"
+    reason: str = ""
+    delivered: bool = True  # False: there was no robot link
+
+
+class ParticipantsRecord(OwnRecord, frozen=True, kw_only=True):
+    """Who is there, at the start of every file and whenever it changes."""
+
+    participants: list[Participant]
+
+
+class ReportRecord(OwnRecord, frozen=True, kw_only=True):
+    """What the page of the seat's holder says of itself: what it rendered, with which gaps."""
+
+    peer: str
+    name: str
+    report: Report
+
+
+class NoteRecord(OwnRecord, frozen=True, kw_only=True):
+    """What somebody wrote to everyone."""
+
+    peer: str
+    name: str
+    role: str
+    text: str
+
+
+class Degraded(OwnRecord, frozen=True, kw_only=True):
+    """The recorder was too slow and left records out before this one. Without it a recording has no gaps."""
+
+    lost: Annotated[int, msgspec.Meta(ge=1)]
+
+
+class Vector(msgspec.Struct, frozen=True):
+    x: float
+    y: float
+    z: float
+
+
+class WrenchRecord(OwnRecord, frozen=True, kw_only=True):
+    """Force and torque, named as in geometry_msgs/WrenchStamped."""
+
+    frame_id: str  # the body that the sensor sits on
+    force: Vector  # N
+    torque: Vector  # N m
+
+
+OWN_RECORDS: dict[str, type[OwnRecord]] = {
+    "lockstep.Robot": RobotRecord,
+    "lockstep.Command": CommandRecord,
+    "lockstep.Feedback": FeedbackRecord,
+    "lockstep.Refusal": RefusalRecord,
+    "lockstep.Rest": RestRecord,
+    "lockstep.Seat": SeatRecord,
+    "lockstep.Stop": StopRecord,
+    "lockstep.Participants": ParticipantsRecord,
+    "lockstep.Report": ReportRecord,
+    "lockstep.Note": NoteRecord,
+    "lockstep.Degraded": Degraded,
+    "lockstep.Wrench": WrenchRecord,
+}
+"""By the name of their schema."""

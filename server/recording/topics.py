@@ -1,0 +1,138 @@
+"""The topics of a recording, with their schemas. No I/O."""
+
+import json
+from functools import cache
+from typing import Any, NamedTuple
+
+import msgspec
+from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.RawAudio_pb2 import RawAudio
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.message import Message
+
+from robot_bridge.protocol.description import RobotDescription
+from server.recording.records import (
+    OWN_RECORDS,
+    CommandRecord,
+    Degraded,
+    FeedbackRecord,
+    NoteRecord,
+    OwnRecord,
+    ParticipantsRecord,
+    RefusalRecord,
+    ReportRecord,
+    RestRecord,
+    RobotRecord,
+    SeatRecord,
+    StopRecord,
+    WrenchRecord,
+)
+
+__all__ = [
+    "CAMERA",
+    "JOINTS",
+    "LOG",
+    "MICROPHONE",
+    "OWN_TOPICS",
+    "POSE",
+    "SCAN",
+    "Topic",
+    "own_schema",
+    "stream_of",
+    "topics_of",
+]
+
+CAMERA, MICROPHONE = "/camera/", "/microphone/"  # and the stream's name
+JOINTS, SCAN, POSE, LOG = "/joint_states", "/scan", "/pose", "/log"
+
+OWN_TOPICS: dict[type[OwnRecord], str] = {
+    RobotRecord: "/lockstep/robot",
+    CommandRecord: "/lockstep/command",
+    FeedbackRecord: "/lockstep/feedback",
+    RefusalRecord: "/lockstep/refusal",
+    RestRecord: "/lockstep/rest",
+    SeatRecord: "/lockstep/seat",
+    StopRecord: "/lockstep/stop",
+    ParticipantsRecord: "/lockstep/participants",
+    ReportRecord: "/lockstep/report",
+    NoteRecord: "/lockstep/note",
+    Degraded: "/lockstep/degraded",
+    WrenchRecord: "/wrench",
+}
+
+
+class Topic(NamedTuple):
+    name: str  # "/camera/front"
+    schema: str  # "foxglove.CompressedVideo"
+    schema_encoding: str  # "protobuf" or "jsonschema"
+    schema_data: bytes
+    encoding: str  # of the messages: "protobuf" or "json"
+
+
+def topics_of(description: RobotDescription, sound_formats: dict[str, str]) -> list[Topic]:
+    """All that a recording of this robot can have; `sound_formats`: "opus" or "g711-ulaw" by microphone."""
+    found = [_own(topic, kind) for kind, topic in OWN_TOPICS.items() if kind is not WrenchRecord]
+    if description.wrench is not None:
+        found.append(_own(OWN_TOPICS[WrenchRecord], WrenchRecord))
+    found += [_foxglove(CAMERA + camera.name, CompressedVideo) for camera in description.cameras]
+    for microphone in description.microphones:
+        kind = CompressedAudio if sound_formats.get(microphone.name, "opus") == "opus" else RawAudio
+        found.append(_foxglove(MICROPHONE + microphone.name, kind))
+    if description.joints:
+        found.append(_foxglove(JOINTS, JointStates))
+    if description.ranges is not None:
+        found.append(_foxglove(SCAN, LaserScan))
+    if description.planar_base is not None:
+        found.append(_foxglove(POSE, PoseInFrame))
+    found.append(_foxglove(LOG, Log))
+    return found
+
+
+def stream_of(topic: str) -> str:
+    """The camera's or microphone's name; "" for other topics."""
+    for prefix in (CAMERA, MICROPHONE):
+        if topic.startswith(prefix):
+            return topic[len(prefix) :]
+    return ""
+
+
+@cache
+def own_schema(kind: type[OwnRecord]) -> dict[str, Any]:
+    """The JSON Schema of one kind, complete in itself."""
+    (reference,), components = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **components.pop(reference["$ref"].rpartition("/")[2]),
+        **({"$defs": dict(sorted(components.items()))} if components else {}),
+    }
+
+
+def _own(topic: str, kind: type[OwnRecord]) -> Topic:
+    name = next(name for name, each in OWN_RECORDS.items() if each is kind)
+    return Topic(topic, name, "jsonschema", json.dumps(own_schema(kind)).encode(), "json")
+
+
+def _foxglove(topic: str, kind: type[Message]) -> Topic:
+    return Topic(topic, kind.DESCRIPTOR.full_name, "protobuf", _descriptors(kind), "protobuf")
+
+
+def _descriptors(kind: type[Message]) -> bytes:
+    """The FileDescriptorSet that MCAP wants as the schema: the message's file and all that it builds on."""
+    files: dict[str, Any] = {}  # file descriptors, which the stubs give several types
+
+    def add(file: Any) -> None:
+        if file.name not in files:
+            for needed in file.dependencies:
+                add(needed)
+            files[file.name] = file
+
+    add(kind.DESCRIPTOR.file)
+    found = FileDescriptorSet()
+    for file in files.values():
+        file.CopyToProto(found.file.add())
+    return found.SerializeToString()

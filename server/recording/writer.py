@@ -1,0 +1,163 @@
+"""Writes one recording file: MCAP, in chunks that are on the disk within a second. Used from one thread."""
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+import msgspec
+from mcap.writer import CompressionType, Writer
+
+from robot_bridge.protocol.description import RobotDescription
+from server.recording.errors import DiskTrouble
+from server.recording.event_index import INDEX_NAME, EventIndex, IndexBuilder, TopicEntry
+from server.recording.info import METADATA_NAME, RecordingInfo
+from server.recording.marks import MarkFinder
+from server.recording.records import FeedbackRecord, OwnRecord
+from server.recording.topics import Topic, topics_of
+
+__all__ = ["Entry", "RecordingWriter"]
+
+CHUNK_SECONDS = 0.9  # with the rest of the way to the disk less than a second
+CHUNK_BYTES = 1_000_000
+NEVER = 1 << 62  # bytes; chunks end when this file says so
+LIBRARY = "lockstep"
+
+
+class Entry(NamedTuple):
+    """One record on its way to the file."""
+
+    topic: str
+    event: int
+    arrived: int  # ns since 1970; never decreases
+    captured: int  # ns since 1970
+    data: bytes
+    keyframe: bool = False  # of a picture
+    record: OwnRecord | None = None  # what `data` says, for the index; None for media and the like
+
+
+class RecordingWriter:
+    """`write` and `flush_if_due` in turn, `close` at the end.
+
+    Raises:
+        DiskTrouble: from all of them. What was flushed before stays whole; `abandon` then.
+    """
+
+    def __init__(
+        self, path: Path, info: RecordingInfo, description: RobotDescription, sound_formats: dict[str, str]
+    ) -> None:
+        self.path = path
+        self._builder = IndexBuilder(EventIndex(epoch=info.epoch, recording=info.recording, part=info.part))
+        self._marks = MarkFinder(description)
+        self._channels: dict[str, int] = {}
+        self._waiting = 0  # bytes in the chunk that is being filled
+        self._chunk_since: int | None = None  # ns, arrival of its first record
+        try:
+            self._file: BinaryIO = path.open("xb")
+        except OSError as error:
+            raise DiskTrouble(_reason(error)) from error
+        self._writer = Writer(self._file, chunk_size=NEVER, compression=CompressionType.ZSTD)
+        self._whole = 0  # bytes of the file that are complete records
+        try:
+            self._writer.start(profile="", library=LIBRARY)
+            self._writer.add_metadata(METADATA_NAME, info.metadata())
+            self._register(topics_of(description, sound_formats), info.epoch)
+            self._sync()
+        except OSError as error:
+            self.abandon()
+            raise DiskTrouble(_reason(error)) from error
+
+    def _register(self, topics: list[Topic], epoch: str) -> None:
+        schemas: dict[str, int] = {}
+        for topic in topics:
+            if topic.schema not in schemas:
+                schemas[topic.schema] = self._writer.register_schema(
+                    topic.schema, topic.schema_encoding, topic.schema_data
+                )
+            channel = self._writer.register_channel(topic.name, topic.encoding, schemas[topic.schema], {"epoch": epoch})
+            self._channels[topic.name] = channel
+            self._builder.index.topics.append(TopicEntry(channel, topic.name, topic.schema, topic.encoding))
+
+    @property
+    def bytes_written(self) -> int:
+        return self._whole
+
+    @property
+    def lost(self) -> int:
+        return self._builder.index.lost
+
+    def count_lost(self, count: int) -> None:
+        """So many records were left out."""
+        self._builder.index.lost += count
+
+    def index(self) -> EventIndex:
+        """Of what is in the file now; a copy."""
+        return self._builder.written()
+
+    def write(self, entry: Entry) -> None:
+        """Put it into the chunk. A topic that the robot does not have is a fault of the caller."""
+        channel = self._channels[entry.topic]
+        self._writer.add_message(channel, entry.arrived, entry.data, publish_time=entry.captured, sequence=entry.event)
+        if self._chunk_since is None:
+            self._chunk_since = entry.arrived
+        self._waiting += len(entry.data)
+        micros = entry.arrived // 1000
+        feedback = isinstance(entry.record, FeedbackRecord)
+        self._builder.add(entry.topic, entry.event, micros, keyframe=entry.keyframe, feedback=feedback)
+        if entry.record is not None:
+            for mark in self._marks.find(entry.record, micros):
+                self._builder.mark(mark)
+        if self._waiting >= CHUNK_BYTES:
+            self.flush()
+
+    def flush_if_due(self, now: int) -> bool:
+        """Put the chunk on the disk when its first record is old enough; `now` in ns as arrivals. Whether it did."""
+        if self._chunk_since is None or now - self._chunk_since < CHUNK_SECONDS * 1e9:
+            return False
+        self.flush()
+        return True
+
+    def flush(self) -> None:
+        """Put the chunk on the disk."""
+        if self._chunk_since is None:
+            return
+        try:
+            self._writer.flush()
+            self._builder.chunk_written(self._whole)
+            self._sync()
+        except OSError as error:
+            raise DiskTrouble(_reason(error)) from error
+        self._waiting, self._chunk_since = 0, None
+
+    def _sync(self) -> None:
+        self._file.flush()
+        os.fdatasync(self._file.fileno())
+        self._whole = self._file.tell()
+
+    def close(self) -> EventIndex:
+        """Write what waits, the index and the summary. Idempotent."""
+        if self._file.closed:
+            return self._builder.index
+        self.flush()
+        index = self._builder.index
+        try:
+            self._writer.add_attachment(
+                0, index.ended * 1000, INDEX_NAME, "application/json", msgspec.json.encode(index)
+            )
+            self._writer.finish()
+            self._sync()
+            self._file.close()
+        except OSError as error:
+            raise DiskTrouble(_reason(error)) from error
+        return index
+
+    def abandon(self) -> None:
+        """The disk took no more: cut off what is no whole record. `recover` can complete the rest. Raises nothing."""
+        with suppress(OSError):
+            self._file.close()  # what Python still had buffered may not fit
+        with suppress(OSError):
+            os.truncate(self.path, self._whole)  # else readers stop at the broken record
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)
