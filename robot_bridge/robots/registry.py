@@ -9,6 +9,7 @@ __all__ = ["create_robot", "robot_names"]
 
 _PACKAGES = {
     "mobile-manipulator": "robot_bridge.robots.mobile_manipulator",
+    "micromanipulator": "robot_bridge.robots.micromanipulator",
     "planar": "robot_bridge.robots.planar",
 }
 

@@ -1,0 +1,101 @@
+"""The micromanipulator: stepping drives, a needle that bends, and what the microscope sees of them."""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.robots.base import Measurement, MediaSource, Robot
+from robot_bridge.robots.micromanipulator.cameras import MicromanipulatorCamera
+from robot_bridge.robots.micromanipulator.description import DESCRIPTION, MICROSCOPE, SIDE, START
+from robot_bridge.robots.micromanipulator.draughtsman import Draughtsman
+from robot_bridge.robots.micromanipulator.microphone import MicromanipulatorMicrophone
+from robot_bridge.robots.micromanipulator.needle import Contact, Needle
+from robot_bridge.robots.micromanipulator.stepper import Stepper
+
+__all__ = ["MicromanipulatorState", "Micromanipulator"]
+
+LIGHT_RANGE: Final = (20.0, 130.0)  # %
+TOO_MUCH: Final = 300e-6  # N on the needle, from where on it is said so
+
+Vector = tuple[float, float, float]
+
+
+class MicromanipulatorState(NamedTuple):
+    """All that pictures and sound need. Lengths in m, x forward, y left, z up from the glass."""
+
+    holder: Vector = START  # where the tip would be if the needle were straight
+    tip: Vector = START
+    force: Vector = (0.0, 0.0, 0.0)  # N, on the needle
+    contact: Contact | None = None
+    focus: float = 0.0  # height of the plane that is sharp
+    light: float = 100.0  # %
+    step_rate: float = 0.0  # steps per second of all drives together
+
+
+class Micromanipulator(Robot):
+    """Axes: the probe's velocity along x, y and z, the focus' velocity, and the change of the light."""
+
+    tick_seconds = 0.004
+
+    def __init__(self) -> None:
+        self._drives = (*(Stepper(place) for place in START), Stepper(0.0))
+        self._needle = Needle(self._holder())
+        self._light = MicromanipulatorState().light
+        self._values: list[float] = [0.0] * len(DESCRIPTION.axes)
+        self._draughtsman = Draughtsman()
+        self._sources: tuple[MediaSource, ...] = (
+            MicromanipulatorCamera(MICROSCOPE, self._draughtsman.microscope, self.state),
+            MicromanipulatorCamera(SIDE, self._draughtsman.side, self.state),
+            MicromanipulatorMicrophone(self.state),
+        )
+
+    def describe(self) -> RobotDescription:
+        return DESCRIPTION
+
+    def apply(self, values: Sequence[float]) -> None:
+        self._values[:] = values
+
+    def tick(self) -> None:
+        dt = self.tick_seconds
+        for drive, velocity in zip(self._drives, self._values, strict=False):
+            drive.tick(velocity, dt)
+        low, high = LIGHT_RANGE
+        self._light = min(max(self._light + self._values[-1] * dt, low), high)
+        self._needle.move(self._holder())
+
+    def measure(self) -> Measurement:
+        force = self._needle.force
+        return Measurement(
+            axes=[*(drive.speed for drive in self._drives), self._values[-1]],
+            joints=[drive.position for drive in self._drives],
+            wrench=[*force, 0.0, 0.0, 0.0],
+            ranges=[],
+            at_rest=not any(self._values) and not any(drive.speed for drive in self._drives),
+            faults=["the needle is bent too far"] if max(map(abs, force)) > TOO_MUCH else [],
+        )
+
+    def positions(self) -> Sequence[float]:
+        return [drive.position for drive in self._drives]
+
+    def state(self) -> MicromanipulatorState:
+        """The state now."""
+        needle = self._needle
+        return MicromanipulatorState(
+            holder=self._holder(),
+            tip=needle.tip,
+            force=needle.force,
+            contact=needle.contact,
+            focus=self._drives[3].position,
+            light=self._light,
+            step_rate=sum(drive.rate for drive in self._drives),
+        )
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._sources
+
+    def close(self) -> None:
+        self._draughtsman.close()
+
+    def _holder(self) -> Vector:
+        x, y, z, _ = self._drives
+        return (x.position, y.position, z.position)
