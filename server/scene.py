@@ -14,6 +14,7 @@ from robot_bridge.protocol.messages import Feedback
 from server.errors import SceneUnavailable
 from server.metrics import Metrics
 from server.scene_model import SceneModel
+from server.scene_scale import SceneScale
 
 __all__ = ["SceneView"]
 
@@ -36,6 +37,7 @@ class SceneView:
         self._metrics = metrics
         self._server: viser.ViserServer | None = None
         self._model: SceneModel | None = None
+        self._scale: SceneScale | None = None
         self._description: RobotDescription | None = None  # not built yet
         self._feedback: Feedback | None = None  # not shown yet
         self._viewers = 0
@@ -83,11 +85,31 @@ class SceneView:
             self._news.clear()
             if self._description is not None and self._server is not None:
                 description, self._description = self._description, None
-                self._model = await asyncio.to_thread(_build, self._server, description)
-            if self._viewers and self._feedback is not None and self._model is not None:
+                self._scale = SceneScale(description)
+                self._model = await self._built(self._server, self._scale.description(description))
+            if self._viewers and self._feedback is not None and self._model is not None and self._scale is not None:
                 feedback, self._feedback = self._feedback, None
-                await asyncio.to_thread(self._model.pose, feedback)
+                await self._pose(self._model, self._scale.feedback(feedback))
                 await asyncio.sleep(self._interval)
+
+    async def _built(self, server: viser.ViserServer, description: RobotDescription) -> SceneModel | None:
+        """None: nothing can be made of it. A shape that viser does not take must not end the console."""
+        try:
+            return await asyncio.to_thread(_build, server, description)
+        except Exception as error:
+            self._failed("built", error)
+            return None
+
+    async def _pose(self, model: SceneModel, feedback: Feedback) -> None:
+        try:
+            await asyncio.to_thread(model.pose, feedback)
+        except Exception as error:
+            self._failed("posed", error)
+            self._model = None  # rather no picture than one that stands still
+
+    def _failed(self, what: str, error: Exception) -> None:
+        self._metrics.bad_input.labels(where="scene", reason=type(error).__name__).inc()
+        log.warning("the 3D scene cannot be " + what, error=f"{type(error).__name__}: {error}")
 
     async def close(self) -> None:
         """Idempotent."""

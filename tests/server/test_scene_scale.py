@@ -1,0 +1,82 @@
+"""Small robots are magnified for the 3D scene, and what cannot be drawn ends nothing."""
+
+import asyncio
+import math
+
+import msgspec
+import pytest
+
+from robot_bridge.protocol.description import Body, BodyJoint, Geom, RobotDescription
+from robot_bridge.protocol.messages import Feedback
+from robot_bridge.robots.micromanipulator.description import DESCRIPTION as MICRO
+from robot_bridge.robots.planar.description import DESCRIPTION as PLANAR
+from server.metrics import Metrics
+from server.scene import SceneView
+from server.scene_scale import SceneScale
+from tests.server.rig import eventually
+
+FEEDBACK = Feedback(event=1, issue=1, time=0.0, axes=[], joints=[1e-5, -2e-5, 3e-5, 0.0], wrench=[1e-5, 0, 0])
+
+
+def test_a_robot_of_metres_stays_as_it_is() -> None:
+    scale = SceneScale(PLANAR)
+    assert scale.description(PLANAR) is PLANAR
+    assert scale.feedback(FEEDBACK) is FEEDBACK
+
+
+def test_a_robot_of_micrometres_gets_metres_large_and_its_joints_with_it() -> None:
+    scale = SceneScale(MICRO)
+    large = scale.description(MICRO)
+    assert 0.5 < max(max(geom.size) for body in large.bodies for geom in body.geoms) < 5.0
+    assert large.joints[0].maximum == pytest.approx((MICRO.joints[0].maximum or 0) * scale.factor)
+    moved = scale.feedback(FEEDBACK)
+    assert moved.joints == pytest.approx([value * scale.factor for value in FEEDBACK.joints])
+    assert moved.wrench == FEEDBACK.wrench
+    assert [body.geoms[0].rgba for body in large.bodies] == [body.geoms[0].rgba for body in MICRO.bodies]
+
+
+def test_angles_are_not_magnified() -> None:
+    joints = tuple(msgspec.structs.replace(joint, unit="rad") for joint in MICRO.joints)
+    scale = SceneScale(msgspec.structs.replace(MICRO, joints=joints))
+    assert scale.factor > 1
+    assert scale.feedback(FEEDBACK).joints == FEEDBACK.joints
+
+
+@pytest.mark.parametrize("size", [0.0, math.nan, math.inf, 1e300])
+def test_sizes_that_make_no_sense_are_left_alone(size: float) -> None:
+    body = Body(name="b", parent="", geoms=(Geom(shape="box", size=(size, size, size)),))
+    assert SceneScale(RobotDescription(name="r", label="R", axes=(), bodies=(body,))).factor == 1.0
+
+
+async def test_a_shape_that_cannot_be_built_is_counted_and_the_next_robot_is_shown() -> None:
+    metrics = Metrics()
+    scene = SceneView(15.0, 1, metrics)
+    tiny = Geom(shape="capsule", size=(1e-12, 1e-12, 0.0), position=(1.0, 0.0, 0.0))
+    bad = msgspec.structs.replace(PLANAR, bodies=(Body(name="base", parent="", geoms=(tiny,)),), ranges=None)
+
+    def failures() -> float:
+        return sum(
+            sample.value
+            for metric in metrics.bad_input.collect()
+            for sample in metric.samples
+            if sample.name.endswith("_total") and sample.labels["where"] == "scene"
+        )
+
+    await scene.start()
+    running = asyncio.create_task(scene.run())
+    try:
+        scene.configure(bad)
+        await eventually(lambda: failures() == 1)
+        scene.configure(msgspec.structs.replace(MICRO, joints=MICRO.joints))
+        await eventually(lambda: scene._model is not None and "holder" in scene._model.frames)
+        assert not running.done()
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+        await scene.close()
+
+
+def test_a_body_on_a_slide_moves_as_far_as_the_rest_is_magnified() -> None:
+    slide = next(body for body in MICRO.bodies if body.joints)
+    assert isinstance(slide.joints[0], BodyJoint)
+    assert SceneScale(MICRO).description(MICRO).bodies[1].joints == slide.joints
