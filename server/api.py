@@ -5,7 +5,7 @@ from typing import Annotated
 import msgspec
 from fastapi import APIRouter, Depends, Request, Response
 
-from robot_bridge.protocol.console import Participant, Seat, StreamInfo
+from robot_bridge.protocol.console import Participant, Seat, StreamInfo, StreamOffer
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Feedback, StopState, Text
 from server.access import Identity, require_role
@@ -36,6 +36,8 @@ class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
     link: LinkInfo
     you: dict[str, str]  # role and name of the token
     peers: dict[str, list[StreamInfo]]  # streams of each peer
+    streams: list[StreamOffer]  # that there are; empty before the robot was reached
+    voice: bool  # whether the console takes the voice of who holds the seat
     description: RobotDescription | None
     feedback: Feedback | None
 
@@ -81,6 +83,8 @@ async def session(request: Request, caller: Caller) -> Response:
             link=LinkInfo(up=console.robot.up, detail=console.robot.detail),
             you={"role": caller.role, "name": caller.name},
             peers={peer.id: peer.streams for peer in console.peers},
+            streams=services(request).media.offers,
+            voice=services(request).media.takes_voice,
             description=console.robot.description,
             feedback=console.clock.feedback,
         )

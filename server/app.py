@@ -23,6 +23,7 @@ from server.link_warden import LinkWarden
 from server.log_context import LogContext, follow_clock
 from server.media.aiortc_private import own_addresses, restrict_ice_hosts
 from server.media.plane import MediaPlane
+from server.media.sources.desk import SourceDesk
 from server.metrics import Metrics
 from server.openapi import openapi_document
 from server.page import page_router
@@ -54,9 +55,14 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
     async def _console(app: FastAPI, opened: ConsoleState, audit: AuditLog) -> AsyncIterator[None]:
         _restrict_ice(settings)
         metrics = Metrics()
-        media = MediaPlane(settings.media, metrics.registry)
+        media = MediaPlane(settings.media, metrics.registry, settings.sources)
         scene = await _start_scene(settings, metrics)
         console = Console(settings, metrics, media, scene, audit)
+        sources = SourceDesk(
+            settings.sources, console.clock, media, metrics.registry, lambda news: console.peers.tell("session", news)
+        )
+        if sources.sources:
+            console.further_news.append(sources.state)
         follow_clock(console.clock)
         audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
         warden = LinkWarden(opened.invitations, console.peers, console.audit, metrics)
@@ -66,6 +72,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
                 running = [
                     tasks.create_task(console.run(), name="console"),
                     tasks.create_task(warden.run(), name="links"),
+                    tasks.create_task(sources.run(), name="sources"),
                 ]
                 if scene is not None:
                     running.append(tasks.create_task(scene.run(), name="scene"))

@@ -24,7 +24,19 @@ from server.app import create_app
 from server.bench_commands import add_bench_commands
 from server.bridge_process import BridgeFailed, BridgeProcess
 from server.cli_access import StateDirOption, add_access_commands
-from server.cli_options import AllowedHosts, PublicUrl, SpeedCap, Stun, Tls, TlsCert, TlsKey, Turn, TurnSecret
+from server.cli_options import (
+    AllowedHosts,
+    Cameras,
+    Microphones,
+    PublicUrl,
+    SpeedCap,
+    Stun,
+    Tls,
+    TlsCert,
+    TlsKey,
+    Turn,
+    TurnSecret,
+)
 from server.console_address import write_address
 from server.guarded_http import guarded_by
 from server.link_access import link_access
@@ -74,11 +86,16 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings.")]
 @app.command()
 def up(
     robot: Annotated[str, typer.Option(help=f"The robot: {', '.join(robot_names())}.")] = "mobile-manipulator",
+    ros2: Annotated[
+        Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
+    ] = None,
     robot_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the bridge; 0 takes any free one.")] = 5600,
     event_log: Annotated[Path | None, typer.Option(help="The bridge appends what happens to events here.")] = None,
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
+    camera: Cameras = None,
+    microphone: Microphones = None,
     quality: Quality = None,
     speed_cap: SpeedCap = None,
     public_url: PublicUrl = None,
@@ -101,12 +118,15 @@ def up(
         port=port,
         ice_hosts=ice_host,
         media=_media(quality),
+        cameras=_words(camera),
+        microphones=_words(microphone),
         speed_cap=speed_cap,
         log_format=log_format,
         state_dir=state_dir,
         **network,
     )
     options = [] if event_log is None else ["--event-log", str(event_log)]
+    options += [] if ros2 is None else ["--ros2", str(ros2)]
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
     bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, secret.reveal(), _say)
@@ -127,6 +147,8 @@ def serve(
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
+    camera: Cameras = None,
+    microphone: Microphones = None,
     quality: Quality = None,
     speed_cap: SpeedCap = None,
     public_url: PublicUrl = None,
@@ -154,6 +176,8 @@ def serve(
         port=port,
         ice_hosts=ice_host,
         media=_media(quality),
+        cameras=_words(camera),
+        microphones=_words(microphone),
         speed_cap=speed_cap,
         log_format=log_format,
         state_dir=state_dir,
@@ -164,6 +188,11 @@ def serve(
 
 def _media(quality: Switch | None) -> dict[str, bool] | None:
     return None if quality is None else {"quality": quality is Switch.ON}
+
+
+def _words(texts: list[str] | None) -> tuple[str, ...] | None:
+    """As a setting that is given several times, and may hold any character."""
+    return tuple(texts) if texts else None
 
 
 def _network(

@@ -6,7 +6,19 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["AllowedHosts", "PublicUrl", "SpeedCap", "Stun", "Tls", "TlsCert", "TlsKey", "Turn", "TurnSecret"]
+__all__ = [
+    "AllowedHosts",
+    "Cameras",
+    "Microphones",
+    "PublicUrl",
+    "SpeedCap",
+    "Stun",
+    "Tls",
+    "TlsCert",
+    "TlsKey",
+    "Turn",
+    "TurnSecret",
+]
 
 
 class SpeedCapChoice(StrEnum):
@@ -31,4 +43,21 @@ TurnSecret = Annotated[str | None, typer.Option(help="Secret shared with the TUR
 SpeedCap = Annotated[
     SpeedCapChoice | None,
     typer.Option(help="Cap the speed by the delay of what the operator sees: always, never, or as the operator wants."),
+]
+Cameras = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--camera",
+        help="A camera of the console's own, [name=]rtsp://…, v4l2:/dev/video0, udp://…, file:…; may be given again. "
+        "docs/media.md has the options.",
+        metavar="SOURCE",
+    ),
+]
+Microphones = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--microphone",
+        help="A microphone of the console's own, [name=]pulse:, alsa:hw:1, rtsp://…, file:…; may be given again.",
+        metavar="SOURCE",
+    ),
 ]

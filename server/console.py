@@ -19,6 +19,7 @@ from robot_bridge.protocol.console import (
     SeatRelease,
     SeatRequest,
     SeatTake,
+    ServerMessage,
     StopStateNotice,
     Welcome,
     encode_console_message,
@@ -96,6 +97,7 @@ class Console:
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
         self.people = People(self.peers, self.clock, self.audit, self.seat.renamed, self._refuse_request)
         self.people.remember(audit_log)
+        self.further_news: list[Callable[[], ServerMessage]] = []  # what else newcomers are told
         self._metrics = metrics
         self._media = media
         self._viewer = viewer
@@ -187,6 +189,8 @@ class Console:
                 peer.send("session", self.state_of_robot(self.robot.description))
             peer.send("session", self.seat.message())
             peer.send("session", self.speed_cap.state(time.monotonic()))
+            for news in self.further_news:
+                peer.send("session", news())
             self.people.welcome(peer)
             if self._audit_trouble:
                 peer.send("session", Notice(level="warning", text=UNWRITTEN.format(self._audit_trouble)))

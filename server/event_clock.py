@@ -8,7 +8,7 @@ from robot_bridge.protocol.serial import FIRST_EVENT, event_gap
 
 __all__ = ["EventClock"]
 
-HISTORY = 256  # changes remembered; at 25 events/s that is 10 s
+HISTORY = 1024  # changes remembered; at 25 events/s that is 40 s, longer than any medium takes to come
 
 
 class Change(NamedTuple):
@@ -55,7 +55,10 @@ class EventClock:
         return True
 
     def reference_at(self, time: float) -> EventReference | None:
-        """The reference that held at `time`: the stamp for a medium captured here. None when too long ago."""
+        """The reference that held at `time`: the stamp for a medium captured here. None when too long ago.
+
+        A change counts from when its feedback came, which is later than it happened: never newer than the truth.
+        """
         for change in reversed(self._changes):
             if change.time <= time:
                 return change.event

@@ -14,6 +14,7 @@ from server.limit_settings import LimitSettings
 from server.link_access import link_access
 from server.logs import LogFormat
 from server.media.settings import MediaSettings
+from server.media.sources.source_settings import SourceSettings
 from server.network_settings import NameList, NetworkSettings
 
 __all__ = ["Settings"]
@@ -21,7 +22,7 @@ __all__ = ["Settings"]
 MIN_SECRET_BYTES = 32  # RFC 7518 3.2: an HS256 key is at least as long as the hash
 
 
-class Settings(NetworkSettings, LimitSettings):
+class Settings(NetworkSettings, LimitSettings, SourceSettings):
     """All that can be set. Times in seconds."""
 
     model_config = SettingsConfigDict(env_prefix="LOCKSTEP_", env_nested_delimiter="__", frozen=True, extra="ignore")

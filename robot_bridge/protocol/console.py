@@ -8,7 +8,7 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 | control | unordered, 0 retransmits | client | command, rest, report, ping |
 | | | server | feedback, refusal, pong |
 | session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
-| | | server | welcome, robot, seat, participants, quality, speed_cap, note_shared, notice, refusal |
+
 | stop | reliable | client | stop, reset |
 | | | server | stop_state, refusal |
 """
@@ -53,13 +53,17 @@ __all__ = [
     "SeatTake",
     "ServerMessage",
     "SharedNote",
+    "SourceStatus",
+    "Sources",
     "SpeedCapMode",
     "SpeedCapState",
     "StopStateNotice",
     "StreamInfo",
+    "StreamOffer",
     "StreamQuality",
     "StreamReport",
     "Tier",
+    "Voice",
     "Welcome",
     "decode_client_message",
     "decode_server_message",
@@ -152,6 +156,14 @@ class StreamInfo(msgspec.Struct, frozen=True, kw_only=True):
     carrier: Carrier
 
 
+class StreamOffer(msgspec.Struct, frozen=True, kw_only=True):
+    """A medium that a peer can ask for: the i-th of a kind is for the offer's i-th section of that kind."""
+
+    stream: str
+    label: str
+    kind: Literal["video", "audio"]
+
+
 class Welcome(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="welcome"):
     """First message on `session`."""
 
@@ -159,6 +171,7 @@ class Welcome(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
     role: Role
     name: str
     streams: list[StreamInfo]
+    voice: str = ""  # the media section in which this peer's voice is taken; "" when it is not
 
 
 class RobotState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="robot"):
@@ -228,6 +241,29 @@ class SpeedCapState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type",
     why: Literal["", "delay", "unknown"] = ""  # why the share is below 1
 
 
+class SourceStatus(msgspec.Struct, frozen=True, kw_only=True):
+    """A camera or microphone that is attached to the console itself."""
+
+    stream: str
+    label: str
+    state: Literal["connecting", "live", "reconnecting"]
+    detail: str = ""  # why it is reconnecting
+
+
+class Sources(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="sources"):
+    """How they all do; sent to newcomers and on every change. Without any it is never sent."""
+
+    sources: list[SourceStatus]
+
+
+class Voice(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="voice"):
+    """Who is heard at the robot now; sent to everyone when it changes."""
+
+    peer: str = ""  # "" when nobody speaks
+    name: str = ""
+    trouble: str = ""  # why nobody can be heard now, as when the loudspeaker does not work
+
+
 class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note_shared"):
     """A note that somebody wrote, with the event it belongs to. Newcomers get the last ones."""
 
@@ -284,6 +320,8 @@ ServerMessage = (
     | Participants
     | Quality
     | SpeedCapState
+    | Sources
+    | Voice
     | SharedNote
     | Notice
     | StopStateNotice

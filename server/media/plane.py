@@ -4,14 +4,15 @@ import asyncio
 import random
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator, Sequence
+from itertools import count
 
 from aiortc import RTCPeerConnection, RTCRtpTransceiver
 from prometheus_client import CollectorRegistry
 
 from robot_bridge.protocol.carriers import Carrier
-from robot_bridge.protocol.console import StreamInfo
-from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.console import StreamInfo, StreamOffer
+from robot_bridge.protocol.description import Camera, Microphone, RobotDescription
 from robot_bridge.protocol.messages import Media
 from server.media.aiortc_private import (
     MediaSender,
@@ -34,7 +35,9 @@ from server.media.quality.metrics import QualityMetrics
 from server.media.quality.path import RateLimits
 from server.media.quality.peer_quality import CameraLink, PeerQuality
 from server.media.receive_guard_private import guard_transports
+from server.media.recorded_output import FrameTaker, RecordedOutput
 from server.media.settings import MediaSettings
+from server.media.sources.source_url import SourceSpec
 from server.media.video_stream import VideoStream
 
 __all__ = ["MediaPlane", "MediaSettings", "PeerMedia"]
@@ -55,10 +58,15 @@ class MediaPlane:
         self,
         settings: MediaSettings,
         metrics_registry: CollectorRegistry,
+        attached: Sequence[SourceSpec] = (),
         *,
         wall_clock: Callable[[], float] = time.time,
     ) -> None:
+        """`attached`: cameras and microphones of the console's own; their streams come after the robot's."""
         self._settings = settings
+        self._attached = {spec.name: spec for spec in attached}
+        self._stream_names: dict[str, str] = {}  # of those, by the source's name
+        self.takes_voice = False  # whether the voice of who holds the seat is taken
         self._metrics = MediaMetrics(metrics_registry)
         self._wall_clock = wall_clock
         self._capture_clock = CaptureClock()
@@ -70,6 +78,8 @@ class MediaPlane:
         self._service_tasks: list[asyncio.Task[None]] = []
         self._ending: set[asyncio.Task[None]] = set()
         self._closed = False
+        self._recorder: FrameTaker | None = None
+        self._record_keyframes = 0.0  # s between keyframes while something is recorded
 
     def configure(self, description: RobotDescription) -> None:
         """Create the streams of a robot; once per epoch. Peers that are still attached get nothing more."""
@@ -79,6 +89,10 @@ class MediaPlane:
         self._streams = {camera.name: VideoStream(camera, settings, fan_out, metrics) for camera in description.cameras}
         for microphone in description.microphones:
             self._streams[microphone.name] = AudioStream(microphone, settings, fan_out, metrics)
+        for spec in self._attached.values():
+            name = self._stream_names[spec.name] = _free_name(spec.name, self._streams)
+            self._streams[name] = self._attached_stream(spec, name)
+        self._record_streams()
         loop = asyncio.get_running_loop()
         self._stream_tasks = [loop.create_task(stream.run()) for stream in self._streams.values()]
         if not self._service_tasks:
@@ -99,6 +113,60 @@ class MediaPlane:
             return
         self._capture_clock.observe(media.time, self._wall_clock())
         stream.feed(media, now, self._capture_clock.wall_time(media.time))
+
+    def record(self, take: FrameTaker | None, keyframe_seconds: float = 4.0) -> None:
+        """Hand every stream, encoded, to `take` from now on; None: no more. Over epochs too."""
+        self._recorder, self._record_keyframes = take, keyframe_seconds
+        self._record_streams()
+
+    def _record_streams(self) -> None:
+        attached = set(self._stream_names.values())
+        for stream in self._streams.values():
+            video = stream.kind == "video"
+            stream.record(
+                None
+                if self._recorder is None
+                else RecordedOutput(
+                    ("H264",) if video else stream.codecs,
+                    "high" if video else "operator",
+                    self._recorder,
+                    keyframe_seconds=self._record_keyframes,
+                    attached=stream.name in attached,
+                )
+            )
+
+    def record_keyframes(self) -> None:
+        """A new file begins: every camera starts with a keyframe."""
+        for stream in self._streams.values():
+            stream.record_keyframe()
+
+    def recorded_codecs(self) -> dict[str, str]:
+        """What each stream is recorded as if nobody takes it, by its name."""
+        return {each.name: "H264" if each.kind == "video" else each.codecs[0] for each in self._streams.values()}
+
+    def _attached_stream(self, spec: SourceSpec, name: str) -> AnyStream:
+        """What the source really gives shows when it comes."""
+        settings, fan_out, metrics = self._settings, self._fan_out, self._metrics
+        if spec.kind == "audio":
+            return AudioStream(Microphone(name=name, label=spec.label, sample_rate=48_000), settings, fan_out, metrics)
+        width, height = spec.size or (640, 480)
+        camera = Camera(name=name, label=spec.label, width=width, height=height, frame_rate=spec.rate or 30.0)
+        return VideoStream(camera, settings, fan_out, metrics)
+
+    def stream_of(self, source: str) -> str:
+        """The stream of an attached source: its name, or one like it when the robot has a stream of that name."""
+        return self._stream_names.get(source, source)
+
+    def feed_local(self, media: Media, now: float) -> None:
+        """As `feed`, for what was captured here: its time is on the clock of `now`."""
+        stream = self._streams.get(media.stream)
+        if stream is not None:
+            stream.feed(media, now, self._wall_clock() - (now - media.time))
+
+    @property
+    def offers(self) -> list[StreamOffer]:
+        """The streams that a peer can ask for, in the order of an offer's sections of their kind."""
+        return [StreamOffer(stream=each.name, label=each.label, kind=each.kind) for each in self._streams.values()]
 
     def attach(self, pc: RTCPeerConnection, offer_sdp: str, *, priority: bool, trailer: bool) -> PeerMedia:
         """Give a peer its streams. Call after setRemoteDescription(offer), before createAnswer.
@@ -236,3 +304,7 @@ class MediaPlane:
 def _msid(name: str) -> str:
     """`name` as a media stream id: only the characters of RFC 8830 2 (token-char), at most 64."""
     return re.sub(r"[^0-9A-Za-z!#$%&'*+.^_`{|}~-]", "_", name)[:64] or "_"
+
+
+def _free_name(wanted: str, taken: Container[str]) -> str:
+    return next(name for n in count(1) if (name := wanted if n == 1 else f"{wanted}-{n}") not in taken)

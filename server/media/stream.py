@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Generic, Literal, TypeVar
 
@@ -18,6 +18,7 @@ from server.media.metrics import MediaMetrics
 from server.media.output import Output
 from server.media.peer_stream import PeerStream
 from server.media.quality.plan import PicturePlan
+from server.media.recorded_output import RecordedOutput
 from server.media.settings import MediaSettings
 
 __all__ = ["Encoded", "Stream"]
@@ -64,11 +65,28 @@ class Stream(ABC, Generic[Job]):
         self._frames_in = metrics.frames_in.labels(name)
         self._outputs: dict[tuple[str, Tier], Output] = {}
         self._members: dict[PeerStream, None] = {}  # an ordered set
+        self._recorded: RecordedOutput | None = None  # None: nothing is recorded
 
     @property
     def full_plan(self) -> PicturePlan:
         """The best that a tier can get."""
         return PicturePlan(self._settings.video_bitrate_bps, 1.0)
+
+    @property
+    def outputs(self) -> Mapping[tuple[str, Tier], Output]:
+        """By codec and tier, as far as they exist."""
+        return self._outputs
+
+    def record(self, recorded: RecordedOutput | None) -> None:
+        """Hand what `recorded` chooses to it from now on; None: no more."""
+        if self._recorded is not None:
+            self._recorded.close()
+        self._recorded = recorded
+
+    def record_keyframe(self) -> None:
+        """The recording begins a new file."""
+        if self._recorded is not None:
+            self._recorded.request_keyframe()
 
     def output(self, codec: str, tier: Tier) -> Output:
         """Made when it is first asked for; it costs nothing while nobody is in it."""
@@ -120,11 +138,15 @@ class Stream(ABC, Generic[Job]):
     def feed(self, media: Media, now: float, capture_time: float) -> None:
         """Take a medium. `capture_time` is in s since 1970."""
         self._frames_in.inc()
-        if self._last_stamp is not None and event_gap(media.stamp, self._last_stamp) < 0:
+        # Without one, none that builds on it could be decoded; an older stamp than the last is no lie.
+        in_order = media.codec == "h264" or self._last_stamp is None
+        if not in_order and event_gap(media.stamp, self._last_stamp or media.stamp) < 0:
             self._drop("stale_stamp")
             return
         self._last_stamp = media.stamp
-        if self._members:
+        if self._recorded is not None:
+            self._recorded.choose(self)
+        if self._members or self._recorded is not None:
             self._enqueue(media, now, capture_time)
 
     def _drop(self, stage: str, count: int = 1) -> None:
@@ -135,6 +157,8 @@ class Stream(ABC, Generic[Job]):
         if frame.keyframe and output.arriving:
             output.arrive()
         self._fan_out.publish(frame, output.targets)
+        if self._recorded is not None:
+            self._recorded.published(self.name, output, frame)
 
     async def run(self) -> None:
         """Encode until cancelled."""

@@ -317,7 +317,7 @@ export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | SharedNote | Notice | StopStateNotice;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | SharedNote | Notice | StopStateNotice;
 
 /** A note that somebody wrote, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {
@@ -330,6 +330,20 @@ export interface SharedNote {
   readonly epoch: string;
   readonly event: number;
   readonly time: number;
+}
+
+/** A camera or microphone that is attached to the console itself. */
+export interface SourceStatus {
+  readonly stream: string;
+  readonly label: string;
+  readonly state: "connecting" | "live" | "reconnecting";
+  readonly detail: string;
+}
+
+/** How they all do; sent to newcomers and on every change. Without any it is never sent. */
+export interface Sources {
+  readonly type: "sources";
+  readonly sources: readonly (SourceStatus)[];
 }
 
 /** Whether and how far the console caps the speed for the delay; sent to newcomers and when it changes. */
@@ -397,6 +411,14 @@ export interface StreamReport {
   readonly lag?: number;
 }
 
+/** Who is heard at the robot now; sent to everyone when it changes. */
+export interface Voice {
+  readonly type: "voice";
+  readonly peer: string;
+  readonly name: string;
+  readonly trouble: string;
+}
+
 /** First message on `session`. */
 export interface Welcome {
   readonly type: "welcome";
@@ -404,6 +426,7 @@ export interface Welcome {
   readonly role: "observer" | "operator" | "supervisor";
   readonly name: string;
   readonly streams: readonly (StreamInfo)[];
+  readonly voice: string;
 }
 
 /** A force and torque sensor; `full_scale_force` is the force that is felt and drawn as "all there is". */

@@ -7,8 +7,10 @@ import type {
   Seat,
   ServerMessage,
   SharedNote,
+  SourceStatus,
   SpeedCapState,
   StopState,
+  Voice,
   Welcome,
 } from "../wire";
 import type { Pacing } from "./command_gate";
@@ -16,6 +18,7 @@ import { requestAnswer, type SeatNews } from "./seat_news";
 import { handOver, type HandOver } from "./hand_over";
 import type { GateMode } from "./media_gate";
 import { isNewer } from "./serial";
+import { sourceWords } from "./source_words";
 import { REFUSAL_WORDS } from "./words";
 
 export interface Settings {
@@ -47,6 +50,8 @@ export interface ConsoleState {
   participants: readonly Participant[];
   quality: Quality | null; // of this peer's pictures
   speedCap: SpeedCapState | null; // the console's; null before it has said so
+  sources: readonly SourceStatus[]; // cameras and microphones of the console's own
+  voice: Voice | null; // who is heard at the robot; null before the console has said so
   notes: SharedNote[]; // oldest first
   feedback: Feedback | null; // newest
   stop: StopState;
@@ -77,6 +82,8 @@ export function createConsoleState(): ConsoleState {
     participants: [],
     quality: null,
     speedCap: null,
+    sources: [],
+    voice: null,
     notes: [],
     feedback: null,
     stop: NOT_STOPPED,
@@ -93,6 +100,8 @@ export function forgetConnection(state: ConsoleState): void {
   state.participants = [];
   state.quality = null;
   state.speedCap = null;
+  state.sources = [];
+  state.voice = null;
   state.notes = [];
   state.feedback = null;
   state.roundTripMs = null;
@@ -149,6 +158,12 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
     case "speed_cap":
       state.speedCap = message;
       return;
+    case "sources":
+      takeSources(state, message.sources, wallMs);
+      return;
+    case "voice":
+      state.voice = message;
+      return;
     case "note_shared":
       state.notes.push(message);
       state.notes.splice(0, state.notes.length - NOTE_LIMIT);
@@ -189,6 +204,18 @@ function takeSeat(state: ConsoleState, seat: Seat, wallMs: number): void {
   state.handOver = change;
   state.seatNews = { words: change.words };
   note(state, "info", change.words, wallMs);
+}
+
+/** A camera that fails and one that works again are worth a line; the first that is heard of them is not. */
+function takeSources(state: ConsoleState, sources: readonly SourceStatus[], wallMs: number): void {
+  for (const source of sources) {
+    const before = state.sources.find((each) => each.stream === source.stream)?.state;
+    if (before === source.state) continue;
+    const failed = sourceWords(source);
+    if (failed !== null && before !== undefined) note(state, "warning", `${source.label}: ${failed}`, wallMs);
+    else if (before === "reconnecting") note(state, "info", `${source.label} is back`, wallMs);
+  }
+  state.sources = sources;
 }
 
 /** A page that only looked whether the seat is free asked for nothing, so nothing was refused. */

@@ -25,6 +25,13 @@ export interface RestartAnswer {
   readonly tag: string;
 }
 
+/** What a connection can carry. */
+export interface MediaOffer {
+  readonly cameras: number;
+  readonly microphones: number;
+  readonly voice: boolean; // whether the console takes the voice of who drives
+}
+
 const FRAGMENT = "application/trickle-ice-sdpfrag";
 const RESTART_LIMIT_MS = 5000;
 
@@ -32,12 +39,14 @@ const RESTART_LIMIT_MS = 5000;
 export class ConsoleApi {
   constructor(private readonly token: string) {}
 
-  /** How many cameras the robot has; 0 while that is not known. */
-  async media(signal: AbortSignal): Promise<{ cameras: number }> {
+  /** How many media there are to ask for; none while that is not known. */
+  async media(signal: AbortSignal): Promise<MediaOffer> {
     const session = await this.json("GET", "/api/session", undefined, signal);
-    const description = isRecord(session) ? session["description"] : undefined;
-    const cameras = isRecord(description) ? description["cameras"] : undefined;
-    return { cameras: Array.isArray(cameras) ? cameras.length : 0 };
+    const streams = isRecord(session) && Array.isArray(session["streams"]) ? session["streams"] : [];
+    const count = (kind: string): number =>
+      streams.filter((each: unknown) => isRecord(each) && each["kind"] === kind).length;
+    const voice = isRecord(session) && session["voice"] === true;
+    return { cameras: count("video"), microphones: count("audio"), voice };
   }
 
   async offer(sdp: string, trailer: boolean, signal: AbortSignal): Promise<WhepAnswer> {

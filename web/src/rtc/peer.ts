@@ -36,8 +36,9 @@ export interface PeerEvents {
   ended(end: PeerEnd): void; // once, unless closed from here
 }
 
-/** Offered before the robot's number of cameras is known; sections too many are answered inactive. */
+/** Offered before the console has said how many there are; sections too many are answered inactive. */
 const USUAL_CAMERAS = 2;
+const USUAL_MICROPHONES = 1;
 const CONNECT_LIMIT_MS = 10_000;
 const REQUEST_LIMIT_MS = 5000;
 
@@ -75,11 +76,13 @@ export class Peer {
     const media = this.api.media(AbortSignal.any([signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]));
     // Without these servers there may still be a direct path.
     const servers = this.refresh().catch(() => undefined);
-    let trailer = this.addSections(USUAL_CAMERAS, 1);
+    let trailer = this.addSections(USUAL_CAMERAS, USUAL_MICROPHONES);
     // The first offer makes the browser look for its codecs, which takes as long as the console's answer.
-    const [{ cameras }, usual] = await Promise.all([media, this.connection.createOffer(), servers]);
-    const more = cameras > USUAL_CAMERAS;
-    if (more) trailer = this.addSections(cameras - USUAL_CAMERAS, 0) || trailer;
+    const [offer, usual] = await Promise.all([media, this.connection.createOffer(), servers]);
+    const cameras = Math.max(0, offer.cameras - USUAL_CAMERAS);
+    const microphones = Math.max(0, offer.microphones - USUAL_MICROPHONES);
+    const more = cameras + microphones > 0;
+    if (more) trailer = this.addSections(cameras, microphones) || trailer;
     await this.connection.setLocalDescription(more ? await this.connection.createOffer() : usual);
     const answer = await this.api.offer(this.localSdp(), trailer, signal);
     this.location = answer.location;

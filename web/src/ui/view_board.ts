@@ -1,5 +1,6 @@
 import type { ConsoleApp } from "../console_app";
 import { robotIsUp } from "../core/console_state";
+import { sourceWords } from "../core/source_words";
 import { stalenessOf } from "../statistics";
 import type { StreamInfo } from "../wire";
 import { h, setData, setHidden, setText } from "./dom";
@@ -122,5 +123,6 @@ function veilWords(app: ConsoleApp, view: View, now: number): string | null {
   const video = app.room.videos.get(view.name);
   if (video === undefined) return "Not connected";
   if (!robotIsUp(app.state) && app.state.robot !== null) return "Robot unreachable";
-  return stalenessOf(app, video, now);
+  const source = app.state.sources.find((each) => each.stream === view.name);
+  return (source && sourceWords(source)) ?? stalenessOf(app, video, now);
 }

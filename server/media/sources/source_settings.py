@@ -1,0 +1,48 @@
+"""Settings of what is attached to the console itself. docs/media.md says how they are written."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, SecretStr, field_validator, model_validator
+from pydantic_settings import BaseSettings, NoDecode
+
+from server.media.sources.source_url import BadSource, SourceSpec, parse_sources
+
+__all__ = ["SourceSettings"]
+
+Sources = Annotated[tuple[SecretStr, ...], NoDecode]
+
+
+class SourceSettings(BaseSettings):
+    """Part of `Settings`. In the environment several stand in one variable, separated by spaces."""
+
+    cameras: Sources = Field(default=(), repr=False)  # there may be passwords in them
+    microphones: Sources = Field(default=(), repr=False)
+
+    @field_validator("cameras", "microphones", mode="before")
+    @classmethod
+    def _split_words(cls, value: object) -> object:
+        return tuple(value.split()) if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _check_sources(self) -> Self:
+        for word, kind, given in (("camera", "video", self.cameras), ("microphone", "audio", self.microphones)):
+            try:
+                parse_sources("video" if kind == "video" else "audio", _revealed(given))
+            except BadSource as error:
+                raise ValueError(f"{word}: {error}") from None
+        names = [spec.name for spec in self.sources]
+        if len(set(names)) != len(names):
+            raise ValueError("camera, microphone: two have the same name")
+        return self
+
+    @property
+    def sources(self) -> tuple[SourceSpec, ...]:
+        """All attached cameras and microphones."""
+        return (
+            *parse_sources("video", _revealed(self.cameras)),
+            *parse_sources("audio", _revealed(self.microphones)),
+        )
+
+
+def _revealed(texts: tuple[SecretStr, ...]) -> list[str]:
+    return [text.get_secret_value() for text in texts]

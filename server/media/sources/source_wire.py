@@ -1,0 +1,70 @@
+"""What a source's process says to the console: 4 bytes of length, then MessagePack, on its standard output."""
+
+import struct
+from typing import BinaryIO, Literal
+
+import msgspec
+
+__all__ = ["Captured", "Said", "SourceState", "Trouble", "Working", "read_said", "write_said"]
+
+MAX_LENGTH = 16_000_000  # bytes: a picture of 8 million pixels
+_LENGTH = struct.Struct("!I")
+
+SourceState = Literal["connecting", "live", "reconnecting"]
+Codec = Literal["yuv420p", "mjpeg", "h264", "pcm_s16le"]
+
+
+class Captured(msgspec.Struct, frozen=True, tag="captured", array_like=True):
+    """A picture or a segment of sound."""
+
+    codec: Codec
+    time: float  # s, when its capture began, on this machine's monotonic clock
+    payload: bytes
+    width: int = 0  # pixels
+    height: int = 0
+    sample_rate: int = 0  # Hz
+    channels: int = 0
+    keyframe: bool = True
+
+
+class Working(msgspec.Struct, frozen=True, tag="working", array_like=True):
+    """The source was opened; what it gives, in words without its address."""
+
+    detail: str
+
+
+class Trouble(msgspec.Struct, frozen=True, tag="trouble", array_like=True):
+    """It failed and is tried again."""
+
+    reason: str  # stable, to be counted
+    detail: str  # in words without its address
+
+
+Said = Captured | Working | Trouble
+
+_decoder: msgspec.msgpack.Decoder[Said] = msgspec.msgpack.Decoder(Said)
+_encoder = msgspec.msgpack.Encoder()
+
+
+def write_said(file: BinaryIO, said: Said) -> None:
+    data = _encoder.encode(said)
+    file.write(_LENGTH.pack(len(data)))
+    file.write(data)
+    file.flush()
+
+
+def read_said(file: BinaryIO) -> Said | None:
+    """The next one; None when the other side has ended, or makes no sense."""
+    head = file.read(_LENGTH.size)
+    if len(head) < _LENGTH.size:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    if length > MAX_LENGTH:
+        return None
+    data = file.read(length)
+    if len(data) < length:
+        return None
+    try:
+        return _decoder.decode(data)
+    except msgspec.DecodeError:
+        return None

@@ -1,0 +1,8 @@
+import type { SourceStatus } from "../wire";
+
+/** Why an attached camera or microphone gives nothing now, in words; null when it works. */
+export function sourceWords(source: SourceStatus): string | null {
+  if (source.state === "live") return null;
+  if (source.state === "connecting") return "Connecting…";
+  return source.detail === "" ? "Reconnecting…" : `Reconnecting… (${source.detail})`;
+}

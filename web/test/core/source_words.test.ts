@@ -1,0 +1,35 @@
+import { expect, test } from "vitest";
+
+import { applyMessage, createConsoleState } from "../../src/core/console_state";
+import { sourceWords } from "../../src/core/source_words";
+import type { SourceStatus } from "../../src/wire";
+
+const front = (state: SourceStatus["state"], detail = ""): SourceStatus => ({
+  stream: "front",
+  label: "Front",
+  state,
+  detail,
+});
+
+test("a source that works needs no words, one that does not says why", () => {
+  expect(sourceWords(front("live"))).toBeNull();
+  expect(sourceWords(front("connecting"))).toBe("Connecting…");
+  expect(sourceWords(front("reconnecting"))).toBe("Reconnecting…");
+  expect(sourceWords(front("reconnecting", "connection refused"))).toBe("Reconnecting… (connection refused)");
+});
+
+test("a source that fails and comes back is logged once each; one that connects at first is not", () => {
+  const state = createConsoleState();
+  const say = (...sources: SourceStatus[]): void => applyMessage(state, { type: "sources", sources }, 0);
+  say(front("connecting"));
+  say(front("live"));
+  expect(state.log).toEqual([]);
+  say(front("reconnecting", "it has ended"));
+  say(front("reconnecting", "connection refused"));
+  say(front("live"));
+  expect(state.log.map((line) => line.text)).toEqual([
+    "Front is back",
+    "Front: Reconnecting… (it has ended)",
+  ]);
+  expect(state.sources).toEqual([front("live")]);
+});
