@@ -112,4 +112,5 @@ def _frame(output: Output, sound: EncodedSound) -> EncodedFrame:
         stamp=sound.stamp,
         capture_time=output.monotone(sound.capture_time),
         media_time=sound.media_time,
+        time=sound.link_time,
     )

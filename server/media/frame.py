@@ -41,6 +41,7 @@ class EncodedFrame:
         "marker",
         "media_time",
         "stamp",
+        "time",
     )
 
     def __init__(
@@ -53,6 +54,7 @@ class EncodedFrame:
         stamp: int,
         capture_time: float,
         media_time: int,
+        time: float = 0.0,
     ) -> None:
         self.data = data
         self.keyframe = keyframe  # decodable without earlier frames; always so for sound
@@ -60,6 +62,7 @@ class EncodedFrame:
         self.stamp = stamp  # event reference at capture
         self.capture_time = capture_time  # s since 1970
         self.media_time = media_time  # in the codec's RTP clock, from 0
+        self.time = time  # s, at capture, on the monotonic clock of the source
         self._packetise = packetise
         self._plain: list[bytes] | None = None
         self._with_trailer: list[bytes] | None = None

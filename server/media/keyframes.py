@@ -21,6 +21,7 @@ class KeyframeScheduler:
 
     def __init__(self, interval_seconds: float, spacing_seconds: float) -> None:
         self.sparing = False  # keyframes that nobody asked for come six times more rarely: the path has no room
+        self.longest: float | None = None  # s between two, twice that while sparing; None: the interval alone counts
         self._interval = interval_seconds
         self._least_spacing = spacing_seconds
         self._spacing = spacing_seconds
@@ -56,6 +57,8 @@ class KeyframeScheduler:
 
     def _wanted(self, now: float) -> bool:
         interval = self._interval * (SPARING if self.sparing else 1)
+        if self.longest is not None:
+            interval = min(interval, self.longest * (2 if self.sparing else 1))
         if self._last is None or now - self._last >= interval:
             return True
         spacing = self._least_spacing if self._joined else self._spacing

@@ -10,7 +10,7 @@ from server.media.quality.plan import PicturePlan
 
 __all__ = ["KEYFRAME_CAUSES", "Output"]
 
-KEYFRAME_CAUSES = ("join", "pli", "drop", "tier")
+KEYFRAME_CAUSES = ("join", "pli", "drop", "tier", "record")
 
 
 class Output:
@@ -36,6 +36,7 @@ class Output:
         self.cadence = Cadence()
         self.targets: dict[PeerStream, None] = {}  # an ordered set
         self.arriving: dict[PeerStream, Output] = {}  # and where each comes from
+        self.recorded = False  # whether a recording takes it
         self.paused_until = 0.0  # no picture before; on the clock of `Stream.feed`
         self.encoded_at = 0.0  # when the last picture was taken, on the same clock
         self._last_capture_time = 0.0
@@ -46,7 +47,7 @@ class Output:
 
     @property
     def needed(self) -> bool:
-        return bool(self.targets or self.arriving)
+        return bool(self.targets or self.arriving or self.recorded)
 
     @property
     def held_up(self) -> bool:
@@ -82,7 +83,7 @@ class Output:
         self._requests[cause].inc()
 
     def request_keyframe(self, cause: str) -> None:
-        """`cause`: "pli" when the peer asks, "drop" when it could not keep up."""
+        """`cause`: "pli" when the peer asks, "drop" when it could not keep up, "record" for a recording."""
         self.keyframes.request()
         self._requests[cause].inc()
 

@@ -127,7 +127,7 @@ class MediaPlane:
                 None
                 if self._recorder is None
                 else RecordedOutput(
-                    ("H264",) if video else stream.codecs,
+                    _recorded_codec(stream),
                     "high" if video else "operator",
                     self._recorder,
                     keyframe_seconds=self._record_keyframes,
@@ -141,8 +141,8 @@ class MediaPlane:
             stream.record_keyframe()
 
     def recorded_codecs(self) -> dict[str, str]:
-        """What each stream is recorded as if nobody takes it, by its name."""
-        return {each.name: "H264" if each.kind == "video" else each.codecs[0] for each in self._streams.values()}
+        """What each stream is recorded as, by its name: "H264", "opus" or "PCMU"."""
+        return {each.name: _recorded_codec(each) for each in self._streams.values()}
 
     def _attached_stream(self, spec: SourceSpec, name: str) -> AnyStream:
         """What the source really gives shows when it comes."""
@@ -304,6 +304,13 @@ class MediaPlane:
 def _msid(name: str) -> str:
     """`name` as a media stream id: only the characters of RFC 8830 2 (token-char), at most 64."""
     return re.sub(r"[^0-9A-Za-z!#$%&'*+.^_`{|}~-]", "_", name)[:64] or "_"
+
+
+def _recorded_codec(stream: AnyStream) -> str:
+    """One for good: a file says once what it holds."""
+    if stream.kind == "video":
+        return "H264"
+    return "opus" if "opus" in stream.codecs else stream.codecs[0]
 
 
 def _free_name(wanted: str, taken: Container[str]) -> str:

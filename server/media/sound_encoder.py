@@ -47,6 +47,7 @@ class EncodedSound(NamedTuple):
     media_time: int  # in the codec's RTP clock
     stamp: int
     capture_time: float
+    link_time: float
     talkspurt: bool  # the first packet, or the first after missing sound (RFC 3551 4.1: the marker)
 
 
@@ -54,6 +55,7 @@ class _Mark(NamedTuple):
     position: int  # index of a segment's first sample, in the codec's rate
     stamp: int
     capture_time: float
+    link_time: float
 
 
 class SoundEncoder(ABC):
@@ -109,7 +111,7 @@ class SoundEncoder(ABC):
         if not continuous:
             position = max(position, end)
             self._restart(position)
-        self._marks.append(_Mark(position, segment.stamp, segment.capture_time))
+        self._marks.append(_Mark(position, segment.stamp, segment.capture_time, segment.link_time))
 
     def _buffered(self) -> int:
         return len(self._buffer) // self.channels
@@ -137,8 +139,17 @@ class SoundEncoder(ABC):
             self._buffer = self._buffer[size * self.channels :]
             data = self._compress(np.ascontiguousarray(samples))
             oldest = self._mark(self._position - self.look_ahead)
-            capture_time = oldest.capture_time + (self._position - oldest.position) / self.rate
-            packets.append(EncodedSound(data, self._position, oldest.stamp, capture_time, self._talkspurt))
+            passed = (self._position - oldest.position) / self.rate
+            packets.append(
+                EncodedSound(
+                    data,
+                    self._position,
+                    oldest.stamp,
+                    oldest.capture_time + passed,
+                    oldest.link_time + passed,
+                    self._talkspurt,
+                )
+            )
             self._talkspurt = False
             self._position += size
         return packets

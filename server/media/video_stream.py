@@ -126,6 +126,7 @@ class VideoStream(Stream[PictureJob]):
             stamp=media.stamp,
             capture_time=capture_time,
             media_time=self._clock.timestamp(media.time),
+            time=media.time,
         )
         for output in self._outputs.values():
             if output.codec != "H264" and output.targets:
@@ -199,6 +200,7 @@ class VideoStream(Stream[PictureJob]):
             stamp=source.media.stamp,
             capture_time=job.capture_time,
             media_time=source.media_time,
+            time=source.media.time,
         )
         for trailer in job.variants:
             packed.payloads(trailer)

@@ -137,17 +137,19 @@ class IndexBuilder:
             self._chunk = None
 
     def written(self) -> EventIndex:
-        """The index of what is in the file by now: a copy, whose lists grow no more."""
+        """The index of what is in the file by now: a copy. May be called from another thread."""
         index = self.index
-        count = len(index.chunks)
+        chunks = list(index.chunks)
+        ended = chunks[-1].ended if chunks else index.started
         return msgspec.structs.replace(
             index,
-            ended=index.chunks[-1].ended if index.chunks else index.started,
-            chunks=list(index.chunks),
-            events=[each for each in index.events if each.chunk < count],
+            ended=ended,
+            chunks=chunks,
+            events=[each for each in list(index.events) if each.chunk < len(chunks)],
             keyframes={
-                topic: [each for each in entries if each.chunk < count] for topic, entries in index.keyframes.items()
+                topic: [each for each in list(entries) if each.chunk < len(chunks)]
+                for topic, entries in list(index.keyframes.items())
             },
-            marks=list(index.marks),
+            marks=[each for each in list(index.marks) if each.time <= ended],
             counts=dict(index.counts),
         )

@@ -76,6 +76,7 @@ class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
     stop: StopState = StopState()
     faults: list[str] = []
     limits: list[str] = []
+    unknown: list[str] = []
 
 
 class RefusalRecord(OwnRecord, frozen=True, kw_only=True):

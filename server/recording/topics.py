@@ -1,6 +1,7 @@
 """The topics of a recording, with their schemas. No I/O."""
 
 import json
+from collections.abc import Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -42,6 +43,7 @@ __all__ = [
     "POSE",
     "SCAN",
     "Topic",
+    "media_topic",
     "own_schema",
     "stream_of",
     "topics_of",
@@ -49,6 +51,8 @@ __all__ = [
 
 CAMERA, MICROPHONE = "/camera/", "/microphone/"  # and the stream's name
 JOINTS, SCAN, POSE, LOG = "/joint_states", "/scan", "/pose", "/log"
+
+MEDIA_SCHEMAS: dict[str, type[Message]] = {"H264": CompressedVideo, "opus": CompressedAudio, "PCMU": RawAudio}
 
 OWN_TOPICS: dict[type[OwnRecord], str] = {
     RobotRecord: "/lockstep/robot",
@@ -74,15 +78,13 @@ class Topic(NamedTuple):
     encoding: str  # of the messages: "protobuf" or "json"
 
 
-def topics_of(description: RobotDescription, sound_formats: dict[str, str]) -> list[Topic]:
-    """All that a recording of this robot can have; `sound_formats`: "opus" or "g711-ulaw" by microphone."""
+def topics_of(description: RobotDescription, codecs: Mapping[str, str]) -> list[Topic]:
+    """All that a recording of this robot can have; `codecs`: "H264", "opus" or "PCMU" by stream."""
     found = [_own(topic, kind) for kind, topic in OWN_TOPICS.items() if kind is not WrenchRecord]
     if description.wrench is not None:
         found.append(_own(OWN_TOPICS[WrenchRecord], WrenchRecord))
-    found += [_foxglove(CAMERA + camera.name, CompressedVideo) for camera in description.cameras]
-    for microphone in description.microphones:
-        kind = CompressedAudio if sound_formats.get(microphone.name, "opus") == "opus" else RawAudio
-        found.append(_foxglove(MICROPHONE + microphone.name, kind))
+    for stream, codec in codecs.items():
+        found.append(_foxglove(media_topic(stream, codec), MEDIA_SCHEMAS[codec]))
     if description.joints:
         found.append(_foxglove(JOINTS, JointStates))
     if description.ranges is not None:
@@ -91,6 +93,10 @@ def topics_of(description: RobotDescription, sound_formats: dict[str, str]) -> l
         found.append(_foxglove(POSE, PoseInFrame))
     found.append(_foxglove(LOG, Log))
     return found
+
+
+def media_topic(stream: str, codec: str) -> str:
+    return (CAMERA if codec == "H264" else MICROPHONE) + stream
 
 
 def stream_of(topic: str) -> str:

@@ -1,6 +1,7 @@
 """Writes one recording file: MCAP, in chunks that are on the disk within a second. Used from one thread."""
 
 import os
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -44,7 +45,7 @@ class RecordingWriter:
     """
 
     def __init__(
-        self, path: Path, info: RecordingInfo, description: RobotDescription, sound_formats: dict[str, str]
+        self, path: Path, info: RecordingInfo, description: RobotDescription, codecs: Mapping[str, str]
     ) -> None:
         self.path = path
         self._builder = IndexBuilder(EventIndex(epoch=info.epoch, recording=info.recording, part=info.part))
@@ -61,7 +62,7 @@ class RecordingWriter:
         try:
             self._writer.start(profile="", library=LIBRARY)
             self._writer.add_metadata(METADATA_NAME, info.metadata())
-            self._register(topics_of(description, sound_formats), info.epoch)
+            self._register(topics_of(description, codecs), info.epoch)
             self._sync()
         except OSError as error:
             self.abandon()
@@ -95,8 +96,11 @@ class RecordingWriter:
         return self._builder.written()
 
     def write(self, entry: Entry) -> None:
-        """Put it into the chunk. A topic that the robot does not have is a fault of the caller."""
-        channel = self._channels[entry.topic]
+        """Put it into the chunk. A topic that the file does not have is left out, and counted as lost."""
+        channel = self._channels.get(entry.topic)
+        if channel is None:
+            self.count_lost(1)
+            return
         self._writer.add_message(channel, entry.arrived, entry.data, publish_time=entry.captured, sequence=entry.event)
         if self._chunk_since is None:
             self._chunk_since = entry.arrived

@@ -119,7 +119,7 @@ class Story:
         yield from feedback_messages(DESCRIPTION, record, at, at - 2_000_000)
 
     def write(self, *, close: bool = True) -> RecordingWriter:
-        writer = RecordingWriter(self.path, INFO, DESCRIPTION, {})
+        writer = RecordingWriter(self.path, INFO, DESCRIPTION, {"front": "H264", "ear": "opus"})
         for entry in sorted(self.entries(), key=lambda entry: entry.arrived):
             writer.flush_if_due(entry.arrived)
             writer.write(entry)
