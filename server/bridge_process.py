@@ -7,7 +7,9 @@ import shutil
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 
+import robot_bridge
 from server.backoff import Backoff
 
 __all__ = ["BridgeFailed", "BridgeProcess"]
@@ -15,6 +17,7 @@ __all__ = ["BridgeFailed", "BridgeProcess"]
 START_TIMEOUT = 60.0  # s; a physics engine and a GL context may have to be loaded
 STOP_TIMEOUT = 5.0  # s to bring the robot to rest and go
 MAX_LINE = 4096
+NOT_FOUND = 127  # the shell's code for a program that cannot be run
 
 
 class BridgeFailed(Exception):
@@ -35,14 +38,29 @@ class BridgeProcess:
     """
 
     def __init__(
-        self, robot: str, host: str, port: int, options: list[str], secret: str, say: Callable[[str], None]
+        self,
+        robot: str,
+        host: str,
+        port: int,
+        options: list[str],
+        secret: str,
+        say: Callable[[str], None],
+        python: str | None = None,
     ) -> None:
-        """`secret`: of the robot link; an environment variable takes it there, which other users cannot read."""
+        """`secret`: of the robot link; an environment variable takes it there, which other users cannot read.
+
+        `python`: another interpreter than ours, such as that of a ROS installation. It finds the bridge's code here.
+        """
         self._robot = robot
         self._host = host
         self._port = port
         self._options = options
+        self._python = python or sys.executable
         self._environment = {**os.environ, "LOCKSTEP_LINK_SECRET": secret}
+        if python is not None:
+            here = str(Path(robot_bridge.__file__).parents[1])
+            paths = [self._environment.get("PYTHONPATH", ""), here]
+            self._environment["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
         self._say = say
         self._process: asyncio.subprocess.Process | None = None
         self._backoff = Backoff(0.5, 10.0)
@@ -54,19 +72,23 @@ class BridgeProcess:
             BridgeFailed: it ended, or said nothing in time.
         """
         command = [
-            *(sys.executable, "-m", "robot_bridge", self._robot, "--json"),
+            *(self._python, "-m", "robot_bridge", self._robot, "--json"),
             *("--host", self._host, "--port", str(self._port), *self._options),
         ]
         if (setpriv := shutil.which("setpriv")) is not None:
             command = [setpriv, "--pdeathsig", "TERM", *command]  # also when the console is killed
-        self._process = await asyncio.create_subprocess_exec(
-            *command,
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE,
-            limit=MAX_LINE,
-            start_new_session=True,
-            env=self._environment,
-        )
+        try:
+            self._process = await asyncio.create_subprocess_exec(
+                *command,
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                limit=MAX_LINE,
+                start_new_session=True,
+                env=self._environment,
+            )
+        except OSError as error:
+            self._say(f"{error.filename}: {error.strerror}")
+            raise BridgeFailed(NOT_FOUND) from error
         try:
             address = await self._read_address(self._process)
         except BaseException:

@@ -89,6 +89,12 @@ def up(
     ros2: Annotated[
         Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
     ] = None,
+    robot_python: Annotated[
+        str | None,
+        typer.Option(
+            envvar="LOCKSTEP_ROBOT_PYTHON", help="Python that runs the bridge, as that of a ROS installation; or ours."
+        ),
+    ] = None,
     robot_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the bridge; 0 takes any free one.")] = 5600,
     event_log: Annotated[Path | None, typer.Option(help="The bridge appends what happens to events here.")] = None,
     host: Host = None,
@@ -129,7 +135,7 @@ def up(
     options += [] if ros2 is None else ["--ros2", str(ros2)]
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
-    bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, secret.reveal(), _say)
+    bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, secret.reveal(), _say, robot_python)
     _run(settings, bridge, as_json, quiet)
 
 

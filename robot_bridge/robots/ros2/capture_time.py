@@ -1,0 +1,34 @@
+"""When a picture that has just arrived was captured, on the bridge's own clock. No I/O, no clock.
+
+The answer may be too early, never too late: a picture that is stamped too late would pass for newer than it is.
+"""
+
+from typing import Literal
+
+__all__ = ["ClockMismatch", "captured_at"]
+
+OLDEST = 10.0  # s; what seems older has a clock that is not ours
+
+
+class ClockMismatch(ValueError):
+    """A header stamp that this machine's clock cannot have given; the text names it, to be counted by."""
+
+
+def captured_at(
+    source: Literal["header", "arrival"], *, arrived: float, arrived_ros: int, header: int, latency: float
+) -> float:
+    """`arrived` (s, monotonic) and `arrived_ros` (ns, the ROS clock) are the same instant.
+
+    Raises:
+        ClockMismatch: the header's stamp is missing, in the future or far in the past.
+    """
+    if source == "arrival":
+        return arrived - latency
+    if header == 0:
+        raise ClockMismatch("picture without a header stamp (set captured: arrival)")
+    age = (arrived_ros - header) / 1e9
+    if age < 0:
+        raise ClockMismatch("header stamp from the future (are the clocks synchronised?)")
+    if age > OLDEST:
+        raise ClockMismatch("header stamp far in the past (are the clocks synchronised?)")
+    return arrived - age - latency

@@ -1,0 +1,54 @@
+"""From a sensor_msgs/LaserScan to the few rays that a console draws. No I/O."""
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["BadScan", "Scan", "Sectors"]
+
+MAX_RAYS = 100_000
+
+
+class BadScan(ValueError):
+    """A scan that contradicts itself; the text names what is wrong, without figures, to be counted by."""
+
+
+class Scan(Protocol):
+    """The fields of sensor_msgs/LaserScan that matter."""
+
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: Sequence[float]
+
+
+class Sectors:
+    """`count` sectors all around, the first centred on -pi; each shows the nearest thing within it."""
+
+    def __init__(self, count: int, range_min: float, range_max: float, yaw: float = 0.0) -> None:
+        """`yaw`: of the scanner's frame in the body's, rad."""
+        self._count = count
+        self._range_min = range_min
+        self._range_max = range_max
+        self._yaw = yaw
+
+    def gather(self, scan: Scan) -> list[float]:
+        """Raises:
+        BadScan: the scan contradicts itself.
+        """
+        ranges: npt.NDArray[np.float64] = np.asarray(scan.ranges, np.float64)
+        if not 0 < ranges.size <= MAX_RAYS:
+            raise BadScan("scan without rays, or with far too many")
+        if not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)) or scan.angle_increment == 0:
+            raise BadScan("scan whose angles make no sense")
+        angles = scan.angle_min + self._yaw + scan.angle_increment * np.arange(ranges.size)
+        # Beyond its own limits a scanner says nothing (REP 117: NaN is wrong, infinite is free).
+        seen = (ranges >= max(scan.range_min, self._range_min)) & (ranges <= min(scan.range_max, self._range_max))
+        sectors = np.rint((angles[seen] + math.pi) * (self._count / math.tau)).astype(np.int64) % self._count
+        nearest = np.full(self._count, self._range_max)
+        np.minimum.at(nearest, sectors, ranges[seen])
+        return [float(distance) for distance in nearest]

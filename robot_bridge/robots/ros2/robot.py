@@ -1,0 +1,83 @@
+"""A robot behind ROS 2 topics, as the bridge sees it."""
+
+import time
+from collections.abc import Sequence
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.robots.base import Measurement, MediaSource, Robot
+from robot_bridge.robots.ros2.arm_drive import ArmDrive
+from robot_bridge.robots.ros2.base_drive import BaseDrive
+from robot_bridge.robots.ros2.camera import CameraSource
+from robot_bridge.robots.ros2.drive import Drive
+from robot_bridge.robots.ros2.ros_side import RosSide
+from robot_bridge.robots.ros2.sensors import RangeSensor, WrenchTopic
+from robot_bridge.robots.ros2.settings import Ros2Settings
+
+__all__ = ["Ros2Robot"]
+
+
+class Ros2Robot(Robot):
+    """Drives its parts, and gathers what they and the sensors say."""
+
+    tick_seconds = 0.01
+
+    def __init__(self, settings: Ros2Settings, description: RobotDescription) -> None:
+        """Raises:
+        RobotUnavailable: ROS 2 is missing or does not start.
+        """
+        self._description = description
+        self._ros = RosSide(settings)
+        try:
+            self._drives: list[Drive] = []
+            if settings.base is not None:
+                self._drives.append(BaseDrive(self._ros, settings.base, self.tick_seconds))
+            if settings.arm is not None:
+                self._drives.append(ArmDrive(self._ros, settings.arm, self.tick_seconds))
+            self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges)
+            self._wrench = None if settings.wrench is None else WrenchTopic(self._ros, settings.wrench)
+            self._cameras = [CameraSource(self._ros, camera) for camera in settings.cameras]
+            self._ros.start()
+        except BaseException:
+            self._ros.close()
+            raise
+
+    def describe(self) -> RobotDescription:
+        return self._description
+
+    def apply(self, values: Sequence[float]) -> None:
+        start = 0
+        for drive in self._drives:
+            drive.step(values[start : start + drive.size], self.tick_seconds)
+            start += drive.size
+
+    def tick(self) -> None:
+        if self._ros.failure is not None:
+            raise self._ros.failure
+
+    def measure(self) -> Measurement:
+        now = time.monotonic()
+        sensed = [drive.sense(now) for drive in self._drives]
+        faults = [fault for drive in self._drives for fault in drive.faults(now)]
+        for sensor in (self._ranges, self._wrench, *self._cameras):
+            if sensor is not None:
+                faults += sensor.faults(now)
+        return Measurement(
+            axes=[value for part in sensed for value in part.axes],
+            joints=[value for part in sensed for value in part.joints],
+            wrench=[] if self._wrench is None else self._wrench.values(now),
+            ranges=[] if self._ranges is None else self._ranges.values(now),
+            at_rest=all(part.at_rest for part in sensed),
+            faults=faults,
+        )
+
+    def positions(self) -> Sequence[float]:
+        now = time.monotonic()
+        return [value for drive in self._drives for value in drive.joints(now)]
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._cameras
+
+    def close(self) -> None:
+        for drive in self._drives:
+            drive.end()
+        self._ros.close()

@@ -1,0 +1,61 @@
+"""Sensors that a console draws beside the robot's state: ranges and a wrench."""
+
+import math
+import time
+from typing import Any
+
+from robot_bridge.robots.ros2.laser_scan import BadScan, Sectors
+from robot_bridge.robots.ros2.newest import Newest
+from robot_bridge.robots.ros2.ros_side import RosSide, header_ns
+from robot_bridge.robots.ros2.settings import Ranges, Wrench
+
+__all__ = ["RangeSensor", "WrenchTopic"]
+
+
+class RangeSensor:
+    """sensor_msgs/LaserScan."""
+
+    def __init__(self, ros: RosSide, settings: Ranges) -> None:
+        self._sectors = Sectors(settings.count, settings.range_min, settings.range_max, settings.yaw)
+        self._scans: Newest[list[float]] = Newest(settings.topic, settings.timeout)
+        ros.subscribe(ros.message("sensor_msgs", "LaserScan"), settings.topic, self._take)
+
+    def values(self, now: float) -> list[float]:
+        """Empty when they are too old."""
+        arrived = self._scans.fresh(now)
+        return [] if arrived is None else arrived.value
+
+    def faults(self, now: float) -> list[str]:
+        return self._scans.faults(now)
+
+    def _take(self, message: Any) -> None:
+        now = time.monotonic()
+        try:
+            self._scans.put(self._sectors.gather(message), now, header_ns(message.header))
+        except BadScan as error:
+            self._scans.refuse(str(error), now)
+
+
+class WrenchTopic:
+    """geometry_msgs/WrenchStamped."""
+
+    def __init__(self, ros: RosSide, settings: Wrench) -> None:
+        self._wrenches: Newest[list[float]] = Newest(settings.topic, settings.timeout)
+        ros.subscribe(ros.message("geometry_msgs", "WrenchStamped"), settings.topic, self._take)
+
+    def values(self, now: float) -> list[float]:
+        """Empty when they are too old."""
+        arrived = self._wrenches.fresh(now)
+        return [] if arrived is None else arrived.value
+
+    def faults(self, now: float) -> list[str]:
+        return self._wrenches.faults(now)
+
+    def _take(self, message: Any) -> None:
+        now = time.monotonic()
+        force, torque = message.wrench.force, message.wrench.torque
+        values = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+        if all(map(math.isfinite, values)):
+            self._wrenches.put(values, now, header_ns(message.header))
+        else:
+            self._wrenches.refuse("wrench with a value that is not a number", now)

@@ -1,0 +1,210 @@
+"""Plays a robot on ROS 2 topics: a base, an arm, a laser scanner, a force sensor and a camera. Run with ROS' Python.
+
+It does what it is told until it is told otherwise, with no timeout of its own, so that whoever forgets a zero is found
+out. Each command and each picture is a JSON line in the log. Lines on standard input: `hush TOPIC`, `speak TOPIC`,
+`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense).
+"""
+
+import array
+import json
+import math
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import CompressedImage, Image, JointState, LaserScan
+from trajectory_msgs.msg import JointTrajectory
+
+JOINTS = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
+WIDTH, HEIGHT = 320, 240
+CELLS = 32
+TICK = 0.02  # s
+PICTURE_EVERY, SCAN_EVERY = 3, 4  # ticks
+ARM_SPEED = 3.0  # 1/s, how fast a joint closes on its setpoint
+WALL = 3.0  # m from the origin, all around
+
+
+class RobotNode(Node):  # type: ignore[misc]
+    def __init__(self, log: Path) -> None:
+        super().__init__("test_robot")
+        self._log = log.open("a", buffering=1)
+        self._pose = [0.0, 0.0, 0.0]
+        self._twist = [0.0, 0.0]
+        self._positions = [0.0, -1.0, 1.0, 0.0, 0.0, 0.0]
+        self._setpoints = list(self._positions)
+        self._velocities = [0.0] * len(JOINTS)
+        self._ticks = 0
+        self._pictures = 0
+        self._hushed: set[str] = set()
+        self._frozen: dict[str, Any] = {}
+        self._spoilt: set[str] = set()
+        self._topics = {
+            "/odom": self.create_publisher(Odometry, "/odom", 10),
+            "/joint_states": self.create_publisher(JointState, "/joint_states", 10),
+            "/scan": self.create_publisher(LaserScan, "/scan", qos_profile_sensor_data),
+            "/wrench": self.create_publisher(WrenchStamped, "/force_torque_sensor_broadcaster/wrench", 10),
+            "/image": self.create_publisher(Image, "/camera/image_raw", qos_profile_sensor_data),
+            "/jpeg": self.create_publisher(
+                CompressedImage, "/wrist_camera/image_raw/compressed", qos_profile_sensor_data
+            ),
+        }
+        self.create_subscription(TwistStamped, "/cmd_vel", self._take_stamped, 10)
+        self.create_subscription(Twist, "/cmd_vel_plain", self._take_twist, 10)
+        self.create_subscription(
+            JointTrajectory, "/joint_trajectory_controller/joint_trajectory", self._take_trajectory, 10
+        )
+        self.create_subscription(JointState, "/joint_command", self._take_joints, 10)
+        self.create_timer(TICK, self._tick)
+
+    def tell(self, line: str) -> None:
+        """One line of standard input."""
+        verb, _, topic = line.partition(" ")
+        if verb == "hush":
+            self._hushed.add(topic)
+        elif verb == "speak":
+            self._hushed.discard(topic)
+            self._frozen.pop(topic, None)
+        elif verb == "freeze":
+            self._frozen[topic] = None
+        elif verb == "spoil":
+            self._spoilt.add(topic)
+        self.note("told", line=line)
+
+    def note(self, kind: str, **fields: object) -> None:
+        self._log.write(json.dumps({"kind": kind, "time": time.monotonic(), **fields}) + "\n")
+
+    def _take_stamped(self, message: TwistStamped) -> None:
+        self._take_twist(message.twist)
+
+    def _take_twist(self, twist: Twist) -> None:
+        self._twist = [twist.linear.x, twist.angular.z]
+        self.note("twist", values=self._twist)
+
+    def _take_trajectory(self, message: JointTrajectory) -> None:
+        point = message.points[0]
+        span = point.time_from_start.sec + point.time_from_start.nanosec / 1e9
+        self._setpoints = list(point.positions)
+        self.note(
+            "trajectory",
+            names=list(message.joint_names),
+            positions=self._setpoints,
+            span=span,
+            measured=self._positions,
+        )
+
+    def _take_joints(self, message: JointState) -> None:
+        self._setpoints = list(message.position)
+        self.note("joints", positions=self._setpoints, velocities=list(message.velocity), measured=self._positions)
+
+    def _tick(self) -> None:
+        self._ticks += 1
+        forward, turn = self._twist
+        x, y, yaw = self._pose
+        yaw = math.remainder(yaw + turn * TICK, math.tau)
+        self._pose = [x + forward * math.cos(yaw) * TICK, y + forward * math.sin(yaw) * TICK, yaw]
+        for number, (point, position) in enumerate(zip(self._setpoints, self._positions, strict=True)):
+            velocity = ARM_SPEED * (point - position)
+            self._velocities[number] = velocity if abs(velocity) > 1e-4 else 0.0
+            self._positions[number] += self._velocities[number] * TICK
+        self._send("/odom", self._odometry)
+        self._send("/joint_states", self._joint_states)
+        self._send("/wrench", self._wrench)
+        if self._ticks % SCAN_EVERY == 0:
+            self._send("/scan", self._scan)
+        if self._ticks % PICTURE_EVERY == 0:
+            self._pictures += 1
+            self._send("/image", self._image)
+
+    def _send(self, topic: str, make: Any) -> None:
+        if topic in self._hushed:
+            return
+        message = self._frozen.get(topic) or make(self.get_clock().now().to_msg(), topic in self._spoilt)
+        self._spoilt.discard(topic)
+        if topic in self._frozen:
+            self._frozen[topic] = message
+        self._topics[topic].publish(message)
+
+    def _odometry(self, stamp: Any, spoilt: bool) -> Odometry:
+        message = Odometry()
+        message.header.stamp = stamp
+        position, turn = message.pose.pose.position, message.pose.pose.orientation
+        position.x, position.y = (math.nan if spoilt else self._pose[0]), self._pose[1]
+        turn.w, turn.z = math.cos(self._pose[2] / 2), math.sin(self._pose[2] / 2)
+        message.twist.twist.linear.x, message.twist.twist.angular.z = self._twist
+        return message
+
+    def _joint_states(self, stamp: Any, spoilt: bool) -> JointState:
+        message = JointState()
+        message.header.stamp = stamp
+        message.name = ["some_gripper", *JOINTS]
+        message.position = [0.5, *self._positions][: 3 if spoilt else None]
+        message.velocity = [0.0, *self._velocities]
+        return message
+
+    def _wrench(self, stamp: Any, spoilt: bool) -> WrenchStamped:
+        message = WrenchStamped()
+        message.header.stamp = stamp
+        message.wrench.force.z = math.nan if spoilt else -10.0 * self._positions[0]
+        return message
+
+    def _scan(self, stamp: Any, spoilt: bool) -> LaserScan:
+        message = LaserScan()
+        message.header.stamp = stamp
+        message.angle_min, message.angle_max = -math.pi, math.pi
+        message.angle_increment = 0.0 if spoilt else math.tau / 360
+        message.range_min, message.range_max = 0.1, 12.0
+        message.ranges = [math.inf] * 360
+        ahead = min(max(WALL - self._pose[0], 0.2), 7.9)
+        message.ranges[170:190] = array.array("f", [ahead] * 20)
+        return message
+
+    def _image(self, stamp: Any, spoilt: bool) -> Image:
+        """The picture's number in a strip of black and white cells above, the base's place as a dot below."""
+        number = self._pictures
+        picture = np.full((HEIGHT, WIDTH, 3), 60, np.uint8)
+        for cell in range(CELLS):
+            bit = number >> (CELLS - 1 - cell) & 1
+            picture[:12, cell * WIDTH // CELLS : (cell + 1) * WIDTH // CELLS] = 255 if bit else 0
+        x = int(WIDTH / 2 + self._pose[0] * 50) % WIDTH
+        y = HEIGHT // 2 + int(self._pose[1] * 50) % (HEIGHT // 2)
+        picture[max(14, y - 10) : y + 10, max(0, x - 10) : x + 10] = (240, 120, 30)
+        message = Image()
+        message.header.stamp = stamp
+        message.width, message.height, message.encoding = WIDTH, HEIGHT, "16UC1" if spoilt else "rgb8"
+        message.step = 3 * WIDTH
+        message.data = array.array("B", picture.tobytes())
+        self.note("picture", number=number)
+        return message
+
+
+def listen(node: RobotNode) -> None:
+    for line in sys.stdin:
+        node.tell(line.strip())
+
+
+def main() -> None:
+    rclpy.init()
+    node = RobotNode(Path(sys.argv[1]))
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    threading.Thread(target=listen, args=(node,), daemon=True).start()
+    print(json.dumps({"ready": True}), flush=True)
+    try:
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+
+
+if __name__ == "__main__":
+    main()
