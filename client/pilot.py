@@ -9,6 +9,8 @@ and hand out what `outcomes` returns.
 - New in the control seat, the first command is neutral: the console refuses a moving one.
 - While the path loses packets every command is sent twice, `ECHO` apart: the copy covers the loss of the command,
   and, being answered from the stored feedback, the loss of the answer too. On a clean path nothing is doubled.
+- Losses come in a row. When both were lost on such a path, the first repeat is a salvo of `SALVO` copies, which ends
+  with the answer: of a row of lost packets, one that counts packets and not time, single repeats would wait out each.
 """
 
 from collections import deque
@@ -26,6 +28,9 @@ __all__ = ["Outcome", "Pilot"]
 
 IDLE = 0.2  # s; 5 Hz
 ECHO = 0.020  # s; longer than the console's own path to the robot and back
+SALVO = 8
+SALVO_SPACING = 0.003  # s
+SALVO_LEAST = 0.050  # s; with a shorter interval single repeats are as quick
 LOSSY_SPELL = 60.0  # s to go on doubling after the last loss that was seen
 PATIENT_REASONS = {"late", "out_of_order", "rested", "not_neutral"}  # another try, on fresh feedback, can succeed
 NEEDLESS = 0.25  # an answer that follows the last repeat within this part of the whole wait answers an earlier sending
@@ -62,6 +67,7 @@ class _Flight:
         self.last_sent_at = now
         self.repeat_at = NEVER
         self.echo_at = NEVER
+        self.echoes_left = 0
 
 
 class Pilot:
@@ -219,7 +225,8 @@ class Pilot:
         command = Command(event=event, issue=issue, values=self._values_for(want))
         flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now)
         flight.repeat_at = now + self._wait(1)
-        flight.echo_at = now + ECHO if now < self._lossy_until else NEVER
+        if now < self._lossy_until:
+            flight.echo_at, flight.echoes_left = now + ECHO, 1
         self._flight = flight
         self.gate.sent(now)
         self.sent_at.append((event, now))
@@ -233,20 +240,29 @@ class Pilot:
         return command
 
     def _again(self, flight: _Flight, now: float) -> list[Command | Rest]:
-        """A repeat or an echo of the command in flight."""
-        if now < min(flight.repeat_at, flight.echo_at):
-            return []
+        """The repeat or the echoes of the command in flight that are due."""
+        copies = 0
         if now >= flight.repeat_at:
+            copies = 1
             self.repeats += 1
             flight.sends += 1
             flight.last_sent_at = now
-            flight.repeat_at = now + self._wait(flight.sends)
-        else:
+            wait = self._wait(flight.sends)
+            flight.repeat_at = now + wait
+            flight.echo_at, flight.echoes_left = NEVER, 0
+            if flight.sends == 2 and now < self._lossy_until and wait >= SALVO_LEAST:
+                flight.echo_at, flight.echoes_left = now + SALVO_SPACING, SALVO - 1
+        while now >= flight.echo_at:
+            copies += 1
             self.echoes += 1
-        flight.echo_at = NEVER
+            flight.echoes_left -= 1
+            flight.echo_at = flight.echo_at + SALVO_SPACING if flight.echoes_left else NEVER
+        if not copies:
+            return []
         flight.issue = self.gate.next().issue
         want = _Want.NEUTRAL if self._only_neutral(flight.command.event) else _Want.VALUES
-        return [Command(event=flight.command.event, issue=flight.issue, values=self._values_for(want))]
+        again = Command(event=flight.command.event, issue=flight.issue, values=self._values_for(want))
+        return [again] * copies
 
     def _wait(self, sends: int) -> float:
         """A ping does not reach the robot: until its share is known, pings may lengthen the wait but not shorten it."""

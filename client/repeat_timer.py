@@ -3,7 +3,7 @@
 No I/O; all times in seconds.
 """
 
-__all__ = ["INITIAL", "RepeatTimer"]
+__all__ = ["FLOOR", "INITIAL", "RepeatTimer"]
 
 ALPHA = 1 / 8
 BETA = 1 / 4

@@ -3,8 +3,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from client.command_gate import CommandGate
-from client.pilot import ECHO, IDLE, LOSSY_SPELL, Pilot
-from client.repeat_timer import INITIAL
+from client.pilot import ECHO, IDLE, LOSSY_SPELL, SALVO, SALVO_SPACING, Pilot
+from client.repeat_timer import FLOOR, INITIAL
 from client.rest_call import SETTLE
 from robot_bridge.protocol.messages import Command, Rest
 from robot_bridge.protocol.serial import MAX_EVENT, event_after
@@ -150,6 +150,32 @@ def test_after_a_loss_commands_are_doubled_for_a_while() -> None:
     assert pilot.timer.round_trip == 0.05
     flying(pilot, LOSSY_SPELL)
     assert pilot.due(LOSSY_SPELL + ECHO) == []
+
+
+def test_on_a_lossy_path_the_first_repeat_is_a_salvo_that_ends_with_the_answer() -> None:
+    pilot = new_pilot()
+    pilot.loss(0.0)
+    command = flying(pilot)
+    pilot.due(ECHO)
+    assert pilot.due(INITIAL) == [command]
+    assert pilot.wake_at(INITIAL) == INITIAL + SALVO_SPACING
+    assert pilot.due(INITIAL + 2.5 * SALVO_SPACING) == [command] * 2
+    assert pilot.due(INITIAL + 0.05) == [command] * (SALVO - 3)
+    assert pilot.due(INITIAL + 0.09) == []
+    pilot.feedback(feedback(2), INITIAL + 0.09)
+    assert command not in pilot.due(5.0)
+
+
+def test_with_a_short_interval_there_is_no_salvo() -> None:
+    pilot = new_pilot()
+    for event in range(2, 20):
+        flying(pilot, event)
+        pilot.feedback(feedback(event), event + 0.005)
+    assert pilot.timer.interval == FLOOR
+    pilot.loss(20.0)
+    command = flying(pilot, 20.0)
+    assert pilot.due(20.0 + FLOOR) == [command]
+    assert pilot.due(20.0 + FLOOR + 3 * SALVO_SPACING) == []
 
 
 def test_a_repeat_that_was_needed_is_a_loss() -> None:

@@ -19,6 +19,11 @@ const IDLE_INTERVAL_MS = 200;
 const REST_GIVE_UP_MS = 5000;
 /** A copy comes this much later: longer than the console's own path to the robot and back. */
 const ECHO_MS = 20;
+/** The first repeat on such a path: so many copies, until the answer. Losses come in a row. */
+const SALVO = 8;
+const SALVO_SPACING_MS = 3;
+/** With a shorter interval single repeats are as quick. */
+const SALVO_LEAST_MS = 50;
 /** To go on doubling after the last loss that was seen. */
 const LOSSY_SPELL_MS = 60_000;
 /** An answer that follows the last repeat within this part of the whole wait answers an earlier sending. */
@@ -35,7 +40,8 @@ export interface Intention {
  * Turns intentions into commands, rests and repeats of them. Holds no clock and no socket.
  *
  * While the path loses packets every command is sent twice: the copy covers the loss of the command and, being
- * answered from the stored feedback, the loss of the answer too. On a clean path nothing is doubled.
+ * answered from the stored feedback, the loss of the answer too. When both were lost, the first repeat is a salvo:
+ * a row of lost packets counts packets, not time. On a clean path nothing is doubled.
  */
 export interface Driver {
   readonly gate: CommandGate;
@@ -46,6 +52,7 @@ export interface Driver {
   lastSentMs: number; // the last of them
   repeatAtMs: number;
   echoAtMs: number; // Infinity when no copy is due
+  echoesLeft: number;
   lossyUntilMs: number; // -Infinity before the first loss
   lastValues: readonly number[]; // sent last
   neutralOwed: boolean; // one neutral command is due after disarming
@@ -68,6 +75,7 @@ export function createDriver(
     lastSentMs: -Infinity,
     repeatAtMs: 0,
     echoAtMs: Infinity,
+    echoesLeft: 0,
     lossyUntilMs: -Infinity,
     lastValues: neutral,
     neutralOwed: false,
@@ -155,9 +163,11 @@ export function driverStep(
   const out: ClientMessage[] = [];
   const rest = restDue(driver, now);
   if (rest !== null) out.push(rest);
-  const command = canCommand || driver.gate.inFlight !== null ? commandDue(driver, intention, now) : null;
-  if (command !== null) out.push(command);
-  return out;
+  for (;;) {
+    const command = canCommand || driver.gate.inFlight !== null ? commandDue(driver, intention, now) : null;
+    if (command === null) return out;
+    out.push(command);
+  }
 }
 
 function restDue(driver: Driver, now: number): ClientMessage | null {
@@ -180,13 +190,12 @@ function commandDue(driver: Driver, intention: Intention, now: number): ClientMe
   if (driver.gate.inFlight !== null) {
     if (now < Math.min(driver.repeatAtMs, driver.echoAtMs)) return null;
     if (now >= driver.repeatAtMs) noteSending(driver, driver.sends + 1, now);
-    driver.echoAtMs = Infinity;
+    else noteEcho(driver);
   } else {
     if (!wantsToSend(driver, intention.armed, values, now)) return null;
     noteSent(driver.gate, now);
     noteCommandSent(driver.latency, next.event, now);
     noteSending(driver, 1, now);
-    driver.echoAtMs = now < driver.lossyUntilMs ? now + ECHO_MS : Infinity;
     driver.neutralOwed &&= intention.armed;
   }
   driver.lastValues = values;
@@ -198,7 +207,19 @@ function noteSending(driver: Driver, sends: number, now: number): void {
   driver.lastSentMs = now;
   // A ping does not reach the robot: until its share is known, pings may lengthen the wait but not shorten it.
   const least = knowsFewCommands(driver) ? INITIAL_MS : 0;
-  driver.repeatAtMs = now + Math.max(least, waitAfter(driver.repeat, sends));
+  const waitMs = Math.max(least, waitAfter(driver.repeat, sends));
+  driver.repeatAtMs = now + waitMs;
+  driver.echoesLeft = 0;
+  if (now < driver.lossyUntilMs) {
+    if (sends === 1) driver.echoesLeft = 1;
+    else if (sends === 2 && waitMs >= SALVO_LEAST_MS) driver.echoesLeft = SALVO - 1;
+  }
+  driver.echoAtMs = driver.echoesLeft === 0 ? Infinity : now + (sends === 1 ? ECHO_MS : SALVO_SPACING_MS);
+}
+
+function noteEcho(driver: Driver): void {
+  driver.echoesLeft -= 1;
+  driver.echoAtMs = driver.echoesLeft === 0 ? Infinity : driver.echoAtMs + SALVO_SPACING_MS;
 }
 
 function knowsFewCommands(driver: Driver): boolean {

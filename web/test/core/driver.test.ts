@@ -3,6 +3,7 @@ import {
   createDriver,
   driverDisarm,
   driverFeedback,
+  driverLoss,
   driverRefusal,
   driverRelease,
   driverSilence,
@@ -52,6 +53,19 @@ describe("commands", () => {
     ]);
     expect(driverStep(driver, MOVING, true, 150)).toEqual([]);
     expect(driverStep(driver, MOVING, true, 200)).toHaveLength(1);
+  });
+
+  it("are sent twice on a lossy path, and then as a salvo that ends with the answer", () => {
+    driverLoss(driver, 0);
+    const sent = driverStep(driver, MOVING, true, 0);
+    expect(driverStep(driver, MOVING, true, 20)).toEqual(sent);
+    expect(driverStep(driver, MOVING, true, 99)).toEqual([]);
+    expect(driverStep(driver, MOVING, true, 100)).toEqual(sent);
+    expect(driverStep(driver, MOVING, true, 107)).toHaveLength(2);
+    expect(driverStep(driver, MOVING, true, 180)).toHaveLength(5);
+    expect(driverStep(driver, MOVING, true, 199)).toEqual([]);
+    driverFeedback(driver, feedbackOf(2), true, 199);
+    expect(commands(driverStep(driver, DISARMED, true, 500))).toEqual([]);
   });
 
   it("do not go while nothing could execute them", () => {
