@@ -1,5 +1,6 @@
 import { holdsSeat, isOperator } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
+import { quantity, scaleFor } from "../core/units";
 import type { Axis, RobotDescription } from "../wire";
 import { button, h, setHidden, setPressed, setText, type Panel } from "./dom";
 import { createStaleMark } from "./stale_mark";
@@ -57,9 +58,9 @@ function createBar(axis: Axis): AxisBar {
   const mark = h("span", "axis-mark");
   const track = h("span", "axis-track", { "aria-hidden": "true" }, fill, mark);
   const line = h("span", "axis-line", {}, h("span", "axis-label", {}, axis.label), value);
-  const share = (amount: number): number =>
-    (amount - axis.minimum) / Math.max(1e-9, axis.maximum - axis.minimum);
+  const share = (amount: number): number => (amount - axis.minimum) / (axis.maximum - axis.minimum || 1);
   const middle = share(axis.rest);
+  const scale = scaleFor(axis.unit, Math.max(Math.abs(axis.minimum), Math.abs(axis.maximum)));
   return {
     axis,
     element: h("div", "axis", {}, line, track),
@@ -68,10 +69,7 @@ function createBar(axis: Axis): AxisBar {
       fill.style.left = percent(Math.min(at, middle));
       fill.style.width = percent(Math.abs(at - middle));
       mark.style.left = percent(Math.min(1, Math.max(0, share(commanded ?? axis.rest))));
-      setText(
-        value,
-        measured === undefined ? "–" : `${measured.toFixed(2).replace(/^-(0\.00)$/, "$1")} ${axis.unit}`,
-      );
+      setText(value, measured === undefined ? "–" : quantity(measured, scale));
     },
   };
 }

@@ -1,4 +1,5 @@
 import { contactStrength, forceOf } from "../core/contact";
+import { quantity, scaleFor } from "../core/units";
 import type { ConsoleApp } from "../console_app";
 import { h, setData, setHidden, setText, svg, type Panel } from "./dom";
 import { createStaleMark } from "./stale_mark";
@@ -46,7 +47,8 @@ export function createForceGauge(app: ConsoleApp, onContact: boolean): Panel {
       if (sensor === null) return;
       setData(element, "tone", strength >= 0.7 ? "bad" : strength > 0 ? "wait" : "good");
       arrow.setAttribute("d", arrowPath(wrench[0] ?? 0, wrench[1] ?? 0, sensor.full_scale_force));
-      setText(value, `${force.toFixed(force < 100 ? 1 : 0)} N`);
+      const scale = scaleFor("N", sensor.full_scale_force);
+      setText(value, quantity(force, { ...scale, digits: force * scale.factor < 100 ? 1 : 0 }));
       fill.style.width = `${Math.min(100, (100 * force) / sensor.full_scale_force).toFixed(1)}%`;
       threshold.style.left = `${((100 * sensor.threshold_force) / sensor.full_scale_force).toFixed(1)}%`;
     },

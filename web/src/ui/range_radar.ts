@@ -1,3 +1,4 @@
+import { quantity, scaleFor } from "../core/units";
 import type { ConsoleApp } from "../console_app";
 import type { RangeRing } from "../wire";
 import { h, setHidden, setText, svg, type Panel } from "./dom";
@@ -36,7 +37,7 @@ export function createRangeRadar(app: ConsoleApp): Panel {
       if (ring === null || ranges.length === 0) return;
       free.setAttribute("d", outline(ring, ranges));
       const nearest = Math.min(...ranges);
-      setText(value, nearest >= ring.range_max ? "clear" : `${nearest.toFixed(2)} m`);
+      setText(value, nearest >= ring.range_max ? "clear" : quantity(nearest, scaleFor("m", ring.range_max)));
     },
   };
 }
