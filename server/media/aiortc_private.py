@@ -2,7 +2,8 @@
 
 Those under the data channels are in `server/data_transport_private.py`; what peers send is
 guarded in `server/media/receive_guard_private.py` and `server/peer_guards_private.py`, ICE restarts are in
-`server/ice_restart_private.py`; nothing else in the server touches any.
+`server/ice_restart_private.py`, codecs in `server/media/codec_choice_private.py`; nothing else in the server touches
+any.
 
 What is used and why:
 
@@ -55,7 +56,6 @@ __all__ = [
     "ReceptionListener",
     "create_peer_connection",
     "install_sender",
-    "keep_codec",
     "keep_extensions",
     "offered_direction",
     "offered_extensions",
@@ -103,19 +103,6 @@ def offered_extensions(offer_sdp: str) -> dict[str, dict[str, int]]:
 def offered_direction(transceiver: RTCRtpTransceiver) -> str | None:
     """What the offer lets us do in this section: "sendonly", "sendrecv", "recvonly" or "inactive"."""
     return transceiver._offerDirection
-
-
-def keep_codec(transceiver: RTCRtpTransceiver, names: Sequence[str]) -> str | None:
-    """Answer the first offered codec among `names`, with its retransmission format; None when there is none."""
-    codecs = transceiver._codecs
-    known = {name.lower(): name for name in names}
-    chosen = next((codec for codec in codecs if codec.name.lower() in known), None)
-    if chosen is None:
-        return None
-    transceiver._codecs = [chosen] + [
-        codec for codec in codecs if codec.name.lower() == "rtx" and codec.parameters.get("apt") == chosen.payloadType
-    ]
-    return known[chosen.name.lower()]
 
 
 def keep_extensions(transceiver: RTCRtpTransceiver, ids: Mapping[str, int]) -> None:

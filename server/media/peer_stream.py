@@ -5,6 +5,7 @@ from typing import Protocol
 
 from robot_bridge.protocol.carriers import Carrier
 from server.media.frame import EncodedFrame
+from server.media.h264 import Profile
 from server.media.metrics import MediaMetrics
 from server.media.outbox import Outbox
 
@@ -43,6 +44,7 @@ class PeerStream:
     ) -> None:
         self.priority = priority
         self.trailer = carrier == "trailer"
+        self.h264: Profile | None = None  # that was negotiated; None for another codec
         self.sender: FrameSender | None = None  # None before the transport is connected
         self._outbox = outbox
         self._on_dropped = on_dropped

@@ -1,7 +1,10 @@
 """Pictures from the robot link, as what encoders take."""
 
+from collections.abc import Sequence
+
 import av
 import numpy as np
+from av.codec.context import Flags
 from av.error import FFmpegError
 from av.video.codeccontext import VideoCodecContext
 
@@ -14,18 +17,24 @@ MIN_SIDE = 16  # pixels
 
 
 class PictureDecoder:
-    """Turns `yuv420p` and `mjpeg` payloads into yuv420p frames. Used from one thread."""
+    """Turns `yuv420p`, `mjpeg` and `h264` payloads into yuv420p frames. Used from one thread."""
 
     def __init__(self) -> None:
         self._mjpeg: VideoCodecContext | None = None
+        self._h264: VideoCodecContext | None = None
 
-    def decode(self, media: Media) -> av.VideoFrame:
+    def decode(self, media: Media, group: Sequence[Media] = ()) -> av.VideoFrame:
         """The picture.
+
+        Args:
+            group: for h264, all that has to be decoded for it, itself the last; the rest was decoded before
 
         Raises:
             PayloadError: the payload is not a picture of the size that `media` names.
-            UnsupportedCodecError: neither yuv420p nor mjpeg.
+            UnsupportedCodecError: none of these.
         """
+        if media.codec == "h264":
+            return self._from_h264(group)
         if media.codec == "yuv420p":
             return _from_yuv420p(media)
         if media.codec == "mjpeg":
@@ -43,6 +52,25 @@ class PictureDecoder:
         if not frames:
             raise PayloadError("not a whole JPEG picture")
         frame = frames[-1]
+        _check_size(frame.width, frame.height)
+        return frame.reformat(format="yuv420p", dst_color_range="MPEG")
+
+    def _from_h264(self, group: Sequence[Media]) -> av.VideoFrame:
+        if not group:
+            raise PayloadError("there is no keyframe to begin with yet")
+        if self._h264 is None:
+            self._h264 = av.CodecContext.create("h264", "r")
+            self._h264.thread_count = 1
+            self._h264.flags |= Flags.low_delay  # one in, one out: there are no B-frames
+        frame = None
+        for media in group:
+            try:
+                frames = self._h264.decode(av.Packet(media.payload))
+            except (FFmpegError, ValueError) as error:
+                raise PayloadError(f"not an H.264 picture: {error}") from error
+            frame = frames[-1] if frames else frame
+        if frame is None:
+            raise PayloadError("not a whole H.264 picture")
         _check_size(frame.width, frame.height)
         return frame.reformat(format="yuv420p", dst_color_range="MPEG")
 

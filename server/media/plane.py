@@ -17,19 +17,20 @@ from robot_bridge.protocol.messages import Media
 from server.media.aiortc_private import (
     MediaSender,
     install_sender,
-    keep_codec,
     keep_extensions,
     offered_direction,
     offered_extensions,
 )
 from server.media.audio_stream import AudioStream
 from server.media.capture_clock import CaptureClock
+from server.media.codec_choice_private import keep_codec, negotiated_h264
 from server.media.fanout import FanOut
 from server.media.header_extensions import choose_carrier, wanted_uris
 from server.media.metrics import MediaMetrics
 from server.media.outbox import Outbox
 from server.media.peer_media import Delivery, PeerMedia
 from server.media.peer_stream import PeerStream
+from server.media.publishing_private import offer_section
 from server.media.quality.desk import QualityDesk
 from server.media.quality.metrics import QualityMetrics
 from server.media.quality.path import RateLimits
@@ -187,7 +188,7 @@ class MediaPlane:
             stream = next(sources[transceiver.kind], None)
             codec = None
             if stream is not None and offered_direction(transceiver) in ("sendonly", "sendrecv"):
-                codec = keep_codec(transceiver, stream.codecs)
+                codec = keep_codec(transceiver, stream.codecs, h264_first=self._gives_h264(stream))
             if stream is None or codec is None:
                 transceiver.direction = "inactive"
                 continue
@@ -197,6 +198,26 @@ class MediaPlane:
             keep_extensions(transceiver, ids)
             transceiver.direction = "sendonly"
             deliveries.append(self._deliver(peer, transceiver, stream, codec, carrier, priority))
+        return self._joined(peer, deliveries)
+
+    def publish(self, pc: RTCPeerConnection, camera_codec: str = "") -> PeerMedia:
+        """Offer every stream to a relay, each in one codec, with trailers. Call before createOffer.
+
+        `camera_codec`: "" is what is being encoded already for somebody, so that it costs no encoder.
+        """
+        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc())
+        sections = [
+            (stream, codec, offer_section(pc, stream.kind, codec))
+            for stream in self._streams.values()
+            for codec in [stream.codec_in_use(camera_codec if stream.kind == "video" else "")]
+        ]
+        deliveries: list[Delivery] = []
+        peer = PeerMedia(deliveries, self._peer_quality(pc, priority=False), self._detached)
+        for stream, codec, transceiver in sections:
+            deliveries.append(self._deliver(peer, transceiver, stream, codec, "trailer", priority=False))
+        return self._joined(peer, deliveries)
+
+    def _joined(self, peer: PeerMedia, deliveries: list[Delivery]) -> PeerMedia:
         self._peers[peer] = None
         peer.quality.cameras = [
             CameraLink(each.stream, each.info.codec, each.target, each.sender)
@@ -207,6 +228,16 @@ class MediaPlane:
         if peer.quality.cameras or peer.quality.sounds:
             self._quality.join(peer.quality)
         return peer
+
+    def _gives_h264(self, stream: AnyStream) -> bool:
+        """Whether the camera may encode by itself, as far as is known now; then its peers had better take that."""
+        if not isinstance(stream, VideoStream):
+            return False
+        if stream.gives is not None:
+            return stream.gives == "h264"
+        attached = {self._stream_names[spec.name]: spec for spec in self._attached.values()}
+        spec = attached.get(stream.name)
+        return spec is not None and spec.passing and spec.size is None
 
     def _peer_quality(self, pc: RTCPeerConnection, priority: bool) -> PeerQuality:
         settings = self._settings
@@ -243,6 +274,8 @@ class MediaPlane:
             metrics=self._metrics,
             on_dropped=lambda: stream.request_keyframe(codec, target, "drop"),
         )
+
+        target.h264 = negotiated_h264(transceiver)
 
         def ready() -> None:
             target.sender = sender

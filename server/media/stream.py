@@ -98,6 +98,12 @@ class Stream(ABC, Generic[Job]):
             self._outputs[codec, tier] = found
         return found
 
+    def codec_in_use(self, wanted: str = "") -> str:
+        """`wanted` if it can be had; else one that is encoded already for peers, the best one if there is none."""
+        if wanted in self.codecs:
+            return wanted
+        return next((output.codec for output in self._outputs.values() if output.targets), self.codecs[0])
+
     def outputs_of(self, tier: Tier) -> list[Output]:
         """Of all codecs, as far as they exist."""
         return [output for output in self._outputs.values() if output.tier == tier]
@@ -146,7 +152,7 @@ class Stream(ABC, Generic[Job]):
         self._last_stamp = media.stamp
         if self._recorded is not None:
             self._recorded.choose(self)
-        if self._members or self._recorded is not None:
+        if self._members or self._recorded is not None or media.codec == "h264":  # the next keyframe may be far
             self._enqueue(media, now, capture_time)
 
     def _drop(self, stage: str, count: int = 1) -> None:

@@ -5,16 +5,20 @@ from typing import NamedTuple
 
 import av
 
+from robot_bridge.protocol.console import Tier
 from robot_bridge.protocol.description import Camera
 from robot_bridge.protocol.messages import Media
-from server.media.errors import MediaError, PayloadError, UnsupportedCodecError
+from server.media.errors import MediaError, PayloadError
 from server.media.fanout import FanOut
 from server.media.frame import EncodedFrame
 from server.media.frame_pace import FramePace
+from server.media.group_of_pictures import GroupOfPictures
 from server.media.media_clock import PictureClock
 from server.media.metrics import MediaMetrics
 from server.media.output import Output
 from server.media.packetise import packetise_h264, packetise_vp8
+from server.media.passing import PASSED, Passing
+from server.media.peer_stream import PeerStream
 from server.media.picture import PictureDecoder
 from server.media.picture_encoder import VIDEO_CODECS, PictureEncoder, create_picture_encoder
 from server.media.quality.plan import PicturePlan
@@ -29,8 +33,10 @@ PACKETISE = {"H264": packetise_h264, "VP8": packetise_vp8}
 class SourcePicture:
     """A picture from the robot, decoded and resized at most once for all that encode it."""
 
-    def __init__(self, media: Media, capture_time: float, media_time: int) -> None:
+    def __init__(self, media: Media, capture_time: float, media_time: int, group: tuple[Media, ...] = ()) -> None:
+        """`group`: what has to be decoded for it, if it builds on others."""
         self.media = media
+        self._group = group
         self.capture_time = capture_time
         self.media_time = media_time
         self._sizes: dict[tuple[int, int], av.VideoFrame] = {}
@@ -43,7 +49,7 @@ class SourcePicture:
             raise self._error
         if self._whole is None:
             try:
-                self._whole = decoder.decode(self.media)
+                self._whole = decoder.decode(self.media, self._group)
             except MediaError as error:
                 self._error = error
                 raise
@@ -73,7 +79,7 @@ class PictureJob(NamedTuple):
 
 
 class VideoStream(Stream[PictureJob]):
-    """Takes yuv420p and mjpeg, encoded to H.264 and VP8; h264 is passed on to H.264 peers as it is.
+    """Takes yuv420p, mjpeg and h264, encoded to H.264 and VP8; h264 goes on as it came where it can (`Passing`).
 
     The operator's tier is encoded first and sent before the next one begins. When the encoders are too slow for all
     tiers a newer picture takes the place of an older one, and the tier that waited longest comes next.
@@ -85,6 +91,7 @@ class VideoStream(Stream[PictureJob]):
     def __init__(self, camera: Camera, settings: MediaSettings, fan_out: FanOut, metrics: MediaMetrics) -> None:
         self.frame_rate = min(camera.frame_rate, settings.video_frames_per_second or camera.frame_rate)
         self.size = camera.width, camera.height  # of the newest picture
+        self.gives: str | None = None  # the codec that comes; None before the first picture
         super().__init__(camera.name, camera.label, settings, fan_out, metrics)
         self._clock = PictureClock()
         self._pace = FramePace(settings.video_frames_per_second)
@@ -95,16 +102,25 @@ class VideoStream(Stream[PictureJob]):
         self._others_served = 0  # observers' tiers that were encoded from it
         self._taken = metrics.taken.labels(camera.name)
         self._decoder = PictureDecoder()
+        self._group = GroupOfPictures()
+        self._passing = Passing(self.output(PASSED, "operator"), lambda tier: self.output("H264", tier))
         self._encoders: dict[Output, PictureEncoder] = {}
 
     @property
     def full_plan(self) -> PicturePlan:
         return PicturePlan(self._settings.video_bitrate_bps, self.frame_rate)
 
+    def feed(self, media: Media, now: float, capture_time: float) -> None:
+        self.gives = media.codec
+        super().feed(media, now, capture_time)
+
     def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
         if media.codec == "h264":
-            self._pass_on(media, capture_time)
-            return
+            self._take_h264(media, capture_time)
+            if not any(output.needed for output in self._ours()):
+                return
+        elif self._passing.profile is not None:
+            self._passing.end()
         if not self._pace.admit(media.time):
             self._drop("thinned")
             return
@@ -115,28 +131,56 @@ class VideoStream(Stream[PictureJob]):
         self._newest = media, now, capture_time
         self._wake.set()
 
-    def _pass_on(self, media: Media, capture_time: float) -> None:
-        """A picture that was encoded at the robot: its encoder cannot be asked for keyframes, and all tiers get it."""
-        capture_time = max((output.monotone(capture_time) for output in self._outputs.values()), default=capture_time)
+    def _take_h264(self, media: Media, capture_time: float) -> None:
+        """A picture that the camera encoded: for those who get it as it is, and kept for the decoder."""
+        if media.keyframe:
+            self._passing.begin(media, self._ours("H264"))
+        self._group.add(media)
+        output = self._passing.output
+        if not output.targets:
+            return
         frame = EncodedFrame(
             media.payload,
             packetise_h264,
             keyframe=media.keyframe,
             marker=True,
             stamp=media.stamp,
-            capture_time=capture_time,
+            capture_time=output.monotone(capture_time),
             media_time=self._clock.timestamp(media.time),
-            time=media.time,
         )
-        for output in self._outputs.values():
-            if output.codec != "H264" and output.targets:
-                self._drop(UnsupportedCodecError.name)
         if not frame.payloads(trailer=False):
             self._drop(PayloadError.name)
             return
-        for output in list(self._outputs.values()):
-            if output.codec == "H264" and output.needed:
-                self._publish(output, frame)
+        self._publish(output, frame)
+
+    def _ours(self, codec: str | None = None) -> list[Output]:
+        """The outputs that we encode, of one codec or all."""
+        passed = self._passing.output
+        return [each for each in self._outputs.values() if each is not passed and codec in (None, each.codec)]
+
+    def join(self, codec: str, target: PeerStream, tier: Tier = "operator") -> None:
+        self._passing.place(target, tier)
+        super().join(codec, target, tier)
+
+    def move(self, codec: str, target: PeerStream, tier: Tier) -> None:
+        self._passing.place(target, tier)
+        if not self._passing.holds(target):
+            super().move(codec, target, tier)
+
+    def request_keyframe(self, codec: str, target: PeerStream, cause: str) -> None:
+        if self._passing.holds(target):
+            self._passing.output.request_keyframe(cause)  # to be counted
+            self._passing.return_to_ours(target)
+        else:
+            super().request_keyframe(codec, target, cause)
+
+    def hold_back(self, target: PeerStream, wanted: bool) -> None:
+        """Whether `target` must not get a camera's own H.264, because its path has no room."""
+        self._passing.hold_back(target, wanted)
+
+    def leave(self, target: PeerStream) -> None:
+        self._passing.leave(target)
+        super().leave(target)
 
     def _next_job(self) -> PictureJob | None:
         if self._newest is not None and (not self._orders or self._others_served > 0):
@@ -155,9 +199,10 @@ class VideoStream(Stream[PictureJob]):
         self._newest = None
         if self._orders:
             self._drop("encoder_busy", len(self._orders))
-        self._source = SourcePicture(media, capture_time, self._clock.timestamp(media.time))
         self._began, self._others_served = now, 0
-        due = [output for output in self._outputs.values() if self._due(output, media.time, now)]
+        due = [output for output in self._ours() if self._due(output, media.time, now)]
+        group = self._group.take() if media.codec == "h264" and due else ()
+        self._source = SourcePicture(media, capture_time, self._clock.timestamp(media.time), group)
         self._taken.inc(bool(due))
         self._orders = sorted(due, key=lambda output: (output.tier != "operator", output.encoded_at))
 

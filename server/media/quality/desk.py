@@ -96,6 +96,9 @@ class QualityDesk:
             self._settle(peer, peer.tier, "operator" if shared and peer.tier == "high" else peer.tier)
             if (i + self._ticks) % OBSERVER_TICKS == 0:
                 self._tell(peer)
+        for peer in self._peers:
+            for camera in peer.cameras:
+                camera.stream.hold_back(camera.target, peer.path.limited or peer.tier == "low")
         if self._ticks % OBSERVER_TICKS == 0:
             for peer in leaders:
                 self._tell(peer)

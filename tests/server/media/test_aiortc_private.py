@@ -12,12 +12,12 @@ from aiortc.rtcpeerconnection import create_media_description_for_transceiver
 
 from server.media.aiortc_private import (
     create_peer_connection,
-    keep_codec,
     offered_direction,
     offered_extensions,
     own_addresses,
     restrict_ice_hosts,
 )
+from server.media.codec_choice_private import keep_codec
 from server.media.receive_guard_private import _BoundedReceiveQueue, guard_transports
 from tests.server.media.viewer import running_plane, viewing
 
