@@ -48,7 +48,14 @@ class _TicketClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     link: Annotated[str, msgspec.Meta(max_length=64)]  # id of the link it was made for; it ends with it
 
 
-Claims = TypeVar("Claims", _LinkClaims, _TicketClaims)
+class _FileClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    aud: Literal["lockstep-file"]
+    exp: float
+    link: Annotated[str, msgspec.Meta(max_length=64)]
+    file: Annotated[str, msgspec.Meta(max_length=200)]  # the one recording that it opens
+
+
+Claims = TypeVar("Claims", _LinkClaims, _TicketClaims, _FileClaims)
 
 
 def _nothing_revoked(token_id: str) -> bool:
@@ -120,13 +127,24 @@ class Access:
         self._check(claims.link, claims.exp)
         return claims.link
 
+    def issue_file_ticket(self, file: str, token_id: str) -> str:
+        """A short-lived permission to download one recording, for the holder of the link `token_id`."""
+        return self._encode(_FileClaims("lockstep-file", time.time() + self._ticket_seconds, token_id, file))
+
+    def verify_file_ticket(self, ticket: str, file: str) -> None:
+        """Raises as `verify` does, also when it is for another file."""
+        claims = self._decode(ticket, _FileClaims)
+        self._check(claims.link, claims.exp)
+        if claims.file != file:
+            raise TokenInvalid(INVALID)
+
     def _check(self, token_id: str, expires: float) -> None:
         if not expires > time.time():  # also when it is not a number
             raise LinkExpired("this link has expired; ask for a new one")
         if self._is_revoked(token_id):
             raise LinkRevoked("this link was revoked")
 
-    def _encode(self, claims: _LinkClaims | _TicketClaims) -> str:
+    def _encode(self, claims: _LinkClaims | _TicketClaims | _FileClaims) -> str:
         return jwt.encode(msgspec.structs.asdict(claims), self._secret, ALGORITHM)
 
     def _decode(self, token: str, kind: type[Claims]) -> Claims:

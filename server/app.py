@@ -13,10 +13,12 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import HTTPConnection
 from starlette.types import Scope
 
-from server import api, api_access, api_ice, scene_proxy, whep
+from server import api, api_access, api_ice, api_recordings, scene_proxy, whep
+from server.api_recordings import RecordingService
 from server.audit_log import AuditLog, open_audit_log
 from server.console import Console
 from server.errors import AccessError, ConsoleError, TooManyRequests, http_error
+from server.event_clock import EventClock
 from server.front_door import FrontDoor, HostNames
 from server.guard import Guard
 from server.link_warden import LinkWarden
@@ -28,6 +30,9 @@ from server.metrics import Metrics
 from server.openapi import openapi_document
 from server.page import page_router
 from server.rate_limits import RateLimits
+from server.recording.library import ConsoleLibrary
+from server.recording.recorder import Recorder, recordings_directory
+from server.recording.shelf import Shelf
 from server.scene import SceneView
 from server.security import SAFE_METHODS, SecurityHeaders, check_origin
 from server.services import Services, services
@@ -57,7 +62,12 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         metrics = Metrics()
         media = MediaPlane(settings.media, metrics.registry, settings.sources)
         scene = await _start_scene(settings, metrics)
-        console = Console(settings, metrics, media, scene, audit)
+        clock = EventClock()
+        shelf = Shelf(recordings_directory(settings.recording, opened.directory.path), settings.recording)
+        recorder = Recorder(settings.recording, shelf, clock, media, lambda news: console.peers.tell("session", news))
+        console = Console(settings, metrics, media, scene, audit, clock, recorder)
+        console.further_news.append(recorder.state)
+        app.state.recordings = RecordingService(ConsoleLibrary(recorder), opened.access)
         sources = SourceDesk(
             settings.sources, console.clock, media, metrics.registry, lambda news: console.peers.tell("session", news)
         )
@@ -73,6 +83,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
                     tasks.create_task(console.run(), name="console"),
                     tasks.create_task(warden.run(), name="links"),
                     tasks.create_task(sources.run(), name="sources"),
+                    tasks.create_task(recorder.run(), name="recorder"),
                 ]
                 if scene is not None:
                     running.append(tasks.create_task(scene.run(), name="scene"))
@@ -96,6 +107,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
     app.include_router(api.router)
     app.include_router(api_access.router)
     app.include_router(api_ice.router)
+    app.include_router(api_recordings.router)
     app.add_api_route("/openapi.json", _describe, include_in_schema=False)
     app.include_router(scene_proxy.router)
     app.include_router(page_router())

@@ -52,6 +52,7 @@ from server.people import People
 from server.robot_connection import RobotConnection
 from server.seat import SeatRefusal, SeatTimes
 from server.seat_keeper import SeatKeeper
+from server.session_tap import SessionTap
 from server.settings import Settings
 from server.speed_cap import SpeedCap
 
@@ -88,11 +89,14 @@ class Console:
         media: MediaFeed,
         viewer: FeedbackViewer | None,
         audit_log: RecordKeeper,
+        clock: EventClock | None = None,
+        tap: SessionTap | None = None,
     ) -> None:
-        self.clock = EventClock()
+        self.clock = clock or EventClock()
+        self._tap = tap or SessionTap()
         self.audit = AuditTrail(self.clock, audit_log)
         self.robot = RobotConnection(settings, self)
-        self.peers = Peers(settings, metrics, lambda peer: self.people.joined(peer))
+        self.peers = Peers(settings, metrics, lambda peer: self.people.joined(peer), self._tap.told)
         times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
         self.people = People(self.peers, self.clock, self.audit, self.seat.renamed, self._refuse_request)
@@ -149,6 +153,7 @@ class Console:
             self.audit.again("stop", by, f"{where}, again")
         else:
             self.audit.record("stop", by, where if delivered else f"{where}, not delivered yet", reason)
+        self._tap.stop_asked(by, where, reason, delivered=delivered)
         log.warning("stop", by=by.name, where=where, reason=reason, delivered=delivered)
         return delivered
 
@@ -163,6 +168,7 @@ class Console:
             raise LinkDown(self.robot.detail)
         self._metrics.resets.inc()
         self.audit.record("reset", by, where)
+        self._tap.reset_asked(by, where)
         log.warning("reset", by=by.name, where=where)
 
     def audit_trouble(self, trouble: str, lost: int) -> None:
@@ -200,7 +206,7 @@ class Console:
         self.seat.heard(peer)
         match message:
             case Command():
-                self._settle(peer, "control", self._desk.command(peer.id, message, now), command=True)
+                self._settle(peer, "control", self._desk.command(peer.id, message, now), message)
             case Rest():
                 self._settle(peer, "control", self._desk.rest(peer.id, message))
             case Ping():
@@ -244,6 +250,8 @@ class Console:
         rest = self._desk.abandon()
         if isinstance(rest, Forward) and self._forward(rest):
             self._metrics.rests.labels(why).inc()
+            if isinstance(rest.message, Rest):
+                self._tap.rest(Actor(), rest.message, why)
 
     def refuse(self, peer: Peer, refusal: SeatRefusal) -> None:
         self._refuse_request(peer, refusal.reason, refusal.detail)
@@ -290,6 +298,7 @@ class Console:
             return
         answered = self._desk.in_flight
         self._desk.feedback(feedback)
+        self._tap.feedback(feedback, now)
         self._fanout.publish(encode_console_message(feedback))
         self.speed_cap.fed_back(feedback, now)
         if answered is not None and self._desk.in_flight is None:
@@ -308,6 +317,7 @@ class Console:
     def refusal_received(self, refusal: Refusal) -> None:
         self._metrics.refusals.labels(refusal.reason).inc()
         peer = self.peers.by_id(self._desk.refused(refusal))
+        self._tap.refused(Actor() if peer is None else peer.actor, refusal, "robot")
         if peer is not None:
             self.audit.refused(peer.actor, refusal.reason)
             peer.send("control", refusal)
@@ -317,7 +327,7 @@ class Console:
 
     # what follows from the cores' outcomes
 
-    def _settle(self, peer: Peer, channel: ChannelName, outcome: Outcome, *, command: bool = False) -> None:
+    def _settle(self, peer: Peer, channel: ChannelName, outcome: Outcome, command: Command | None = None) -> None:
         if isinstance(outcome, Forward) and not self._forward(outcome):
             outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
         match outcome:
@@ -329,7 +339,10 @@ class Console:
                     peer.send_feedback(encode_console_message(self.clock.feedback))
             case Forward(Command() as forwarded) if self._desk.moves(forwarded):
                 self.seat.moved(peer)
-        if command:
+            case Forward(Rest() as rest):
+                self._tap.rest(peer.actor, rest, "")
+        if command is not None:
+            self._tap.command(peer.actor, command, outcome)
             self._metrics.commands.labels(type(outcome).__name__.lower()).inc()
 
     def _refuse_request(self, peer: Peer, reason: RefusalReason, detail: str = "") -> None:
@@ -338,6 +351,7 @@ class Console:
     def _refuse(self, peer: Peer, channel: ChannelName, refusal: Refusal) -> None:
         self._metrics.refusals.labels(refusal.reason).inc()
         self.audit.refused(peer.actor, refusal.reason)
+        self._tap.refused(peer.actor, refusal, "console")
         peer.send(channel, refusal)
 
     def _forward(self, outcome: Forward) -> bool:
@@ -351,6 +365,7 @@ class Console:
     def _report_speed(self, peer: Peer, report: Report) -> None:
         if not self.seat.rules.holds(peer.id):
             return
+        self._tap.report(peer.actor, report)
         now = time.monotonic()
         self.speed_cap.reported(peer.id, report, now)
         news = self.speed_cap.news(now)

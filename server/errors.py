@@ -9,6 +9,7 @@ ConsoleError
 │   ├── NotAllowed          the role does not permit it
 │   └── OriginRefused       a page of another site
 ├── RequestError            the request is not understood
+│   ├── AlreadyRecording
 │   ├── BadJson
 │   ├── BadParameter
 │   ├── BadSdp
@@ -34,6 +35,7 @@ ConsoleError
 │   └── WrongChannel
 └── Unavailable             right now it cannot be done
     ├── LinkDown
+    ├── RecordingFailed     the disk, or what is on it
     ├── RobotUnreachable
     ├── SceneUnavailable
     ├── ShuttingDown
@@ -46,6 +48,7 @@ from typing import NamedTuple
 __all__ = [
     "HTTP_ERRORS",
     "AccessError",
+    "AlreadyRecording",
     "BadJson",
     "BadParameter",
     "BadSdp",
@@ -70,6 +73,7 @@ __all__ = [
     "OriginRefused",
     "PreconditionFailed",
     "PreconditionRequired",
+    "RecordingFailed",
     "RequestError",
     "RobotUnreachable",
     "SceneUnavailable",
@@ -130,6 +134,10 @@ class OriginRefused(AccessError):
 
 
 class RequestError(ConsoleError):
+    pass
+
+
+class AlreadyRecording(RequestError):
     pass
 
 
@@ -239,6 +247,10 @@ class LinkDown(Unavailable):
     pass
 
 
+class RecordingFailed(Unavailable):
+    pass
+
+
 class RobotUnreachable(Unavailable):
     pass
 
@@ -274,6 +286,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     LinkRevoked: HttpError(401, "link_revoked", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     NotAllowed: HttpError(403, "not_allowed"),
     OriginRefused: HttpError(403, "origin_refused"),
+    AlreadyRecording: HttpError(409, "already_recording"),
     BadJson: HttpError(400, "bad_json"),
     BadParameter: HttpError(422, "bad_parameter"),
     BadSdp: HttpError(400, "bad_sdp"),
@@ -289,6 +302,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     PreconditionRequired: HttpError(428, "precondition_required"),
     TooManyRequests: HttpError(429, "too_many_requests", {"Retry-After": "2"}),
     LinkDown: HttpError(503, "link_down", {"Retry-After": "1"}),
+    RecordingFailed: HttpError(503, "recording_failed", {"Retry-After": "5"}),
     RobotUnreachable: HttpError(503, "robot_unreachable", {"Retry-After": "1"}),
     SceneUnavailable: HttpError(503, "scene_unavailable", {"Retry-After": "5"}),
     ShuttingDown: HttpError(503, "shutting_down", {"Retry-After": "5"}),

@@ -38,9 +38,17 @@ class PeersLimits(Protocol):
 class Peers:
     """At most `max_peers` peers. Each runs in a task that this object owns; `close` waits for all of them."""
 
-    def __init__(self, limits: PeersLimits, metrics: Metrics, joined: Callable[[Peer], None]) -> None:
+    def __init__(
+        self,
+        limits: PeersLimits,
+        metrics: Metrics,
+        joined: Callable[[Peer], None],
+        told: Callable[[ServerMessage], None] = lambda message: None,
+    ) -> None:
+        """`joined` is called with newcomers, `told` with what everyone is told."""
         self._limits = limits
         self._joined = joined
+        self._told = told
         self._metrics = metrics
         self._sessions: dict[Peer, asyncio.Task[None]] = {}
         self._reserved: Counter[str] = Counter()  # places of peers that are being negotiated, by token
@@ -120,6 +128,7 @@ class Peers:
         text = encode_console_message(message)
         for peer in self._sessions:
             peer.send_text(channel, text)
+        self._told(message)
 
     def participants(self) -> Participants:
         """Those who may drive first. In a crowd only they come with measured values: the list changes less often."""

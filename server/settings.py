@@ -16,6 +16,7 @@ from server.logs import LogFormat
 from server.media.settings import MediaSettings
 from server.media.sources.source_settings import SourceSettings
 from server.network_settings import NameList, NetworkSettings
+from server.recording.settings import RecordingSettings
 
 __all__ = ["Settings"]
 
@@ -63,6 +64,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings):
     max_scene_viewers: Annotated[int, Field(ge=1)] = 20
 
     media: MediaSettings = MediaSettings()
+    recording: RecordingSettings = RecordingSettings()
 
     @field_validator("ice_hosts", "allowed_origins", mode="before")
     @classmethod

@@ -40,6 +40,7 @@ __all__ = [
     "Participant",
     "Participants",
     "Quality",
+    "RecordingState",
     "Rename",
     "Report",
     "RobotState",
@@ -264,6 +265,20 @@ class Voice(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="vo
     trouble: str = ""  # why nobody can be heard now, as when the loudspeaker does not work
 
 
+class RecordingState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="recording"):
+    """Whether the session is recorded; sent to newcomers, when it changes, and every few seconds while it is."""
+
+    state: Literal["off", "recording", "failed"]
+    id: str = ""  # of the file that is written now; "" before the robot was reached
+    recording: str = ""  # common to all its files
+    name: str = ""  # that somebody gave it
+    by: str = ""  # who started it; "" when nobody did
+    since: float = 0.0  # s since 1970
+    bytes: Count = 0
+    lost: Count = 0  # records that were left out because the disk was too slow
+    detail: str = ""  # why it failed, or what it waits for
+
+
 class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note_shared"):
     """A note that somebody wrote, with the event it belongs to. Newcomers get the last ones."""
 
@@ -322,6 +337,7 @@ ServerMessage = (
     | SpeedCapState
     | Sources
     | Voice
+    | RecordingState
     | SharedNote
     | Notice
     | StopStateNotice

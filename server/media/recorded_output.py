@@ -34,7 +34,8 @@ class RecordedStream(Protocol):
 class RecordedOutput:
     """Call `choose` before each medium, `published` with each frame, `close` at the end.
 
-    The operator's encoding comes first; else that of observers; else one is made. Another one is taken from its next keyframe on.
+    The operator's encoding comes first; else that of observers; else one is made. Another one is taken from its next
+    keyframe on.
 
     Args:
         codec: in which it is recorded

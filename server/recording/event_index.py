@@ -62,6 +62,21 @@ class EventIndex(msgspec.Struct, kw_only=True):
             if not is_newer(chunk.first_event, last_event) and not is_newer(first_event, chunk.last_event):
                 yield number
 
+    def after(self, chunk: int) -> "EventIndex":
+        """What is known from that chunk on; the rest of the index is whole."""
+        if chunk == 0:
+            return self
+        begin = self.chunks[chunk].started if chunk < len(self.chunks) else self.ended + 1
+        return msgspec.structs.replace(
+            self,
+            chunks=self.chunks[chunk:],
+            events=[each for each in self.events if each.chunk >= chunk],
+            keyframes={
+                topic: [each for each in entries if each.chunk >= chunk] for topic, entries in self.keyframes.items()
+            },
+            marks=[each for each in self.marks if each.time >= begin],
+        )
+
     def keyframe_before(self, topic: str, event: int) -> EventEntry | None:
         """The newest keyframe stamped `event` or earlier; None: there is none."""
         entries = self.keyframes.get(topic, [])

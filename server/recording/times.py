@@ -5,7 +5,7 @@ from server.media.capture_clock import CaptureClock
 __all__ = ["LinkTimes", "RecordClock"]
 
 SECOND = 1_000_000_000
-STEP = 1_000_000  # ns by which the estimate has to be another one before it is taken
+STEP = 0.001  # s by which the estimate has to be another one before it is taken
 
 
 class RecordClock:
@@ -21,26 +21,22 @@ class RecordClock:
 
 
 class LinkTimes:
-    """From the robot bridge's monotonic clock to the recording's. The mapping changes only with a feedback.
+    """From the robot bridge's monotonic clock to the console's. The mapping changes only with a feedback.
 
     So a reader gets the bridge's own time of a picture back, exactly: by the feedback before it.
     """
 
     def __init__(self) -> None:
         self._clock = CaptureClock()
-        self._offset: int | None = None  # ns
-        self._origin = 0  # ns; keeps the estimator's floats small
+        self._offset: float | None = None  # s
 
-    def observe(self, link_time: float, arrived: int) -> int:
-        """A feedback of then arrived: its time of capture, in ns since 1970."""
-        if self._offset is None:
-            self._origin = arrived
-        self._clock.observe(link_time, (arrived - self._origin) / SECOND)
-        estimate = self._origin + round((self._clock.wall_time(link_time) - link_time) * SECOND)
+    def observe(self, link_time: float, now: float) -> None:
+        """A feedback that was issued at `link_time` arrived now; both in s."""
+        self._clock.observe(link_time, now)
+        estimate = self._clock.wall_time(link_time) - link_time
         if self._offset is None or abs(estimate - self._offset) > STEP:
             self._offset = estimate
-        return self.captured(link_time, arrived)
 
-    def captured(self, link_time: float, arrived: int) -> int:
-        """Of a medium; `arrived` itself before the first feedback."""
-        return arrived if self._offset is None else self._offset + round(link_time * SECOND)
+    def captured(self, link_time: float, now: float) -> float:
+        """When that was on the console's clock, in s; `now` before the first feedback."""
+        return now if self._offset is None else self._offset + link_time

@@ -1,5 +1,6 @@
 """Writes one recording file: MCAP, in chunks that are on the disk within a second. Used from one thread."""
 
+import fcntl
 import os
 from collections.abc import Mapping
 from contextlib import suppress
@@ -48,6 +49,7 @@ class RecordingWriter:
         self, path: Path, info: RecordingInfo, description: RobotDescription, codecs: Mapping[str, str]
     ) -> None:
         self.path = path
+        self.info = info
         self._builder = IndexBuilder(EventIndex(epoch=info.epoch, recording=info.recording, part=info.part))
         self._marks = MarkFinder(description)
         self._channels: dict[str, int] = {}
@@ -55,6 +57,7 @@ class RecordingWriter:
         self._chunk_since: int | None = None  # ns, arrival of its first record
         try:
             self._file: BinaryIO = path.open("xb")
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # tells others that it is being written
         except OSError as error:
             raise DiskTrouble(_reason(error)) from error
         self._writer = Writer(self._file, chunk_size=NEVER, compression=CompressionType.ZSTD)

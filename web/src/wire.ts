@@ -206,6 +206,20 @@ export interface RangeRing {
   readonly range_max: number;
 }
 
+/** Whether the session is recorded; sent to newcomers, when it changes, and every few seconds while it is. */
+export interface RecordingState {
+  readonly type: "recording";
+  readonly state: "failed" | "off" | "recording";
+  readonly id: string;
+  readonly recording: string;
+  readonly name: string;
+  readonly by: string;
+  readonly since: number;
+  readonly bytes: number;
+  readonly lost: number;
+  readonly detail: string;
+}
+
 /** Why a command was not executed, and which event is current. */
 export interface Refusal {
   readonly type: "refusal";
@@ -317,7 +331,7 @@ export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | SharedNote | Notice | StopStateNotice;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice;
 
 /** A note that somebody wrote, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {

@@ -1,0 +1,254 @@
+"""The HTTP API of recordings (docs/recording.md). Files are read in threads, never on the loop."""
+
+import asyncio
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Annotated, TypeVar
+
+import msgspec
+from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi.responses import FileResponse, StreamingResponse
+
+from robot_bridge.protocol.console import RecordingState
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.serial import MAX_EVENT, event_gap
+from server.access import Access, Identity, require_role
+from server.body import read_json
+from server.errors import BadParameter, NotFound, RecordingFailed
+from server.recording.errors import RecordingError
+from server.recording.event_index import EventIndex
+from server.recording.library import Library
+from server.recording.reader import Record, RecordingReader
+from server.recording.shelf import RecordingEntry
+
+__all__ = [
+    "FileTicket",
+    "RecordingDetails",
+    "RecordingList",
+    "RecordingRequest",
+    "RecordingService",
+    "router",
+]
+
+router = APIRouter()
+
+MAX_EVENTS = 10_000  # in one answer of `records`
+MAX_BYTES = 64 * 1024 * 1024
+
+Result = TypeVar("Result")
+Event = Annotated[int, Query(ge=1, le=MAX_EVENT)]
+
+
+@dataclass(frozen=True)
+class RecordingService:
+    """What the routes need; `app.state.recordings`."""
+
+    library: Library
+    access: Access
+
+
+class RecordingRequest(msgspec.Struct, frozen=True):
+    """Body of POST /api/recordings."""
+
+    name: Annotated[str, msgspec.Meta(max_length=80)] = ""
+
+
+class RecordingList(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /api/recordings."""
+
+    state: RecordingState
+    recordings: list[RecordingEntry]
+
+
+class RecordingDetails(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /api/recordings/{id}."""
+
+    info: RecordingEntry
+    description: RobotDescription | None  # None before its first chunk is written
+    index: EventIndex
+
+
+class FileTicket(msgspec.Struct, frozen=True):
+    """Answer of POST /api/recordings/{id}/ticket."""
+
+    path: str
+
+
+def _service(request: Request) -> RecordingService:
+    found = request.app.state.recordings
+    if not isinstance(found, RecordingService):
+        raise TypeError("the app is not running")
+    return found
+
+
+def _caller(request: Request) -> Identity:
+    return _service(request).access.bearer(request.headers.get("authorization"))
+
+
+Caller = Annotated[Identity, Depends(_caller)]
+
+
+@router.get("/api/recordings")
+async def recordings(request: Request, caller: Caller) -> Response:
+    library = _service(request).library
+    found = await asyncio.to_thread(library.entries)
+    return _json(RecordingList(state=library.state(), recordings=found))
+
+
+@router.post("/api/recordings")
+async def start(request: Request, caller: Caller) -> Response:
+    require_role(caller, "operator", "supervisor")
+    wanted = await read_json(request, RecordingRequest)
+    return _json(_service(request).library.start(caller.name, wanted.name.strip()), 201)
+
+
+@router.post("/api/recordings/stop")
+async def stop(request: Request, caller: Caller) -> Response:
+    """Answers when the file is closed."""
+    require_role(caller, "operator", "supervisor")
+    return _json(await _service(request).library.stop())
+
+
+@router.get("/api/recordings/{recording_id}")
+async def details(
+    request: Request, caller: Caller, recording_id: str, after: Annotated[int, Query(ge=0)] = 0
+) -> Response:
+    """`after`: only what the index has from that chunk on, for one who follows a running recording."""
+
+    def read(reader: RecordingReader, entry: RecordingEntry) -> RecordingDetails:
+        description = reader.description() if reader.index.chunks else None
+        return RecordingDetails(info=entry, description=description, index=reader.index.after(after))
+
+    return _json(await _with_reader(request, recording_id, read))
+
+
+@router.get("/api/recordings/{recording_id}/chunks/{number}")
+async def chunk(request: Request, caller: Caller, recording_id: str, number: int) -> Response:
+    """A chunk never changes."""
+
+    def read(reader: RecordingReader, entry: RecordingEntry) -> bytes:
+        try:
+            return b"".join(map(_framed, reader.chunk(number)))
+        except IndexError as error:
+            raise NotFound("no such chunk") from error
+
+    body = await _with_reader(request, recording_id, read)
+    headers = {"Cache-Control": "private, max-age=86400, immutable"}
+    return Response(body, media_type="application/octet-stream", headers=headers)
+
+
+@router.get("/api/recordings/{recording_id}/records")
+async def records(
+    request: Request,
+    caller: Caller,
+    recording_id: str,
+    first: Annotated[int, Query(alias="from", ge=1, le=MAX_EVENT)],
+    last: Annotated[int, Query(alias="to", ge=1, le=MAX_EVENT)],
+    topic: Annotated[list[str] | None, Query(max_length=50)] = None,
+    decodable: bool = False,
+) -> Response:
+    """By events."""
+    if not 0 <= event_gap(last, first) <= MAX_EVENTS:
+        raise BadParameter(f"from 0 to {MAX_EVENTS} events at once")
+    topics = None if topic is None else frozenset(topic)
+    reader, _ = await _open(request, recording_id)
+    # The response closes the iterator, and that the file, also when whoever asked is gone.
+    body = _bounded(reader, first, last, topics, decodable)
+    return StreamingResponse(body, media_type="application/octet-stream", headers={"Cache-Control": "no-store"})
+
+
+@router.post("/api/recordings/{recording_id}/ticket")
+async def ticket(request: Request, caller: Caller, recording_id: str) -> Response:
+    """For a link that the browser downloads by itself: it sends no token."""
+    await _with_reader(request, recording_id, lambda reader, entry: None)
+    permission = _service(request).access.issue_file_ticket(recording_id, caller.token_id)
+    return _json(FileTicket(f"/api/recordings/{recording_id}/file?ticket={permission}"))
+
+
+@router.get("/api/recordings/{recording_id}/file")
+async def download(request: Request, recording_id: str, ticket: str = "") -> Response:
+    """Of a running recording what is there now; `lockstep export` and other tools take that too."""
+    access = _service(request).access
+    if ticket:
+        access.verify_file_ticket(ticket, recording_id)
+    else:
+        _caller(request)
+    path = await _with_reader(request, recording_id, lambda reader, entry: reader.path)
+    return FileResponse(
+        path, media_type="application/x-mcap", filename=path.name, headers={"Cache-Control": "no-store"}
+    )
+
+
+@router.delete("/api/recordings/{recording_id}")
+async def delete(request: Request, caller: Caller, recording_id: str) -> Response:
+    require_role(caller, "supervisor")
+    library = _service(request).library
+    try:
+        await asyncio.to_thread(library.delete, recording_id)
+    except OSError as error:
+        raise RecordingFailed(error.strerror or str(error)) from error
+    found = await asyncio.to_thread(library.entries)
+    return _json(RecordingList(state=library.state(), recordings=found))
+
+
+async def _open(request: Request, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
+    try:
+        return await asyncio.to_thread(_service(request).library.open, recording_id)
+    except (RecordingError, OSError) as error:
+        raise RecordingFailed(f"it cannot be read: {error}") from error
+
+
+async def _with_reader(
+    request: Request, recording_id: str, read: Callable[[RecordingReader, RecordingEntry], Result]
+) -> Result:
+    def work() -> Result:
+        reader, entry = _service(request).library.open(recording_id)
+        with reader:
+            return read(reader, entry)
+
+    try:
+        return await asyncio.to_thread(work)
+    except (RecordingError, OSError) as error:
+        raise RecordingFailed(f"it cannot be read: {error}") from error
+
+
+def _bounded(
+    reader: RecordingReader, first: int, last: int, topics: frozenset[str] | None, decodable: bool
+) -> Iterator[bytes]:
+    """Ends early where the file is broken: the status is on its way already."""
+    sent = 0
+    try:
+        for record in reader.records(first, last, topics, decodable=decodable):
+            part = _framed(record)
+            sent += len(part)
+            if sent > MAX_BYTES:
+                return
+            yield part
+    except (RecordingError, OSError):
+        return
+    finally:
+        reader.close()
+
+
+class _Head(msgspec.Struct, frozen=True):
+    topic: str
+    event: int
+    arrived: int  # µs since 1970
+    captured: int
+    keyframe: bool
+    size: int
+
+
+def _framed(record: Record) -> bytes:
+    payload = record.payload
+    head = msgspec.json.encode(
+        _Head(
+            record.topic, record.event, record.arrived // 1000, record.captured // 1000, record.keyframe, len(payload)
+        )
+    )
+    return len(head).to_bytes(4, "big") + head + payload
+
+
+def _json(answer: msgspec.Struct, status: int = 200) -> Response:
+    body = msgspec.json.encode(answer)
+    return Response(body, status, media_type="application/json", headers={"Cache-Control": "no-store"})

@@ -1,0 +1,19 @@
+"""Settings of recordings: LOCKSTEP_RECORDING__…"""
+
+from pathlib import Path
+
+from pydantic import BaseModel, Field
+
+__all__ = ["RecordingSettings"]
+
+
+class RecordingSettings(BaseModel):
+    """Where recordings go, and how much of them is kept."""
+
+    directory: Path | None = None  # None: `recordings` in the state directory
+    automatic: bool = False  # record from the start on, and again after a failure
+    file_bytes: int = Field(default=2_000_000_000, ge=1_000_000)  # then the next part begins
+    total_bytes: int = Field(default=20_000_000_000, ge=1_000_000)  # of the directory; then the oldest go
+    age_days: float = Field(default=30.0, gt=0)  # older ones go
+    free_bytes: int = Field(default=500_000_000, ge=0)  # that stay free on the disk; else recording ends
+    keyframe_seconds: float = Field(default=4.0, ge=0.5, le=60.0)  # between two keyframes, twice that without room

@@ -1,0 +1,167 @@
+"""The directory of recordings: lists them, completes interrupted ones, deletes what is too much. Blocks."""
+
+import fcntl
+import time
+from collections.abc import Collection
+from pathlib import Path
+
+import msgspec
+import structlog
+
+from server.recording.errors import RecordingError
+from server.recording.event_index import EventIndex
+from server.recording.info import RecordingInfo
+from server.recording.reader import RecordingReader
+from server.recording.scan import complete_file
+from server.recording.settings import RecordingSettings
+
+__all__ = ["RecordingEntry", "Shelf", "entry_of"]
+
+log = structlog.get_logger(__name__)
+
+SUFFIX = ".mcap"
+DAY = 86_400.0
+
+
+class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
+    """One file. Times in µs since 1970."""
+
+    id: str  # the file's name without its suffix
+    recording: str
+    part: int
+    name: str
+    robot: str
+    epoch: str
+    by: str
+    started: int
+    ended: int
+    first_event: int
+    last_event: int
+    bytes: int
+    marks: dict[str, int]  # how many of each kind
+    lost: int
+    running: bool
+    interrupted: bool
+
+
+class Shelf:
+    """One directory. Files that are no recordings are passed over."""
+
+    def __init__(self, directory: Path, settings: RecordingSettings) -> None:
+        self.directory = directory
+        self._settings = settings
+        self._known: dict[Path, tuple[tuple[int, int], RecordingEntry | None]] = {}  # by size and time of change
+
+    def prepare(self) -> None:
+        """Raises OSError: the directory cannot be made."""
+        self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+
+    def files(self) -> list[Path]:
+        return [path for path in self.directory.glob(f"*{SUFFIX}") if path.is_file()]
+
+    def path(self, recording_id: str) -> Path | None:
+        """None: there is none of that id."""
+        return next((path for path in self.files() if path.stem == recording_id), None)
+
+    def entries(self) -> list[RecordingEntry]:
+        """The newest first. Files that are being written are not among them."""
+        paths = self.files()
+        self._known = {path: known for path, known in self._known.items() if path in paths}
+        found = [entry for path in paths if (entry := self._entry(path)) is not None]
+        return sorted(found, key=lambda entry: entry.started, reverse=True)
+
+    def _entry(self, path: Path) -> RecordingEntry | None:
+        try:
+            status = path.stat()
+            version = status.st_size, status.st_mtime_ns
+            known = self._known.get(path)
+            if known is not None and known[0] == version:
+                return known[1]
+            entry = None
+            if not _is_locked(path):
+                with RecordingReader(path) as reader:
+                    entry = entry_of(path, reader.info, reader.index, interrupted=reader.interrupted)
+                self._known[path] = version, entry
+            return entry
+        except (RecordingError, OSError):
+            return None
+
+    def recover(self) -> int:
+        """Complete the files that were interrupted; how many."""
+        count = 0
+        for path in self.files():
+            try:
+                if _is_locked(path):
+                    continue
+                with RecordingReader(path) as reader:
+                    if not reader.interrupted:
+                        continue
+                    info, empty = reader.info, not reader.index.chunks
+                if empty:
+                    path.unlink()
+                    continue
+                complete_file(path, info)
+                count += 1
+                log.warning("an interrupted recording was completed", file=path.name)
+            except (RecordingError, OSError) as error:
+                log.error("an interrupted recording cannot be completed", file=path.name, reason=str(error))
+        return count
+
+    def prune(self, keep: Collection[Path] = ()) -> list[str]:
+        """Delete recordings that are too old, and the oldest while there are too many bytes; returns their ids."""
+        dated = []
+        for path in self.files():
+            status = path.stat()
+            dated.append((status.st_mtime, status.st_size, path))
+        total = sum(size for _, size, _ in dated)
+        oldest = time.time() - self._settings.age_days * DAY
+        gone = []
+        for changed, size, path in sorted(dated):
+            if total <= self._settings.total_bytes and changed >= oldest:
+                break
+            if path in keep or _is_locked(path):
+                continue
+            path.unlink(missing_ok=True)
+            total -= size
+            gone.append(path.stem)
+            log.warning("a recording was deleted to make room", file=path.name)
+        return gone
+
+    def delete(self, path: Path) -> None:
+        path.unlink(missing_ok=True)
+
+
+def entry_of(
+    path: Path, info: RecordingInfo, index: EventIndex, *, running: bool = False, interrupted: bool = False
+) -> RecordingEntry:
+    marks: dict[str, int] = {}
+    for mark in index.marks:
+        marks[mark.kind] = marks.get(mark.kind, 0) + 1
+    return RecordingEntry(
+        id=path.stem,
+        recording=info.recording,
+        part=info.part,
+        name=info.name,
+        robot=info.robot,
+        epoch=info.epoch,
+        by=info.by,
+        started=index.started,
+        ended=index.ended,
+        first_event=index.first_event,
+        last_event=index.last_event,
+        bytes=path.stat().st_size,
+        marks=marks,
+        lost=index.lost,
+        running=running,
+        interrupted=interrupted,
+    )
+
+
+def _is_locked(path: Path) -> bool:
+    """Whether somebody writes it now."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        return False

@@ -1,0 +1,33 @@
+"""Who listens to a session: all that passes the console, for a recorder. This one does nothing."""
+
+from robot_bridge.protocol.console import Report, ServerMessage
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest
+from server.audit import Actor
+from server.command_desk import Outcome
+
+__all__ = ["SessionTap"]
+
+
+class SessionTap:
+    """All are called on the loop and return at once. Who asks is nobody (`Actor()`) where the console acts itself."""
+
+    def told(self, message: ServerMessage) -> None:
+        """What everyone is told: the seat, the participants, notes, the robot link."""
+
+    def command(self, by: Actor, command: Command, outcome: Outcome) -> None:
+        """What `by` asked for, and what became of it."""
+
+    def rest(self, by: Actor, rest: Rest, why: str) -> None:
+        """A rest went to the robot."""
+
+    def feedback(self, feedback: Feedback, now: float) -> None: ...
+
+    def refused(self, to: Actor, refusal: Refusal, by: str) -> None:
+        """`by`: "console" or "robot"."""
+
+    def stop_asked(self, by: Actor, where: str, reason: str, *, delivered: bool) -> None: ...
+
+    def reset_asked(self, by: Actor, where: str) -> None: ...
+
+    def report(self, by: Actor, report: Report) -> None:
+        """Of the seat's holder."""
