@@ -1,39 +1,58 @@
-// A gamepad of the W3C standard mapping that a test moves: window.testPad.
+// Gamepads that a test moves: window.testPad. One of the W3C standard mapping is plugged in from the start.
 (() => {
   const button = () => ({ pressed: false, touched: false, value: 0 });
-  const pad = {
-    index: 0,
-    id: "Test pad (STANDARD GAMEPAD Vendor: 0000 Product: 0000)",
-    connected: true,
-    mapping: "standard",
-    timestamp: 0,
-    axes: [0, 0, 0, 0],
-    buttons: Array.from({ length: 17 }, button),
-    vibrationActuator: {
-      type: "dual-rumble",
-      effects: ["dual-rumble"],
-      playEffect: (type, effect) => {
-        window.testPad.rumbles.push(effect);
-        return Promise.resolve("complete");
-      },
-      reset: () => Promise.resolve("complete"),
+  const slots = [null, null, null, null];
+
+  // `felt` gets every effect as it is played and null as it is stopped.
+  const actuator = (index, effects) => ({
+    type: "dual-rumble",
+    effects,
+    playEffect: (type, effect) => {
+      if (!effects.includes(type)) return Promise.reject(new DOMException("no such effect", "NotSupportedError"));
+      window.testPad.rumbles.push({ type, pad: index, ...effect });
+      window.testPad.felt.push(type);
+      return Promise.resolve("complete");
     },
-  };
+    reset: () => {
+      window.testPad.felt.push(null);
+      return Promise.resolve("complete");
+    },
+  });
+
   window.testPad = {
-    plugged: true,
     rumbles: [],
-    press(index, pressed) {
-      pad.buttons[index] = { pressed, touched: pressed, value: pressed ? 1 : 0 };
-      pad.timestamp = performance.now();
+    felt: [],
+    // Plugs in another pad; returns its index.
+    plug({ id = "Test pad", mapping = "standard", axes = [0, 0, 0, 0], buttons = 17, effects = ["dual-rumble"] } = {}) {
+      const index = slots.indexOf(null);
+      slots[index] = {
+        index,
+        id,
+        connected: true,
+        mapping,
+        timestamp: performance.now(),
+        axes: [...axes],
+        buttons: Array.from({ length: buttons }, button),
+        vibrationActuator: actuator(index, effects),
+      };
+      window.dispatchEvent(Object.assign(new Event("gamepadconnected"), { gamepad: slots[index] }));
+      return index;
     },
-    tilt(axis, value) {
-      pad.axes[axis] = value;
-      pad.timestamp = performance.now();
+    press(at, pressed, index = 0) {
+      slots[index].buttons[at] = { pressed, touched: pressed, value: pressed ? 1 : 0 };
+      slots[index].timestamp = performance.now();
     },
-    unplug() {
-      this.plugged = false;
-      window.dispatchEvent(Object.assign(new Event("gamepaddisconnected"), { gamepad: pad }));
+    tilt(axis, value, index = 0) {
+      slots[index].axes[axis] = value;
+      slots[index].timestamp = performance.now();
+    },
+    unplug(index = 0) {
+      const gamepad = slots[index];
+      slots[index] = null;
+      gamepad.connected = false;
+      window.dispatchEvent(Object.assign(new Event("gamepaddisconnected"), { gamepad }));
     },
   };
-  navigator.getGamepads = () => (window.testPad.plugged ? [pad, null, null, null] : [null, null, null, null]);
+  window.testPad.plug({ id: "Test pad (STANDARD GAMEPAD Vendor: 0000 Product: 0000)" });
+  navigator.getGamepads = () => [...slots];
 })();

@@ -107,6 +107,7 @@ export class ConsoleApp {
       isArmed: () => this.isArmed(),
       answerClaim: (grant) => this.session.answerFirst(grant, performance.now()),
       lost: () => this.disarm("pad_lost"),
+      plugged: (words) => note(this.state, "info", words, Date.now()),
     });
     if (this.reader === null)
       note(this.state, "error", "This browser cannot read stamps: no picture passes the gate", Date.now());

@@ -24,10 +24,13 @@ import { createKeysSheet } from "./ui/keys_sheet";
 import { createLimitsStrip } from "./ui/limits_strip";
 import { createLogPanel } from "./ui/log_panel";
 import { createNotesPanel } from "./ui/notes_panel";
+import { createPadSheet } from "./ui/pad_sheet";
 import { createOverlay, overlayWords } from "./ui/overlay";
 import { createPageTools } from "./ui/page_tools";
 import { createPeoplePanel } from "./ui/people_panel";
+import { createPlacePanel } from "./ui/place_panel";
 import { createRangeRadar } from "./ui/range_radar";
+import { createScaleBar } from "./ui/scale_bar";
 import { SceneView } from "./ui/scene_view";
 import { createSeatBar } from "./ui/seat_bar";
 import { createSettingsPanel } from "./ui/settings_panel";
@@ -53,6 +56,7 @@ export class Page {
   private readonly unread = createUnread();
   private readonly charts: ChartsDrawer;
   private readonly keys: SheetContent;
+  private readonly pads: SheetContent;
   private readonly panels: Panel[];
   private drawnMs = 0;
 
@@ -68,6 +72,7 @@ export class Page {
       feedbackTaken: (now) => this.board.update(this.app, now),
     });
     this.keys = createKeysSheet(this.app);
+    this.pads = createPadSheet(this.app.controls.pad);
     this.charts = new ChartsDrawer(this.app.charts, (open) =>
       this.root.classList.toggle("shows-charts", open),
     );
@@ -98,10 +103,16 @@ export class Page {
     const force = createForceGauge(app, false);
     const contact = createForceGauge(app, true);
     const radar = createRangeRadar(app);
+    const places = createPlacePanel(app);
     const overlay = createOverlay(app);
     const limits = createLimitsStrip(app);
+    const scale = createScaleBar(app, () => board.largeStream());
     const seat = createSeatBar(app);
-    const tools = createPageTools({ charts: () => this.act("charts"), keys: () => this.act("keys") });
+    const tools = createPageTools({
+      charts: () => this.act("charts"),
+      keys: () => this.act("keys"),
+      pads: () => this.act("pads"),
+    });
     bar.element.append(tools.bar);
     const status = [
       { element: tools.details, update: () => undefined },
@@ -116,8 +127,8 @@ export class Page {
     const stop = createStopPanel(app);
     const announcer = createAnnouncer(app);
     board.element.append(
-      h("div", "gauges", {}, force.element, radar.element),
-      h("div", "stage", {}, contact.element, limits.element, overlay.element),
+      h("div", "gauges", {}, places.element, force.element, radar.element),
+      h("div", "stage", {}, scale.element, contact.element, limits.element, overlay.element),
     );
     const rail = h("aside", "rail", {}, event.element, tabs.element);
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
@@ -138,8 +149,10 @@ export class Page {
       force,
       contact,
       radar,
+      places,
       overlay,
       limits,
+      scale,
       tabs,
       charts,
       arm,
@@ -151,6 +164,7 @@ export class Page {
 
   private act(action: PageAction): void {
     if (action === "keys") this.sheets.open(this.keys);
+    else if (action === "pads") this.sheets.open(this.pads);
     else if (this.sheets.isOpen) return;
     else if (action === "charts") this.charts.toggle();
     else if (action === "freeze") this.charts.freeze();

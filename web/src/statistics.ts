@@ -59,6 +59,7 @@ export interface Statistics {
   readonly at_rest: boolean | null;
   readonly first_picture_ms: number | null;
   readonly sound: "on" | "off";
+  readonly pad: { readonly id: string; readonly ready: boolean; readonly calibrated: boolean } | null;
   readonly bad_messages: number;
 }
 
@@ -105,8 +106,14 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     at_rest: state.feedback?.at_rest ?? null,
     first_picture_ms: app.firstPictureMs,
     sound: app.room.isAudible() ? "on" : "off",
+    pad: padOf(app),
     bad_messages: state.badMessages,
   };
+}
+
+function padOf(app: ConsoleApp): Statistics["pad"] {
+  const { state } = app.controls.pad;
+  return state === null ? null : { id: state.id, ready: state.ready, calibrated: state.setup.calibrated };
 }
 
 /** Why a view must not be trusted; null when it may. */

@@ -1,13 +1,14 @@
 import type { RobotDescription } from "../wire";
 
 /** What a key does to the page, wherever it is not one that drives. */
-export type PageAction = "charts" | "freeze" | "keys" | "save";
+export type PageAction = "charts" | "freeze" | "keys" | "pads" | "save";
 
 const ACTIONS: ReadonlyMap<string, PageAction> = new Map([
   ["KeyC", "charts"],
   ["KeyF", "freeze"],
   ["KeyX", "save"],
   ["KeyH", "keys"],
+  ["KeyG", "pads"],
 ]);
 
 /** The action of a key; null when there is none, or the key drives this robot and the page is armed. */

@@ -2,6 +2,7 @@ import type { HeldInputs } from "../core/axis_mapping";
 import { createGrip, noteGrip } from "../core/grip";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
 import { Pad, type PadEvents } from "./pad";
+import { PadStorage } from "./pad_storage";
 import type { TouchSticks } from "./touch_sticks";
 
 const SLOW_SHARE = 0.3;
@@ -10,7 +11,7 @@ const SLOW_SHARE = 0.3;
 export interface ControlSample {
   readonly deadman: boolean;
   readonly held: HeldInputs;
-  readonly slowShare: number; // 1, or less with the slow button
+  readonly slowShare: number; // 1, or less with the slow key; a pad's own share is in its inputs
   readonly signature: string; // the same while no hand shows
 }
 
@@ -24,20 +25,20 @@ export class Controls {
     readonly sticks: TouchSticks,
     events: KeyboardEvents & PadEvents,
   ) {
-    this.pad = new Pad(events);
+    this.pad = new Pad(events, new PadStorage());
     this.keyboard = new Keyboard(events);
   }
 
   sample(): ControlSample {
     this.pad.poll();
     const { keyboard, sticks } = this;
-    const pad = this.pad.state?.standard === true ? this.pad.state : null;
+    const pad = this.pad.state?.ready === true ? this.pad.state : null;
     const touch = sticks.deadman ? sticks.inputs : null;
     const held: HeldInputs = { pad: pad?.inputs ?? null, keys: keyboard.keys, touch };
     return {
       deadman: keyboard.deadman || sticks.deadman || (pad?.deadman ?? false),
       held,
-      slowShare: keyboard.slow || pad?.slow === true ? SLOW_SHARE : 1,
+      slowShare: keyboard.slow ? SLOW_SHARE : 1,
       signature: noteGrip(this.grip, held),
     };
   }

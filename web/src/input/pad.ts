@@ -1,67 +1,154 @@
-import { isPressed, isStandard, PAD_BUTTONS, readPad, type PadInputs } from "../core/pad_mapping";
+import { choosePad } from "../core/pad_choice";
+import type { PadAction } from "../core/pad_layout";
+import { readPad, type PadInputs, type SeenAtRest } from "../core/pad_mapping";
+import { padName, setupOf, type PadSetup } from "../core/pad_profile";
+import { speedShare } from "../core/pad_shaping";
+import type { PadStorage } from "./pad_storage";
 
 export interface PadEvents {
   stop(): void;
   arm(): void;
   nextLayer(): void;
   lost(): void;
+  /** A pad came or went, in words. */
+  plugged(words: string): void;
 }
 
-/** What one pad holds now. */
+/** What the pad in use holds now. */
 export interface PadState {
-  readonly id: string;
-  readonly standard: boolean; // false: the browser does not know which button is which
+  readonly id: string; // Gamepad.id
+  readonly name: string;
+  readonly setup: PadSetup;
+  readonly ready: boolean; // false: it has to be calibrated before it can drive
   readonly deadman: boolean;
-  readonly slow: boolean;
-  readonly inputs: PadInputs;
+  readonly inputs: PadInputs; // with the pad's own speed share in them
+  readonly pressed: ReadonlySet<PadAction>;
   readonly gamepad: Gamepad;
 }
 
-/** The first gamepad that shows itself. Polled, because browsers tell of no button presses. */
+interface Known {
+  readonly id: string;
+  readonly seen: SeenAtRest;
+  pressed: ReadonlySet<PadAction> | null; // null: not read yet, so nothing is a new press
+}
+
+/** The gamepad in use, and STOP of all others. Polled, because browsers tell of no button presses. */
 export class Pad {
   state: PadState | null = null;
-  private pressed = new Set<number>();
+  private readonly known = new Map<number, Known>(); // by Gamepad.index
+  private chosen: { index: number; id: string } | null = null;
+  isSuspended = false;
 
-  constructor(private readonly events: PadEvents) {}
+  constructor(
+    private readonly events: PadEvents,
+    readonly storage: PadStorage,
+  ) {}
 
-  /** Reads the pad, and tells of buttons pressed since the last time. */
+  /** All pads that are plugged in and were touched. */
+  all(): Gamepad[] {
+    return navigator
+      .getGamepads()
+      .filter((pad) => pad !== null)
+      .filter((pad) => pad.connected);
+  }
+
+  /** From now on this pad drives. */
+  choose(pad: Gamepad): void {
+    this.chosen = { index: pad.index, id: pad.id };
+    this.storage.prefer(pad.id);
+  }
+
+  /** While suspended no pad does anything: one is being calibrated. */
+  suspend(suspended: boolean): void {
+    this.isSuspended = suspended;
+    for (const known of this.known.values()) known.pressed = null;
+  }
+
+  /** Reads all pads, and tells of what was pressed since the last time. */
   poll(): void {
-    const gamepad = findGamepad(this.state?.gamepad.index);
-    const had = this.state;
-    this.state = gamepad === null ? null : stateOf(gamepad);
-    if (had !== null && this.state === null) this.events.lost();
-    if (this.state?.standard === true) this.tellPresses(this.state.gamepad);
-    else this.pressed.clear();
+    const pads = this.all();
+    this.notePlugs(pads);
+    const before = this.state;
+    const states = pads.map((pad) => this.read(pad));
+    const candidates = states.map(({ gamepad, ready }) => ({ index: gamepad.index, id: gamepad.id, ready }));
+    const index = choosePad(candidates, this.chosen, this.storage.book.preferred);
+    const state = states.find(({ gamepad }) => gamepad.index === index) ?? null;
+    this.chosen = state === null ? null : { index: state.gamepad.index, id: state.id };
+    this.state = this.isSuspended ? null : state;
+    const isOther = before?.gamepad.index !== state?.gamepad.index || before?.id !== state?.id;
+    if (before?.ready === true && isOther) this.events.lost();
+    if (!this.isSuspended) for (const each of states) this.tellPresses(each, each === state);
   }
 
-  private tellPresses(gamepad: Gamepad): void {
-    const now = new Set([...gamepad.buttons.keys()].filter((button) => isPressed(gamepad, button)));
-    const isNew = (button: number): boolean => now.has(button) && !this.pressed.has(button);
-    if (PAD_BUTTONS.stop.some(isNew)) this.events.stop();
-    if (isNew(PAD_BUTTONS.arm)) this.events.arm();
-    if (isNew(PAD_BUTTONS.layer)) this.events.nextLayer();
-    this.pressed = now;
+  private read(gamepad: Gamepad): PadState {
+    const setup = setupOf(gamepad, this.storage.book.profiles);
+    const { layout, shaping } = setup;
+    const common = { id: gamepad.id, name: padName(gamepad.id), setup, gamepad };
+    if (layout === null) return { ...common, ready: false, deadman: false, inputs: NOTHING, pressed: NONE };
+    const { inputs, pressed } = readPad(gamepad, layout, shaping, this.knownOf(gamepad).seen);
+    const share = speedShare(shaping, pressed.has("slow"), pressed.has("turbo"));
+    return {
+      ...common,
+      ready: true,
+      deadman: pressed.has("deadman"),
+      inputs: scaled(inputs, share),
+      pressed,
+    };
+  }
+
+  /** Any pad stops the robot; only the one in use does more. */
+  private tellPresses({ gamepad, pressed }: PadState, inUse: boolean): void {
+    const known = this.knownOf(gamepad);
+    const before = known.pressed;
+    known.pressed = pressed;
+    if (before === null) return;
+    const isNew = (action: PadAction): boolean => pressed.has(action) && !before.has(action);
+    if (isNew("stop")) this.events.stop();
+    if (inUse && isNew("arm")) this.events.arm();
+    if (inUse && isNew("layer")) this.events.nextLayer();
+  }
+
+  private knownOf(gamepad: Gamepad): Known {
+    const known = this.known.get(gamepad.index);
+    if (known !== undefined && known.id === gamepad.id) return known;
+    const fresh: Known = { id: gamepad.id, seen: new Set(), pressed: null };
+    this.known.set(gamepad.index, fresh);
+    return fresh;
+  }
+
+  private notePlugs(pads: readonly Gamepad[]): void {
+    for (const [index, known] of this.known)
+      if (!pads.some((pad) => pad.index === index && pad.id === known.id)) {
+        this.known.delete(index);
+        this.events.plugged(`Gamepad gone: ${padName(known.id)}`);
+      }
+    for (const pad of pads) {
+      if (this.known.has(pad.index)) continue;
+      this.knownOf(pad);
+      this.events.plugged(`Gamepad found: ${padName(pad.id)}`);
+    }
   }
 }
 
-function findGamepad(index: number | undefined): Gamepad | null {
-  const pads = navigator.getGamepads().filter((pad) => pad?.connected === true);
-  return (
-    pads.find((pad) => pad?.index === index) ??
-    pads.find((pad) => pad?.mapping === "standard") ??
-    pads[0] ??
-    null
-  );
-}
+const NONE: ReadonlySet<PadAction> = new Set();
+const NOTHING: PadInputs = {
+  left_x: 0,
+  left_y: 0,
+  right_x: 0,
+  right_y: 0,
+  dpad_x: 0,
+  dpad_y: 0,
+  triggers: 0,
+};
 
-function stateOf(gamepad: Gamepad): PadState {
-  const standard = isStandard(gamepad);
+function scaled(inputs: PadInputs, share: number): PadInputs {
   return {
-    id: gamepad.id.replace(/\s*\(.*$/, "") || "Gamepad",
-    standard,
-    deadman: standard && isPressed(gamepad, PAD_BUTTONS.deadman),
-    slow: standard && isPressed(gamepad, PAD_BUTTONS.slow),
-    inputs: readPad(gamepad),
-    gamepad,
+    left_x: inputs.left_x * share,
+    left_y: inputs.left_y * share,
+    right_x: inputs.right_x * share,
+    right_y: inputs.right_y * share,
+    dpad_x: inputs.dpad_x * share,
+    dpad_y: inputs.dpad_y * share,
+    triggers: inputs.triggers * share,
   };
 }

@@ -1,5 +1,5 @@
 import type { TouchInputs } from "../core/axis_mapping";
-import { shapeStick } from "../core/pad_mapping";
+import { shapeStick } from "../core/pad_shaping";
 
 type Side = "left" | "right";
 

@@ -1,5 +1,7 @@
 import { armRefusal } from "../core/arming";
 import { holdsSeat, isOperator } from "../core/console_state";
+import { actionName, type PadAction } from "../core/pad_layout";
+import { isStandard } from "../core/pad_mapping";
 import { ARM_REFUSAL_WORDS, DISARM_WORDS } from "../core/words";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
@@ -42,14 +44,43 @@ function armWords(app: ConsoleApp, now: number): string {
 }
 
 function deadmanName(app: ConsoleApp): string {
-  if (app.controls.pad.state?.standard === true) return "the right bumper (RB)";
+  const name = padButton(app, "deadman");
+  if (name === "RB") return "the right bumper (RB)";
+  if (name !== null) return name;
   return document.documentElement.dataset["touch"] === "true" ? "a stick" : "the space bar";
 }
 
 function padWords(app: ConsoleApp): string {
   const { state } = app.controls.pad;
+  if (app.controls.pad.isSuspended) return "A gamepad is being calibrated";
   if (state === null) return "No gamepad: press a button on it to wake it";
-  if (!state.standard) return `${state.id} has no standard mapping: it cannot drive`;
-  const layer = (app.state.robot?.description.layers.length ?? 0) > 1 ? "Y layer · " : "";
-  return app.isArmed() ? `${layer}LB slow · B STOP` : `${state.id} ready: START arms`;
+  if (!state.ready) return `${state.name} has to be calibrated first: press G`;
+  if (!app.isArmed()) {
+    const arm = padButton(app, "arm");
+    return arm === null ? `${state.name} ready` : `${state.name} ready: ${arm} arms`;
+  }
+  const { shaping } = state.setup;
+  const hasLayers = (app.state.robot?.description.layers.length ?? 0) > 1;
+  const hasTurbo = shaping.turbo > shaping.normal;
+  const parts: [PadAction, string, boolean][] = [
+    ["layer", "layer", hasLayers],
+    ["slow", "slow", true],
+    ["turbo", "turbo", hasTurbo],
+    ["stop", "STOP", true],
+  ];
+  const words = parts.map(([action, what, isShown]) => (isShown ? padLine(app, action, what) : null));
+  return words.filter((line) => line !== null).join(" · ");
+}
+
+function padLine(app: ConsoleApp, action: PadAction, what: string): string | null {
+  const name = padButton(app, action);
+  return name === null ? null : `${name} ${what}`;
+}
+
+/** What the pad in use calls the button of an action; null without such a pad or button. */
+function padButton(app: ConsoleApp, action: PadAction): string | null {
+  const { state } = app.controls.pad;
+  const layout = state?.setup.layout ?? null;
+  if (state === null || layout === null) return null;
+  return actionName(layout, action, isStandard(state.gamepad));
 }

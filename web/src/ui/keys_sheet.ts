@@ -16,6 +16,7 @@ const ALWAYS: readonly Line[] = [
   [["C"], "Live charts, open and close"],
   [["F"], "Freeze the charts"],
   [["X"], "Save the charts that are shown as CSV and PNG"],
+  [["G"], "Gamepads: which one drives, calibration, how it feels"],
   [["H"], "These keys"],
 ];
 

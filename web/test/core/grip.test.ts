@@ -1,7 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { arm, createArming, sampleDeadman, type ArmConditions } from "../../src/core/arming";
 import { createGrip, noteGrip } from "../../src/core/grip";
-import { readPad, type PadSnapshot } from "../../src/core/pad_mapping";
+import { STANDARD_LAYOUT } from "../../src/core/pad_layout";
+import { readPad, type PadInputs } from "../../src/core/pad_mapping";
+import { DEFAULT_SHAPING } from "../../src/core/pad_shaping";
 import type { HeldInputs } from "../../src/core/axis_mapping";
 
 const READY: ArmConditions = {
@@ -16,21 +18,22 @@ const READY: ArmConditions = {
 const TICK_MS = 10;
 const MINUTE_MS = 60_000;
 
-function pad(leftY: number): PadSnapshot {
+function pad(leftY: number): PadInputs {
   const buttons = Array.from({ length: 17 }, (_, index) => ({
     pressed: index === 5,
     value: Number(index === 5),
   }));
-  return { mapping: "standard", axes: [0, leftY, 0, 0], buttons };
+  const snapshot = { id: "pad", mapping: "standard", axes: [0, leftY, 0, 0], buttons };
+  return readPad(snapshot, STANDARD_LAYOUT, DEFAULT_SHAPING, new Set()).inputs;
 }
 
 const holding: Record<string, (now: number) => HeldInputs> = {
   "a pad whose sensors tremble": (now) => ({
-    pad: readPad(pad(-0.6 + 0.008 * Math.sin(now))),
+    pad: pad(-0.6 + 0.008 * Math.sin(now)),
     keys: new Set(),
     touch: null,
   }),
-  "a pad at its stop": () => ({ pad: readPad(pad(-1)), keys: new Set(), touch: null }),
+  "a pad at its stop": () => ({ pad: pad(-1), keys: new Set(), touch: null }),
   "the keyboard": () => ({ pad: null, keys: new Set(["Space", "KeyW"]), touch: null }),
   "a touched stick": (now) => ({
     pad: null,
@@ -61,7 +64,7 @@ describe("a deadman that is taped down", () => {
 
   it("is not one whose stick a hand moves", () => {
     const moved = (now: number): HeldInputs => ({
-      pad: readPad(pad(-0.6 + 0.1 * Math.sin(now / 2000))),
+      pad: pad(-0.6 + 0.1 * Math.sin(now / 2000)),
       keys: new Set(),
       touch: null,
     });
