@@ -1,0 +1,78 @@
+"""What is said to a Janus over its WebSocket, and what it says back: JSON text, no I/O.
+
+A request carries a `transaction` that its answer repeats. Requests to a plugin are acknowledged at once and answered
+by an event with the same transaction. It stands here because the console publishes and the headless client watches.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from robot_bridge.protocol.errors import MessageError
+
+__all__ = ["JANUS_PROTOCOL", "VIDEO_ROOM", "Heard", "janus_request", "parse_janus"]
+
+JANUS_PROTOCOL = "janus-protocol"  # WebSocket subprotocol
+VIDEO_ROOM = "janus.plugin.videoroom"
+Kind = Literal["ack", "success", "event", "error", "ended", "other"]
+ENDED = ("hangup", "detached", "timeout")  # of a handle, or of the whole session
+
+
+@dataclass(frozen=True)
+class Heard:
+    """One message of Janus."""
+
+    kind: Kind
+    transaction: str  # "" when it answers nothing
+    handle: int  # 0: about the session
+    data: dict[str, Any]  # the plugin's, or what a success carries
+    jsep: dict[str, Any] | None  # a description that came with it
+    detail: str = ""  # of an error, or why it ended
+    code: int = 0  # of an error
+
+
+def janus_request(kind: str, transaction: str, **fields: object) -> str:
+    """`fields` that are None are left out."""
+    given = {name: value for name, value in fields.items() if value is not None}
+    return json.dumps({"janus": kind, "transaction": transaction, **given})
+
+
+def parse_janus(text: str | bytes) -> Heard:
+    """Raises MessageError when it is not a message of Janus."""
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise MessageError("not JSON") from error
+    if not isinstance(message, dict) or not isinstance(message.get("janus"), str):
+        raise MessageError("not a message of Janus")
+    said: str = message["janus"]
+    handle = message.get("sender")
+    plugin = _mapping(message.get("plugindata"))
+    data = dict(_mapping(plugin.get("data")) if plugin else _mapping(message.get("data")))
+    jsep = message.get("jsep")
+    common = {
+        "transaction": str(message.get("transaction", "")),
+        "handle": handle if isinstance(handle, int) else 0,
+        "data": data,
+        "jsep": dict(jsep) if isinstance(jsep, dict) and isinstance(jsep.get("sdp"), str) else None,
+    }
+    if said == "error":
+        problem = _mapping(message.get("error"))
+        return Heard("error", detail=str(problem.get("reason", ""))[:200], code=_number(problem.get("code")), **common)
+    if "error_code" in data:
+        detail = str(data.get("error", ""))[:200]
+        return Heard("error", detail=detail, code=_number(data["error_code"]), **common)
+    if said in ENDED:
+        return Heard("ended", detail=str(message.get("reason", said))[:200], **common)
+    if said in ("ack", "success", "event"):
+        return Heard(said, **common)  # type: ignore[arg-type]  # one of the literals
+    return Heard("other", detail=said[:50], **common)
+
+
+def _mapping(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, dict) else {}
+
+
+def _number(value: object) -> int:
+    return value if isinstance(value, int) else 0
