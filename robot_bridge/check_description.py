@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from robot_bridge.check_limits import check_limits
 from robot_bridge.errors import DescriptionError
-from robot_bridge.protocol.description import Axis, Camera, RobotDescription
+from robot_bridge.protocol.description import Axis, Camera, ForceFeeling, RobotDescription
 
 __all__ = ["check_description"]
 
@@ -33,6 +33,8 @@ def check_description(description: RobotDescription) -> None:
     for camera in description.cameras:
         _check_scale(camera)
     _check_references(description)
+    if description.force_feeling is not None:
+        _check_feeling(description.force_feeling)
     check_limits(description)
 
 
@@ -58,6 +60,13 @@ def _check_scale(camera: Camera) -> None:
         raise DescriptionError(f"camera {camera.name}: metres_per_pixel must be positive, not {scale}")
 
 
+def _check_feeling(feeling: ForceFeeling) -> None:
+    if not 0 <= feeling.threshold_newtons < feeling.full_newtons < math.inf:
+        raise DescriptionError("force_feeling needs 0 <= threshold_newtons < full_newtons, and both finite")
+    if not 0.1 <= feeling.curve <= 10:
+        raise DescriptionError(f"force_feeling: curve must be in [0.1, 10], not {feeling.curve}")
+
+
 def _check_references(description: RobotDescription) -> None:
     axes = {axis.name for axis in description.axes}
     joints = {joint.name for joint in description.joints}
@@ -69,6 +78,14 @@ def _check_references(description: RobotDescription) -> None:
         _check_known("body", body.parent, bodies, f"body {body.name}")
         for joint in body.joints:
             _check_known("joint", joint.joint, joints, f"body {body.name}")
+    for twist in description.body_twists:
+        where = f"the twist of {twist.body}"
+        _check_known("body", twist.body, bodies - {""}, where)
+        _check_known("body", twist.frame, bodies, where)
+        for name in (*twist.linear, *twist.angular):
+            _check_known("axis", name, axes | {""}, where)
+        if not all(map(math.isfinite, twist.point)):
+            raise DescriptionError(f"{where}: its point must be finite")
     for sensor in (description.wrench, description.ranges):
         if sensor is not None:
             _check_known("body", sensor.body, bodies, f"sensor {sensor.name}")

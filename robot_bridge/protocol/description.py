@@ -13,8 +13,10 @@ __all__ = [
     "Binding",
     "Body",
     "BodyJoint",
+    "BodyTwist",
     "Camera",
     "ControlLayer",
+    "ForceFeeling",
     "Geofence",
     "Geom",
     "Joint",
@@ -118,6 +120,17 @@ class WrenchSensor(msgspec.Struct, frozen=True, kw_only=True):
     full_scale_torque: float  # N m
 
 
+class ForceFeeling(msgspec.Struct, frozen=True, kw_only=True):
+    """How a contact feels to the operator: rumble and tone by newtons. Without it, by the wrench sensor's own range.
+
+    Of the force between the two, as a share from 0 to 1, `curve` is the exponent: below 1 light contacts are felt more.
+    """
+
+    threshold_newtons: float  # N, up to it nothing is felt
+    full_newtons: float  # N, from it on it is felt at its strongest
+    curve: float = 1.0
+
+
 class RangeRing(msgspec.Struct, frozen=True, kw_only=True):
     """Range sensors in a plane, with the field names of sensor_msgs/LaserScan."""
 
@@ -181,6 +194,16 @@ class Body(msgspec.Struct, frozen=True, kw_only=True):
     geoms: tuple[Geom, ...] = ()
 
 
+class BodyTwist(msgspec.Struct, frozen=True, kw_only=True):
+    """Axes that together are the twist of a body, for what the 3D view draws as commanded; "" where there is none."""
+
+    body: str
+    frame: str = ""  # the body in whose axes the twist is given; "" for the world
+    point: Vector3 = (0.0, 0.0, 0.0)  # m, the point of the body that moves with `linear`, in its own frame
+    linear: tuple[str, str, str] = ("", "", "")  # axes along x, y and z, m/s
+    angular: tuple[str, str, str] = ("", "", "")  # axes about x, y and z, rad/s
+
+
 class Binding(msgspec.Struct, frozen=True, kw_only=True):
     """What moves an axis. A positive input drives the axis up to `scale * maximum`, after `invert`."""
 
@@ -216,6 +239,8 @@ class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     position_limits: tuple[PositionLimit, ...] = ()
     planar_base: PlanarBase | None = None
     geofences: tuple[Geofence, ...] = ()
+    force_feeling: ForceFeeling | None = None
+    body_twists: tuple[BodyTwist, ...] = ()
     hold: float = 0.3  # s a command is held before the robot comes to rest by itself
     max_event_age: float = 2.0  # s after which a feedback may no longer be answered
     max_event_rate: float = 25.0  # Hz, the most events per second that the robot wants

@@ -47,6 +47,15 @@ export interface BodyJoint {
   readonly axis: readonly [number, number, number];
 }
 
+/** Axes that together are the twist of a body, for what the 3D view draws as commanded; "" where there is none. */
+export interface BodyTwist {
+  readonly body: string;
+  readonly frame: string;
+  readonly point: readonly [number, number, number];
+  readonly linear: readonly [string, string, string];
+  readonly angular: readonly [string, string, string];
+}
+
 export interface Camera {
   readonly name: string;
   readonly label: string;
@@ -88,6 +97,13 @@ export interface Feedback {
   readonly faults: readonly (string)[];
   readonly limits: readonly (string)[];
   readonly unknown: readonly (string)[];
+}
+
+/** How a contact feels to the operator: rumble and tone by newtons. Without it, by the wrench sensor's own range. Of the force between the two, as a share from 0 to 1, `curve` is the exponent: below 1 light contacts are felt more. */
+export interface ForceFeeling {
+  readonly threshold_newtons: number;
+  readonly full_newtons: number;
+  readonly curve: number;
 }
 
 /** A zone on the floor that the whole base stays inside of, or outside of. */
@@ -272,6 +288,8 @@ export interface RobotDescription {
   readonly position_limits: readonly (PositionLimit)[];
   readonly planar_base: PlanarBase | null;
   readonly geofences: readonly (Geofence)[];
+  readonly force_feeling: ForceFeeling | null;
+  readonly body_twists: readonly (BodyTwist)[];
   readonly hold: number;
   readonly max_event_age: number;
   readonly max_event_rate: number;

@@ -11,6 +11,7 @@ from robot_bridge.protocol.description import (
     BodyJoint,
     Camera,
     ControlLayer,
+    ForceFeeling,
     Geom,
     Joint,
     Microphone,
@@ -202,6 +203,7 @@ DESCRIPTION: Final = RobotDescription(
     wrench=WrenchSensor(
         name="probe", body=SENSOR_BODY, threshold_force=1e-6, full_scale_force=400e-6, full_scale_torque=1e-7
     ),
+    force_feeling=ForceFeeling(threshold_newtons=1e-6, full_newtons=300e-6, curve=0.6),
     bodies=(
         Body(name="slide", parent="", geoms=_slide()),
         Body(

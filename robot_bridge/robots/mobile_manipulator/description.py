@@ -2,7 +2,14 @@
 
 from typing import Any, Final
 
-from robot_bridge.protocol.description import Camera, Microphone, RobotDescription, WrenchSensor
+from robot_bridge.protocol.description import (
+    BodyTwist,
+    Camera,
+    ForceFeeling,
+    Microphone,
+    RobotDescription,
+    WrenchSensor,
+)
 from robot_bridge.robots.mobile_manipulator.controls import AXES, LAYERS
 from robot_bridge.robots.mobile_manipulator.kinematics import describe_bodies, describe_joints
 from robot_bridge.robots.mobile_manipulator.limits import BASE_ON_FLOOR, GEOFENCES, arm_limits
@@ -21,6 +28,16 @@ WRENCH: Final = WrenchSensor(
     name="contact", body=MOUNT, threshold_force=3.0, full_scale_force=150.0, full_scale_torque=80.0
 )
 
+# A push at the wrist is seldom more than a tenth of what the sensor can take: it is felt early.
+FEELING: Final = ForceFeeling(threshold_newtons=3.0, full_newtons=80.0, curve=0.6)
+TOOL_TWIST: Final = BodyTwist(
+    body="tool",
+    frame=MOUNT,
+    point=(0.17, 0.0, 0.0),  # the tip
+    linear=("tool.vx", "tool.vy", "tool.vz"),
+    angular=("tool.wx", "tool.wy", "tool.wz"),
+)
+
 
 def describe(model: Any) -> RobotDescription:
     """The description that belongs to the compiled model."""
@@ -35,6 +52,8 @@ def describe(model: Any) -> RobotDescription:
         microphones=(MICROPHONE,),
         wrench=WRENCH,
         ranges=RING,
+        force_feeling=FEELING,
+        body_twists=(TOOL_TWIST,),
         bodies=describe_bodies(model),
         position_limits=arm_limits(joints),
         planar_base=BASE_ON_FLOOR,

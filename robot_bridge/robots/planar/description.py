@@ -9,6 +9,7 @@ from robot_bridge.protocol.description import (
     BodyJoint,
     Camera,
     ControlLayer,
+    ForceFeeling,
     Geofence,
     Geom,
     Joint,
@@ -95,6 +96,7 @@ DESCRIPTION = RobotDescription(
     cameras=(OVERVIEW, FRONT),
     microphones=(MICROPHONE,),
     wrench=WrenchSensor(name="bumper", body="base", threshold_force=2.0, full_scale_force=80.0, full_scale_torque=20.0),
+    force_feeling=ForceFeeling(threshold_newtons=2.0, full_newtons=60.0, curve=0.6),
     ranges=RANGES,
     bodies=(
         Body(
