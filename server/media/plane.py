@@ -205,12 +205,12 @@ class MediaPlane:
 
         `camera_codec`: "" is what is being encoded already for somebody, so that it costs no encoder.
         """
-        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc())
         sections = [
             (stream, codec, offer_section(pc, stream.kind, codec))
             for stream in self._streams.values()
             for codec in [stream.codec_in_use(camera_codec if stream.kind == "video" else "")]
         ]
+        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc())
         deliveries: list[Delivery] = []
         peer = PeerMedia(deliveries, self._peer_quality(pc, priority=False), self._detached)
         for stream, codec, transceiver in sections:
