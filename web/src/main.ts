@@ -24,6 +24,7 @@ import "./style/places.css";
 import "./style/scale_bar.css";
 import "./style/pads.css";
 import "./style/layers.css";
+import "./style/record.css";
 import { readFragment } from "./core/fragment";
 import { installHook } from "./lockstep_hook";
 import { Page } from "./page";

@@ -30,6 +30,7 @@ import { createPageTools } from "./ui/page_tools";
 import { createPeoplePanel } from "./ui/people_panel";
 import { createPlacePanel } from "./ui/place_panel";
 import { createRangeRadar } from "./ui/range_radar";
+import { createRecordButton } from "./ui/record_button";
 import { createScaleBar } from "./ui/scale_bar";
 import { SceneView } from "./ui/scene_view";
 import { createSeatBar } from "./ui/seat_bar";
@@ -113,7 +114,8 @@ export class Page {
       keys: () => this.act("keys"),
       pads: () => this.act("pads"),
     });
-    bar.element.append(tools.bar);
+    const record = createRecordButton(app, sessionApi);
+    bar.element.append(record.element, tools.bar);
     const status = [
       { element: tools.details, update: () => undefined },
       createStreamTable(app),
@@ -143,6 +145,7 @@ export class Page {
     const { charts } = this;
     return [
       bar,
+      record,
       seat,
       banner,
       event,

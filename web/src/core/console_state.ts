@@ -2,6 +2,7 @@ import type {
   Feedback,
   Participant,
   Quality,
+  RecordingState,
   Refusal,
   RobotState,
   Seat,
@@ -52,6 +53,7 @@ export interface ConsoleState {
   speedCap: SpeedCapState | null; // the console's; null before it has said so
   sources: readonly SourceStatus[]; // cameras and microphones of the console's own
   voice: Voice | null; // who is heard at the robot; null before the console has said so
+  recording: RecordingState | null; // null before the console has said so
   notes: SharedNote[]; // oldest first
   feedback: Feedback | null; // newest
   stop: StopState;
@@ -84,6 +86,7 @@ export function createConsoleState(): ConsoleState {
     speedCap: null,
     sources: [],
     voice: null,
+    recording: null,
     notes: [],
     feedback: null,
     stop: NOT_STOPPED,
@@ -102,6 +105,7 @@ export function forgetConnection(state: ConsoleState): void {
   state.speedCap = null;
   state.sources = [];
   state.voice = null;
+  state.recording = null;
   state.notes = [];
   state.feedback = null;
   state.roundTripMs = null;
@@ -164,6 +168,9 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
     case "voice":
       state.voice = message;
       return;
+    case "recording":
+      takeRecording(state, message, wallMs);
+      return;
     case "note_shared":
       state.notes.push(message);
       state.notes.splice(0, state.notes.length - NOTE_LIMIT);
@@ -195,6 +202,13 @@ function isNews(known: Feedback | null, feedback: Feedback): boolean {
 function takeFeedbackState(state: ConsoleState, feedback: Feedback): void {
   state.feedback = feedback;
   state.stop = feedback.stop;
+}
+
+/** A failure is said once, in the log too. */
+function takeRecording(state: ConsoleState, recording: RecordingState, wallMs: number): void {
+  if (recording.state === "failed" && state.recording?.state !== "failed")
+    note(state, "error", `Recording failed: ${recording.detail}`, wallMs);
+  state.recording = recording;
 }
 
 function takeSeat(state: ConsoleState, seat: Seat, wallMs: number): void {

@@ -35,6 +35,11 @@ export class SessionApi {
     return parseAudit(await this.ask("GET", `/api/audit?after=${after}&limit=${AUDIT_LINES}`));
   }
 
+  /** Starts or ends the recording of the session; the new state comes to everyone as a message. */
+  async record(start: boolean): Promise<void> {
+    await this.ask("POST", start ? "/api/recordings" : "/api/recordings/stop");
+  }
+
   private ask(method: string, path: string, body?: object): Promise<unknown> {
     return this.api.json(method, path, body, AbortSignal.timeout(LIMIT_MS));
   }
