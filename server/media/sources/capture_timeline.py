@@ -2,8 +2,9 @@
 
 A medium that waited on its way arrives late, and arrival alone would make it look younger than it is. Its own time
 tells: the one that came quickest shows what the source's clock reads when ours reads something, and every other is
-placed by it. So a capture time may be too early, by what the quickest took beyond the configured latency, never too
-late, as long as the quickest took at least that latency.
+placed by it. So a capture time is never too late as long as the quickest took no longer than the configured latency,
+but for what two clocks drift until the next quick one, 0.4 ms a second at most. It is too early by what the quickest
+took less.
 """
 
 __all__ = ["CaptureTimeline"]

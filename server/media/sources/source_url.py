@@ -16,7 +16,7 @@ Kind = Literal["video", "audio"]
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 SCHEME = re.compile(r"[a-z][a-z0-9+.-]*")
 DEVICES: Mapping[str, Kind] = {"v4l2": "video", "alsa": "audio", "pulse": "audio"}
-# s between capture and arrival that can be taken for granted. Too large only makes stamps older.
+# s that the quickest may take from capture to arrival. Too large only makes stamps older.
 LATENCY = {"v4l2": 0.05, "alsa": 0.02, "pulse": 0.02, "file": 0.0, "rtsp": 0.3, "rtsps": 0.3}
 NETWORK_LATENCY = 0.2
 MAX_LATENCY = 10.0
@@ -35,7 +35,7 @@ class SourceSpec(NamedTuple):
     label: str  # "Front": for people
     scheme: str  # "rtsp"
     address: str  # what is opened: a path, a device, a whole URL. May hold a password: never to be logged or shown
-    latency: float  # s from capture to arrival, at least
+    latency: float  # s from capture to arrival, of the quickest
     rate: float | None = None  # pictures, or samples, per second; None: as they come
     size: tuple[int, int] | None = None  # of pictures; None: as they come
     channels: int = 1  # of a sound device
