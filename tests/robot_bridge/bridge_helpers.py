@@ -7,7 +7,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from robot_bridge.bridge import Bridge
 from robot_bridge.link_client import RobotLink
@@ -28,6 +28,7 @@ from robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
 from robot_bridge.settings import BridgeSettings
 
 __all__ = [
+    "Addressed",
     "DRIVE",
     "NEUTRAL",
     "Operator",
@@ -42,6 +43,15 @@ __all__ = [
 Kind = TypeVar("Kind", bound=LinkMessage)
 
 PATIENCE = 5.0  # s
+
+
+class Addressed(Protocol):
+    """A bridge in this process, or somewhere else."""
+
+    @property
+    def address(self) -> tuple[str, int]: ...
+
+
 DRIVE = [0.4, 0.0, 0.0]
 NEUTRAL = [0.0, 0.0, 0.0]
 
@@ -141,7 +151,7 @@ class Operator:
 
 
 @asynccontextmanager
-async def operator(bridge: Bridge) -> AsyncIterator[Operator]:
+async def operator(bridge: Addressed) -> AsyncIterator[Operator]:
     async with RobotLink(*bridge.address, "operator", name="test") as link:
         driver = Operator(link)
         await driver.next(Feedback)
@@ -179,7 +189,7 @@ class RawLink:
 
 
 @asynccontextmanager
-async def raw_link(bridge: Bridge, role: LinkRole | None = None) -> AsyncIterator[RawLink]:
+async def raw_link(bridge: Addressed, role: LinkRole | None = None) -> AsyncIterator[RawLink]:
     """A raw connection, with the handshake done when a role is given."""
     reader, writer = await asyncio.open_connection(*bridge.address)
     link = RawLink(reader, writer)

@@ -24,9 +24,10 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image, JointState, LaserScan
 from trajectory_msgs.msg import JointTrajectory
 
+from robot_bridge.robots.event_strip import draw_event_strip
+
 JOINTS = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
 WIDTH, HEIGHT = 320, 240
-CELLS = 32
 TICK = 0.02  # s
 PICTURE_EVERY, SCAN_EVERY = 3, 4  # ticks
 ARM_SPEED = 3.0  # 1/s, how fast a joint closes on its setpoint
@@ -168,12 +169,11 @@ class RobotNode(Node):  # type: ignore[misc]
         return message
 
     def _image(self, stamp: Any, spoilt: bool) -> Image:
-        """The picture's number in a strip of black and white cells above, the base's place as a dot below."""
+        """The picture's number in the strip that elsewhere has the event, and the base's place as a dot below."""
         number = self._pictures
-        picture = np.full((HEIGHT, WIDTH, 3), 60, np.uint8)
-        for cell in range(CELLS):
-            bit = number >> (CELLS - 1 - cell) & 1
-            picture[:12, cell * WIDTH // CELLS : (cell + 1) * WIDTH // CELLS] = 255 if bit else 0
+        grey = np.full((HEIGHT, WIDTH), 60, np.uint8)
+        draw_event_strip(grey, number)
+        picture = np.repeat(grey[:, :, None], 3, axis=2)
         x = int(WIDTH / 2 + self._pose[0] * 50) % WIDTH
         y = HEIGHT // 2 + int(self._pose[1] * 50) % (HEIGHT // 2)
         picture[max(14, y - 10) : y + 10, max(0, x - 10) : x + 10] = (240, 120, 30)

@@ -1,0 +1,232 @@
+/* A robot for Lockstep in C, with nothing but the standard library and POSIX sockets: a carriage on a table.
+ *
+ *     cc -O2 -o c_robot *.c -lm
+ *     ./c_robot --port 5600          then: lockstep serve --robot tcp://127.0.0.1:5600
+ *
+ * Written from docs/robot-link.md alone. main.c runs the control loop and answers; events.c decides what executes;
+ * links.c has the connections, message.c and pack.c the bytes; robot.c is the robot. It knows no secret, so it listens
+ * on loopback only. */
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "event_log.h"
+#include "events.h"
+#include "links.h"
+#include "robot.h"
+
+static const double TICK = 0.005; /* s */
+static const int CATCH_UP = 3;    /* ticks made good after the process was held up */
+
+static events event_core;
+static robot carriage;
+static buffer feedback; /* the newest, as a frame: a repeated command gets it again */
+static uint8_t picture[PICTURE_BYTES];
+static volatile sig_atomic_t ending;
+
+static void end_soon(int signal) {
+    (void)signal;
+    ending = 1;
+}
+
+static double now(void) {
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + (double)time.tv_nsec / 1e9;
+}
+
+static void numbers_field(const char *key, const double *numbers, uint32_t count) {
+    pack_str(&feedback, key);
+    pack_array(&feedback, count);
+    for (uint32_t i = 0; i < count; i++) pack_float(&feedback, numbers[i]);
+}
+
+static void pack_feedback(double time, bool at_rest) {
+    double wrench[6] = {carriage.force[0], carriage.force[1]};
+    feedback.size = 0;
+    size_t begun = begin_frame(&feedback);
+    pack_map(&feedback, 9);
+    pack_str(&feedback, "type");
+    pack_str(&feedback, "feedback");
+    pack_str(&feedback, "event");
+    pack_int(&feedback, event_core.current);
+    pack_str(&feedback, "issue");
+    pack_int(&feedback, event_core.issue);
+    pack_str(&feedback, "time");
+    pack_float(&feedback, time);
+    numbers_field("axes", carriage.velocity, AXES);
+    numbers_field("joints", carriage.position, AXES);
+    numbers_field("wrench", wrench, 6);
+    pack_str(&feedback, "at_rest");
+    pack_bool(&feedback, at_rest);
+    pack_str(&feedback, "stop");
+    pack_map(&feedback, 3);
+    pack_str(&feedback, "stopped");
+    pack_bool(&feedback, event_core.stopped);
+    pack_str(&feedback, "by");
+    pack_str(&feedback, event_core.stopped_by);
+    pack_str(&feedback, "reason");
+    pack_str(&feedback, event_core.stop_reason);
+    end_frame(&feedback, begun);
+}
+
+static void publish_notice(double time) {
+    buffer notice = {0};
+    size_t begun = begin_frame(&notice);
+    pack_map(&notice, 3);
+    pack_str(&notice, "type");
+    pack_str(&notice, "event");
+    pack_str(&notice, "event");
+    pack_int(&notice, event_core.current);
+    pack_str(&notice, "time");
+    pack_float(&notice, time);
+    end_frame(&notice, begun);
+    publish(EVENTS, &notice);
+    release(&notice);
+}
+
+/* Measures the robot: the answer to the pending command, or the current event again. */
+static void issue(void) {
+    double time = now();
+    bool at_rest = events_at_rest(&event_core) && robot_at_rest(&carriage);
+    events_issue(&event_core, time);
+    pack_feedback(time, at_rest);
+    log_feedback(time, event_core.current, event_core.issue, at_rest);
+    publish(OPERATOR, &feedback);
+    publish_notice(time);
+}
+
+/* The state, the event and the time belong to the same instant: nothing runs beside this. */
+static void publish_picture(void) {
+    double captured = now();
+    buffer frame = {0};
+    robot_draw(&carriage, event_core.current, picture);
+    size_t begun = begin_frame(&frame);
+    pack_map(&frame, 8);
+    pack_str(&frame, "type");
+    pack_str(&frame, "media");
+    pack_str(&frame, "stream");
+    pack_str(&frame, "above");
+    pack_str(&frame, "codec");
+    pack_str(&frame, "yuv420p");
+    pack_str(&frame, "stamp");
+    pack_int(&frame, event_core.current);
+    pack_str(&frame, "time");
+    pack_float(&frame, captured);
+    pack_str(&frame, "width");
+    pack_int(&frame, WIDTH);
+    pack_str(&frame, "height");
+    pack_int(&frame, HEIGHT);
+    pack_str(&frame, "payload");
+    pack_bin(&frame, picture, sizeof picture);
+    end_frame(&frame, begun);
+    publish(MEDIA, &frame);
+    release(&frame);
+    log_media(now(), event_core.current, "above", captured);
+}
+
+static void tick(void) {
+    static bool rested = true;
+    events_step(&event_core, now(), TICK);
+    robot_tick(&carriage, event_core.values, TICK);
+    if (events_at_rest(&event_core) != rested) {
+        rested = !rested;
+        log_plain(now(), event_core.current, rested ? "at_rest" : "driven");
+    }
+    if (events_issue_due(&event_core, now())) issue();
+}
+
+static void refuse(peer *to, uint32_t event, const char *reason) {
+    log_refused(now(), event, reason, event_core.current);
+    send_refusal(to, event, reason, event_core.current);
+}
+
+static void command(peer *from, const message *given) {
+    const char *reason;
+    double time = now();
+    switch (events_command(&event_core, given->event, given->issue, given->values, given->count, time, &reason)) {
+    case EXECUTED: log_executed(time, given->event, given->issue, given->values, given->count); break;
+    case REPEATED: send_feedback(from, &feedback); break;
+    case ABSORBED: break;
+    case REFUSED: refuse(from, given->event, reason); break;
+    }
+}
+
+static void on_opened(role who) {
+    if (who != MEDIA) event_core.wanted = true;
+}
+
+static void on_said(peer *from, const message *given) {
+    switch (given->type) {
+    case COMMAND: command(from, given); break;
+    case REST: log_rest(now(), given->event, events_rest(&event_core, given->event)); break;
+    case STOP:
+        if (events_stop(&event_core, given->by, given->reason)) log_plain(now(), event_core.current, "stop");
+        break;
+    case RESET:
+        if (events_reset(&event_core)) log_plain(now(), event_core.current, "reset");
+        break;
+    default: break;
+    }
+}
+
+static void on_operator_lost(void) { events_come_to_rest(&event_core); }
+
+static void run(void) {
+    double next_tick = now(), next_picture = next_tick;
+    while (!ending || !events_at_rest(&event_core)) {
+        links_serve(fmin(next_tick, next_picture) - now(), now);
+        if (ending) events_come_to_rest(&event_core);
+        double time = now();
+        if (time - next_tick > CATCH_UP * TICK) next_tick = time - CATCH_UP * TICK;
+        for (; next_tick <= time; next_tick += TICK) tick();
+        if (next_picture <= time) {
+            next_picture = fmax(next_picture + 1 / FRAME_RATE, time);
+            publish_picture();
+        }
+    }
+}
+
+static void draw_epoch(char epoch[17]) {
+    uint64_t drawn = (uint64_t)(now() * 1e9);
+    FILE *random = fopen("/dev/urandom", "rb");
+    if (random != NULL) {
+        if (fread(&drawn, sizeof drawn, 1, random) != 1) drawn ^= (uint64_t)time(NULL);
+        fclose(random);
+    }
+    snprintf(epoch, 17, "%016llx", (unsigned long long)drawn);
+}
+
+int main(int count, char **words) {
+    static const handler ROBOT = {on_opened, on_said, refuse, on_operator_lost};
+    struct sigaction action = {.sa_handler = end_soon};
+    int port = 5600;
+    char epoch[17];
+    for (int i = 1; i < count; i += 2) {
+        bool valued = i + 1 < count;
+        if (valued && strcmp(words[i], "--port") == 0) {
+            port = atoi(words[i + 1]);
+        } else if (valued && strcmp(words[i], "--event-log") == 0) {
+            if (!log_open(words[i + 1])) return perror(words[i + 1]), 1;
+        } else {
+            return fprintf(stderr, "usage: %s [--port NUMBER] [--event-log FILE]\n", words[0]), 2;
+        }
+    }
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    draw_epoch(epoch);
+    events_begin(&event_core);
+    if (!links_listen(&port, &ROBOT, epoch)) return perror("cannot listen"), 1;
+    log_start(now(), event_core.current, epoch);
+    issue();
+    printf("{\"robot\": \"tcp://127.0.0.1:%d\"}\n", port);
+    fflush(stdout);
+    run();
+    links_close(now);
+    log_close();
+    release(&feedback);
+    return 0;
+}
