@@ -13,7 +13,7 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import HTTPConnection
 from starlette.types import Scope
 
-from server import api, api_access, api_ice, api_recordings, scene_proxy, whep
+from server import api, api_access, api_ice, api_recordings, api_relay, scene_proxy, whep
 from server.api_recordings import RecordingService
 from server.audit_log import AuditLog, open_audit_log
 from server.console import Console
@@ -33,6 +33,7 @@ from server.rate_limits import RateLimits
 from server.recording.library import ConsoleLibrary
 from server.recording.recorder import Recorder, recordings_directory
 from server.recording.shelf import Shelf
+from server.relay.desk import RelayDesk, RelayedMedia
 from server.scene import SceneView
 from server.security import SAFE_METHODS, SecurityHeaders, check_origin
 from server.services import Services, services
@@ -65,7 +66,9 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         clock = EventClock()
         shelf = Shelf(recordings_directory(settings.recording, opened.directory.path), settings.recording)
         recorder = Recorder(settings.recording, shelf, clock, media, lambda news: console.peers.tell("session", news))
-        console = Console(settings, metrics, media, scene, audit, clock, recorder)
+        relays = RelayDesk(settings, media, lambda: console.peers, opened.signing_key(settings))
+        console = Console(settings, metrics, RelayedMedia(media, relays), scene, audit, clock, recorder)
+        console.peers.relays.append(relays)
         console.further_news.append(recorder.state)
         app.state.recordings = RecordingService(ConsoleLibrary(recorder), opened.access)
         sources = SourceDesk(
@@ -76,7 +79,8 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         follow_clock(console.clock)
         audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
         warden = LinkWarden(opened.invitations, console.peers, console.audit, metrics)
-        app.state.services = Services(settings, metrics, console, media, opened, audit, warden, Guard(settings), scene)
+        guard = Guard(settings)
+        app.state.services = Services(settings, metrics, console, media, opened, audit, warden, guard, scene, relays)
         try:
             async with asyncio.TaskGroup() as tasks:
                 running = [
@@ -84,6 +88,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
                     tasks.create_task(warden.run(), name="links"),
                     tasks.create_task(sources.run(), name="sources"),
                     tasks.create_task(recorder.run(), name="recorder"),
+                    tasks.create_task(relays.run(), name="relays"),
                 ]
                 if scene is not None:
                     running.append(tasks.create_task(scene.run(), name="scene"))
@@ -108,6 +113,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
     app.include_router(api_access.router)
     app.include_router(api_ice.router)
     app.include_router(api_recordings.router)
+    app.include_router(api_relay.router)
     app.add_api_route("/openapi.json", _describe, include_in_schema=False)
     app.include_router(scene_proxy.router)
     app.include_router(page_router())
@@ -129,7 +135,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         count=_count_refused,
     )
     app.add_middleware(LogContext)
-    app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None)
+    app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None, relays=settings.relay_origins)
     return app
 
 

@@ -10,7 +10,9 @@ __all__ = [
     "AllowedHosts",
     "Cameras",
     "Microphones",
+    "ObserversDirect",
     "PublicUrl",
+    "Relay",
     "SpeedCap",
     "Stun",
     "Tls",
@@ -60,4 +62,15 @@ Microphones = Annotated[
         help="A microphone of the console's own, [name=]pulse:, alsa:hw:1, rtsp://…, file:…; may be given again.",
         metavar="SOURCE",
     ),
+]
+Relay = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Observers beyond --observers-direct watch through it: janus:ws://host:8188/ROOM, or "
+        "livekit:wss://host?room=NAME; may be given again, then the first feeds the others.",
+        metavar="ENGINE:URL",
+    ),
+]
+ObserversDirect = Annotated[
+    int | None, typer.Option(min=0, help="Observers that the console serves itself when it has a relay; 10 unless set.")
 ]

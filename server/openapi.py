@@ -43,6 +43,7 @@ from server.errors import (
     WrongMediaType,
 )
 from server.ice_servers import IceServers
+from server.relay.tickets import RelayAnswer
 
 __all__ = ["OPERATIONS", "Operation", "openapi_document"]
 
@@ -91,6 +92,9 @@ class Operation(NamedTuple):
 RESOURCE = Parameter("resource", "path", {"type": "string"}, required=True)
 MATCH = Parameter("If-Match", "header", {"type": "string", "pattern": r'^(\*|"[0-9a-f]{16}")$'}, required=True)
 STAMP = Parameter("stamp", "query", {"type": "string", "enum": ["trailer"]})
+RELAY = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{0,3}$"})
+PEER = Parameter("peer", "query", {"type": "string", "maxLength": 16})
+LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
 AFTER = Parameter("after", "query", {"type": "integer", "default": 0})
 LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS, "default": 100})
 INVITATION = Parameter("invitation_id", "path", {"type": "string"}, required=True)
@@ -100,7 +104,7 @@ OPERATIONS: tuple[Operation, ...] = (
         *("post", "/whep", "Offer a WebRTC connection (WHEP).", 201, SDP),
         errors=(BadSdp, WrongMediaType, BadParameter, RobotUnreachable, TooManyPeers, ShuttingDown, *WITH_BODY),
         body=SDP,
-        parameters=(STAMP,),
+        parameters=(STAMP, RELAY),
         headers=("Location", "ETag", "Accept-Patch"),
     ),
     Operation(
@@ -117,6 +121,11 @@ OPERATIONS: tuple[Operation, ...] = (
     Operation("delete", "/whep/{resource}", "End a connection.", 200, None, (NotFound,), parameters=(RESOURCE,)),
     Operation("get", "/api/session", "What is going on.", 200, SessionInfo),
     Operation("get", "/api/ice", "STUN and TURN servers, with credentials for a while.", 200, IceServers),
+    Operation(
+        *("get", "/api/relay", "Where an observer gets its media: null, from the console.", 200, RelayAnswer),
+        errors=(BadParameter,),
+        parameters=(PEER, LOST),
+    ),
     Operation(
         *("post", "/api/stop", "Stop the robot, latched. From every role.", 200, Delivered),
         errors=(LinkDown, *WITH_JSON),

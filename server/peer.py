@@ -107,6 +107,7 @@ class Peer:
         self.report = Report()  # newest
         self._quality: Quality | None = None  # newest
         self.ended = ""  # why; "" while it lives
+        self.relay = ""  # the relay that it watches through; "": media and feedback come from here
         self._media = media
         self._host = host
         self._limits = limits
@@ -187,7 +188,7 @@ class Peer:
             peer=self.id,
             name=self.name,
             role=self.role,
-            carrier=carriers[0] if carriers else "none",
+            carrier=carriers[0] if carriers else "trailer" if self.relay else "none",
             gap=max((stream.gap for stream in self.report.streams), key=abs, default=0),
             picture_delay_ms=self.report.picture_delay_ms,
             round_trip_ms=self.report.round_trip_ms,

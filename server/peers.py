@@ -12,6 +12,7 @@ from robot_bridge.protocol.console import Participant, Participants, ServerMessa
 from server.access import Identity
 from server.channels import ChannelName
 from server.errors import NotFound, ShuttingDown, TooManyPeers, TooManyRequests
+from server.feedback_fanout import FeedbackReceiver
 from server.metrics import Metrics
 from server.names import unique_names
 from server.peer import Peer
@@ -53,6 +54,7 @@ class Peers:
         self._sessions: dict[Peer, asyncio.Task[None]] = {}
         self._reserved: Counter[str] = Counter()  # places of peers that are being negotiated, by token
         self._closing = False
+        self.relays: list[FeedbackReceiver] = []
 
     def __iter__(self) -> Iterator[Peer]:
         return iter(list(self._sessions))
@@ -64,8 +66,10 @@ class Peers:
         """Those whose role may drive."""
         return [peer for peer in self._sessions if peer.role != "observer"]
 
-    def observers(self) -> list[Peer]:
-        return [peer for peer in self._sessions if peer.role == "observer"]
+    def observers(self) -> list[FeedbackReceiver]:
+        """Those that get feedback from here: a relay gets it once for all who watch through it."""
+        here = [peer for peer in self._sessions if peer.role == "observer" and not peer.relay]
+        return [*self.relays, *here]
 
     def settle_names(self) -> list[Peer]:
         """Give everyone the name they asked for, or that with a number; those whose name changed."""

@@ -44,16 +44,20 @@ HSTS = "max-age=31536000"  # RFC 6797; no sub-domains: they are not ours to deci
 class SecurityHeaders:
     """Adds the headers to every HTTP answer."""
 
-    def __init__(self, app: ASGIApp, lasting_tls: bool = False) -> None:
-        """`lasting_tls`: a certificate that browsers trust, so that they may insist on TLS from now on."""
+    def __init__(self, app: ASGIApp, lasting_tls: bool = False, relays: tuple[str, ...] = ()) -> None:
+        """`lasting_tls`: a certificate that browsers trust, so that they may insist on TLS from now on.
+
+        `relays`: WebSocket origins that the page connects to besides its own.
+        """
         self._app = app
+        self._page_policy = PAGE_POLICY.replace("connect-src 'self'", " ".join(("connect-src 'self'", *relays)))
         self._headers = HEADERS | ({"Strict-Transport-Security": HSTS} if lasting_tls else {})
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        policy = SCENE_POLICY if scope["path"].startswith("/scene/") else PAGE_POLICY
+        policy = SCENE_POLICY if scope["path"].startswith("/scene/") else self._page_policy
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":

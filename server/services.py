@@ -13,6 +13,7 @@ from server.guard import Guard
 from server.link_warden import LinkWarden
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
+from server.relay.desk import RelayDesk
 from server.scene import SceneView
 from server.settings import Settings
 from server.state import ConsoleState
@@ -31,6 +32,7 @@ class Services:
     warden: LinkWarden
     guard: Guard
     scene: SceneView | None  # None when it is switched off or could not start
+    relays: RelayDesk
 
     @property
     def access(self) -> Access:

@@ -17,13 +17,14 @@ from server.media.settings import MediaSettings
 from server.media.sources.source_settings import SourceSettings
 from server.network_settings import NameList, NetworkSettings
 from server.recording.settings import RecordingSettings
+from server.relay.relay_settings import RelaySettings
 
 __all__ = ["Settings"]
 
 MIN_SECRET_BYTES = 32  # RFC 7518 3.2: an HS256 key is at least as long as the hash
 
 
-class Settings(NetworkSettings, LimitSettings, SourceSettings):
+class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings):
     """All that can be set. Times in seconds."""
 
     model_config = SettingsConfigDict(env_prefix="LOCKSTEP_", env_nested_delimiter="__", frozen=True, extra="ignore")

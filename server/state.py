@@ -21,6 +21,10 @@ class ConsoleState(NamedTuple):
     invitations: InvitationStore
     access: Access
 
+    def signing_key(self, settings: Settings) -> str:
+        """What everything is derived from that only this console may know."""
+        return settings.secret.get_secret_value() if settings.secret is not None else self.directory.signing_key()
+
 
 def state_path(settings: Settings) -> Path:
     return settings.state_dir or default_state_dir()

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import structlog
 from aiortc import RTCIceCandidate, RTCIceGatherer, RTCPeerConnection, RTCSessionDescription
 from aiortc.sdp import SessionDescription, candidate_from_sdp, candidate_to_sdp
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 
 from server.access import Identity
 from server.api_ice import servers_for
@@ -46,8 +46,12 @@ async def create(
     request: Request,
     identity: Annotated[Identity, Depends(authorized)],
     stamp: Literal["trailer"] | None = None,
+    relay: Annotated[str, Query(pattern=r"^\d{0,3}$")] = "",
 ) -> Response:
-    """An offer in, an answer out; the peer lives on until DELETE, or until its connection ends."""
+    """An offer in, an answer out; the peer lives on until DELETE, or until its connection ends.
+
+    `relay`: an observer has its media from that relay, and offers data channels alone.
+    """
     here = services(request)
     offer = prepare_offer(await read_text(request, SDP, here.settings.max_sdp_bytes))
     if here.console.robot.description is None:
@@ -56,6 +60,8 @@ async def create(
     ice = servers_for(here.settings, identity.token_id)
     with here.console.peers.place(identity):
         peer, answer = await _negotiate(here, identity, offer, ice, trailer=stamp == "trailer")
+        if relay and identity.role == "observer" and here.relays.arrived(relay):
+            peer.relay = relay
         here.console.peers.admit(peer)
     headers = {
         "Location": f"/whep/{peer.resource}",

@@ -28,8 +28,8 @@ class Heard:
     handle: int  # 0: about the session
     data: dict[str, Any]  # the plugin's, or what a success carries
     jsep: dict[str, Any] | None  # a description that came with it
-    detail: str = ""  # of an error, or why it ended
-    code: int = 0  # of an error
+    detail: str  # of an error, or why it ended
+    code: int  # of an error
 
 
 def janus_request(kind: str, transaction: str, **fields: object) -> str:
@@ -47,27 +47,33 @@ def parse_janus(text: str | bytes) -> Heard:
     if not isinstance(message, dict) or not isinstance(message.get("janus"), str):
         raise MessageError("not a message of Janus")
     said: str = message["janus"]
-    handle = message.get("sender")
     plugin = _mapping(message.get("plugindata"))
     data = dict(_mapping(plugin.get("data")) if plugin else _mapping(message.get("data")))
     jsep = message.get("jsep")
-    common = {
-        "transaction": str(message.get("transaction", "")),
-        "handle": handle if isinstance(handle, int) else 0,
-        "data": data,
-        "jsep": dict(jsep) if isinstance(jsep, dict) and isinstance(jsep.get("sdp"), str) else None,
-    }
+    kind, detail, code = _kind(said, data), str(message.get("reason", "")), 0
     if said == "error":
         problem = _mapping(message.get("error"))
-        return Heard("error", detail=str(problem.get("reason", ""))[:200], code=_number(problem.get("code")), **common)
-    if "error_code" in data:
-        detail = str(data.get("error", ""))[:200]
-        return Heard("error", detail=detail, code=_number(data["error_code"]), **common)
+        detail, code = str(problem.get("reason", "")), _number(problem.get("code"))
+    elif kind == "error":
+        detail, code = str(data.get("error", "")), _number(data.get("error_code"))
+    return Heard(
+        kind=kind,
+        transaction=str(message.get("transaction", "")),
+        handle=_number(message.get("sender")),
+        data=data,
+        jsep=dict(jsep) if isinstance(jsep, dict) and isinstance(jsep.get("sdp"), str) else None,
+        detail=(detail or said)[:200],
+        code=code,
+    )
+
+
+def _kind(said: str, data: Mapping[str, Any]) -> Kind:
+    if said == "error" or "error_code" in data:
+        return "error"
     if said in ENDED:
-        return Heard("ended", detail=str(message.get("reason", said))[:200], **common)
-    if said in ("ack", "success", "event"):
-        return Heard(said, **common)  # type: ignore[arg-type]  # one of the literals
-    return Heard("other", detail=said[:50], **common)
+        return "ended"
+    known: dict[str, Kind] = {"ack": "ack", "success": "success", "event": "event"}
+    return known.get(said, "other")
 
 
 def _mapping(value: object) -> Mapping[str, Any]:

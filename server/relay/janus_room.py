@@ -1,10 +1,9 @@
 """The session's room in one Janus (https://janus.conf.meetecho.com/docs/videoroom.html): made, filled, passed on."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from robot_bridge.protocol.console import StreamInfo
-from robot_bridge.protocol.janus import Heard
 from server.media.publishing_private import H264_PROFILE, PLAYOUT_DELAY_ID
 from server.relay.errors import RelayRefused
 from server.relay.janus_session import JanusSession
@@ -116,7 +115,8 @@ class JanusRoom:
                         **({"h264-profile": H264_PROFILE} if each.codec == "H264" else {}),
                     }
                     for index, each in enumerate(streams)
-                ],
+                ]
+                + [{"type": "data", "mindex": len(streams), "mid": str(len(streams)), "codec": "data"}],
             },
         )
         port, control = (answer.data.get(name) for name in ("port", "rtcp_port"))
@@ -140,6 +140,19 @@ class JanusRoom:
             },
         )
 
+    async def stop_sending(self, handle: int, feed: int, name: str) -> None:
+        """End what `send_to` began."""
+        await self._session.message(
+            handle,
+            {
+                "request": "unpublish_remotely",
+                "room": self._room,
+                "secret": self._keys.secret,
+                "publisher_id": feed,
+                "remote_id": name,
+            },
+        )
+
     async def forget(self, handle: int, feed: int) -> None:
         """No more of a feed that came from another Janus."""
         await self._session.message(
@@ -154,6 +167,3 @@ class Inlet:
 
     port: int
     control_port: int
-
-
-Listener = Callable[[Heard], None]

@@ -12,6 +12,10 @@ class RelayUrl(NamedTuple):
     room: str
 
     @property
+    def host(self) -> str:
+        return urlsplit(self.address).hostname or ""
+
+    @property
     def origin(self) -> str:
         """For a content security policy: scheme, host and port."""
         parts = urlsplit(self.address)

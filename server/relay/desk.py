@@ -1,0 +1,343 @@
+"""Brings the session into the relays while somebody watches there, and tells observers where to watch."""
+
+import asyncio
+import hashlib
+import hmac
+import secrets
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from contextlib import asynccontextmanager, suppress
+from typing import Protocol
+
+import structlog
+
+from robot_bridge.protocol.console import encode_console_message
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Media, Pong
+from server.backoff import Backoff
+from server.media.errors import MediaError
+from server.relay.errors import RelayError
+from server.relay.handout import Handout
+from server.relay.janus_room import JanusRoom, RoomKeys
+from server.relay.janus_session import JanusSession, open_janus
+from server.relay.publication import Publication, PublishedMedia, publish
+from server.relay.relay_settings import RelaySettings
+from server.relay.station import Station
+from server.relay.tickets import RelayTicket
+
+__all__ = ["RelayDesk", "RelayedMedia", "RelayedPeer"]
+
+log = structlog.get_logger(__name__)
+
+WAIT_SECONDS = 3.0  # that an observer waits for a relay before it is served directly
+LINGER_SECONDS = 20.0  # that the session stays in the relays without an observer there
+HEARTBEAT_SECONDS = 0.4  # between two messages on the feedback channel, also while the robot link is down
+BACKOFF, BACKOFF_CAP = 0.1, 5.0  # s
+DISTRUST_SECONDS = 30.0  # that a relay which failed is tried after the others
+HEALTHY_SECONDS = 10.0
+NEW_EPOCH, REVOKED, UNWATCHED = "new epoch", "a link was revoked", "nobody watches"
+OWN_REASONS = (NEW_EPOCH, REVOKED, UNWATCHED)  # to end a publication; no relay's fault
+HEARTBEAT = encode_console_message(Pong(id=0))
+
+
+class RelayedPeer(Protocol):
+    """What it needs of a peer."""
+
+    @property
+    def relay(self) -> str: ...
+    @property
+    def role(self) -> str: ...
+    @property
+    def ended(self) -> str: ...
+
+
+class RelayDesk:
+    """Run `run` as a task. Everything else is called on the same loop and returns at once, but for `ticket`."""
+
+    def __init__(
+        self,
+        settings: RelaySettings,
+        media: PublishedMedia,
+        peers: Callable[[], Iterable[RelayedPeer]],
+        key: str,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.stations = [
+            Station(str(number), url, settings.relay_public[number] if settings.relay_public else url.address)
+            for number, url in enumerate(settings.relay_urls)
+        ]
+        self._codec = settings.relay_codec
+        self._admin_key = settings.relay_admin_key.get_secret_value()
+        self._media = media
+        self._peers = peers
+        self._key = key.encode()
+        self._clock = clock
+        self._handout = Handout(settings.observers_direct)
+        self._pin = ""  # of the present publication; another one with each
+        self._publication: Publication | None = None
+        self._wanted = asyncio.Event()
+        self._changed = asyncio.Event()  # replaced whenever a station became live or was lost
+        self._watching: set[RelayedPeer] = set()  # at the last look
+
+    # What the console tells
+
+    def epoch_began(self) -> None:
+        """Media of another epoch are another publication."""
+        self._restart(NEW_EPOCH)
+
+    def _restart(self, why: str) -> None:
+        """Publish anew: another feed and another pin, so that who may not watch any more does not."""
+        if self._publication is not None:
+            self._publication.end(why)
+
+    def send_feedback(self, text: str) -> None:
+        """A receiver among the observers; all that watch through relays at once."""
+        if self._publication is not None:
+            self._publication.send_feedback(text)
+
+    # What observers ask
+
+    async def ticket(self, peer: RelayedPeer | None, lost: str) -> RelayTicket | None:
+        """Where one more observer watches; None: directly.
+
+        Args:
+            peer: who asks again, because what it watched is gone
+            lost: "RELAY-FEED" that it lost; the same is not given out again
+        """
+        now = self._clock()
+        direct = sum(not each.relay and each.role == "observer" for each in self._peers())
+        if not self.stations or (peer is None and not self._handout.full(now, direct)):
+            self._handout.choose(now, direct, {})
+            return None
+        self._wanted.set()
+        usable = await self._usable(lost)
+        watching = {station.name: 0 for station in usable}
+        for each in self._peers():
+            if each.relay in watching and each is not peer:
+                watching[each.relay] += 1
+        choice = self._handout.choose(now, direct, watching)
+        return next((self._ticket(station) for station in usable if station.name == choice), None)
+
+    def arrived(self, relay: str) -> bool:
+        """A peer that watches there is connected to the console; False: there is no such relay."""
+        self._handout.arrived(relay)
+        return any(station.name == relay for station in self.stations)
+
+    async def _usable(self, lost: str) -> list[Station]:
+        """Stations that carry the session, waited for a while."""
+        deadline = self._clock() + WAIT_SECONDS
+        while True:
+            found = [each for each in self.stations if each.live and f"{each.name}-{each.feed}" != lost]
+            if found or self._clock() >= deadline:
+                return found
+            try:
+                async with asyncio.timeout(deadline - self._clock()):
+                    await self._changed.wait()
+            except TimeoutError:
+                continue
+
+    def _ticket(self, station: Station) -> RelayTicket:
+        return RelayTicket(
+            engine="janus",
+            relay=station.name,
+            url=station.public,
+            room=station.room,
+            pin=self._pin,
+            feed=station.feed,
+            streams=list(station.streams),
+        )
+
+    # Its own life
+
+    async def run(self) -> None:
+        """Until cancelled. Without relays it has nothing to do."""
+        backoff = Backoff(BACKOFF, BACKOFF_CAP)
+        while self.stations:
+            await self._wanted.wait()
+            if not self._in_demand():
+                self._wanted.clear()
+                continue
+            began = self._clock()
+            origin = min(self.stations, key=self._order)
+            try:
+                await self._carry(origin)
+            except (RelayError, MediaError, OSError, ConnectionError) as error:
+                self._lost(origin, str(error))
+            except Exception as error:
+                # What aiortc raises here has no common base; a relay never ends the console.
+                log.exception("publishing failed", relay=origin.url.address)
+                self._lost(origin, type(error).__name__)
+            if self._clock() - began > HEALTHY_SECONDS:
+                backoff.healthy()
+            await asyncio.sleep(backoff.next())
+
+    def _order(self, station: Station) -> tuple[bool, int]:
+        """Those that failed lately come last."""
+        return self._clock() - station.failed_at < DISTRUST_SECONDS, int(station.name)
+
+    def _in_demand(self) -> bool:
+        return self._handout.expected(self._clock()) or any(each.relay for each in self._peers())
+
+    async def _carry(self, origin: Station) -> None:
+        """From here into one relay, and from there into the others; returns when it ended or nobody watches."""
+        self._pin = secrets.token_urlsafe(12)
+        feed = secrets.randbits(52) | 1
+        async with (
+            open_janus(origin.url.address) as session,
+            publish(session, self._room_of(origin), self._media, feed, self._codec) as publication,
+        ):
+            self._publication = publication
+            self._live(origin, publication)
+            try:
+                await self._while_wanted(session, publication, origin)
+            finally:
+                self._publication = None
+                for station in self.stations:
+                    self._gone(station, publication.why)
+        if publication.why in OWN_REASONS:
+            log.info("no longer published", relay=origin.url.address, why=publication.why)
+        else:
+            self._lost(origin, publication.why)
+
+    async def _while_wanted(self, session: JanusSession, publication: Publication, origin: Station) -> None:
+        loop = asyncio.get_running_loop()
+        tasks = [
+            loop.create_task(self._extend(origin, station, publication), name=f"relay {station.name}")
+            for station in self.stations
+            if station is not origin
+        ]
+        tasks += [loop.create_task(self._watch(session, publication)), loop.create_task(self._beat(publication))]
+        try:
+            await publication.ended.wait()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _watch(self, session: JanusSession, publication: Publication) -> None:
+        """Ends it with its session, when nobody watches any more, or when a link was revoked."""
+        quiet_since = self._clock()
+        while True:
+            try:
+                async with asyncio.timeout(1.0):
+                    await session.ended.wait()
+                publication.end(session.why)
+                return
+            except TimeoutError:
+                pass
+            if self._shut_out():
+                publication.end(REVOKED)
+            if self._in_demand():
+                quiet_since = self._clock()
+            elif self._clock() - quiet_since > LINGER_SECONDS:
+                self._wanted.clear()
+                publication.end(UNWATCHED)
+
+    def _shut_out(self) -> bool:
+        """Whether somebody who watched through a relay may not watch any more."""
+        gone = any(each.ended in ("link revoked", "link expired") for each in self._watching)
+        self._watching = {each for each in self._peers() if each.relay}
+        return gone
+
+    async def _beat(self, publication: Publication) -> None:
+        """Observers tell a relay that hangs from a robot that is silent."""
+        while True:
+            await asyncio.sleep(HEARTBEAT_SECONDS)
+            publication.send_feedback(HEARTBEAT)
+
+    async def _extend(self, origin: Station, station: Station, publication: Publication) -> None:
+        """Keep one more relay fed from the first, until cancelled."""
+        backoff = Backoff(BACKOFF, BACKOFF_CAP)
+        while True:
+            began = self._clock()
+            try:
+                async with self._fed(origin, station, publication) as session:
+                    self._live(station, publication)
+                    await session.ended.wait()
+                    self._lost(station, session.why)
+            except RelayError as error:
+                self._lost(station, str(error))
+            finally:
+                self._gone(station, "")
+            if self._clock() - began > HEALTHY_SECONDS:
+                backoff.healthy()
+            await asyncio.sleep(backoff.next())
+
+    @asynccontextmanager
+    async def _fed(self, origin: Station, station: Station, publication: Publication) -> AsyncIterator[JanusSession]:
+        """`station` gets the feed from `origin` while entered."""
+        name = f"{station.name}-{secrets.token_hex(4)}"
+        async with open_janus(station.url.address) as session, open_janus(origin.url.address) as there:
+            handle, sender = await session.attach(_ignore), await there.attach(_ignore)
+            room, first = self._room_of(station)(session), self._room_of(origin)(there)
+            await room.prepare(handle)
+            inlet = await room.receive_from(handle, publication.feed, publication.streams)
+            await first.send_to(sender, publication.feed, name, station.url.host, inlet)
+            try:
+                yield session
+            finally:
+                if not there.ended.is_set():
+                    await _quietly(first.stop_sending(sender, publication.feed, name))
+                if not session.ended.is_set():
+                    await _quietly(room.forget(handle, publication.feed))
+
+    def _room_of(self, station: Station) -> Callable[[JanusSession], JanusRoom]:
+        """Its keys are made from the console's own, so that a console that was restarted can go on with its room."""
+        place = f"{station.url.address}/{station.room}"
+        keys = RoomKeys(self._admin_key, self._derived("secret", place), self._derived("publisher", place), self._pin)
+        return lambda session: JanusRoom(session, station.room, keys)
+
+    def _derived(self, purpose: str, place: str) -> str:
+        return hmac.new(self._key, f"relay {purpose} {place}".encode(), hashlib.sha256).hexdigest()[:32]
+
+    def _live(self, station: Station, publication: Publication) -> None:
+        station.feed, station.streams, station.trouble = publication.feed, tuple(publication.streams), ""
+        log.info("relay carries the session", relay=station.url.address, room=station.room)
+        self._tell()
+
+    def _lost(self, station: Station, trouble: str) -> None:
+        station.failed_at = self._clock()
+        if trouble != station.trouble:
+            log.warning("relay does not carry the session", relay=station.url.address, why=trouble)
+        station.trouble = trouble
+        self._gone(station, trouble)
+
+    def _gone(self, station: Station, trouble: str) -> None:
+        if station.live:
+            station.feed, station.trouble = 0, trouble or station.trouble
+            self._tell()
+
+    def _tell(self) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+
+class FedMedia(Protocol):
+    """The console's media."""
+
+    def configure(self, description: RobotDescription) -> None: ...
+    def feed(self, media: Media, now: float) -> None: ...
+
+
+class RelayedMedia:
+    """The console's media, of which the relays hear when an epoch begins."""
+
+    def __init__(self, media: FedMedia, relays: RelayDesk) -> None:
+        self._media = media
+        self._relays = relays
+
+    def configure(self, description: RobotDescription) -> None:
+        self._media.configure(description)
+        self._relays.epoch_began()
+
+    def feed(self, media: Media, now: float) -> None:
+        self._media.feed(media, now)
+
+
+def _ignore(_: object) -> None:
+    """Handles for administration hear nothing that matters."""
+
+
+async def _quietly(request: Awaitable[None]) -> None:
+    with suppress(RelayError):
+        await request

@@ -1,0 +1,61 @@
+"""Settings of the relays that observers watch through."""
+
+from typing import Annotated, Literal, Self
+from urllib.parse import urlsplit
+
+from pydantic import Field, SecretStr, field_validator, model_validator
+from pydantic_settings import BaseSettings
+
+from server.network_settings import NameList
+from server.relay.relay_url import RelayUrl, parse_relay_url
+
+__all__ = ["RelaySettings"]
+
+
+class RelaySettings(BaseSettings):
+    """Part of `Settings`."""
+
+    relay: NameList = ()  # "janus:ws://host:8188/ROOM"; of several, the first feeds the others
+    relay_public: NameList = ()  # the same relays as browsers reach them, "wss://relay.example.org"; empty: as above
+    relay_admin_key: SecretStr = SecretStr("")  # that Janus' video room asks of who creates a room
+    relay_codec: Literal["", "H264", "VP8"] = ""  # of cameras; "": what is being encoded already
+    relay_secret: SecretStr = SecretStr("")  # LiveKit: API key and secret, "KEY:SECRET"
+    observers_direct: Annotated[int, Field(ge=0)] = 10  # observers that the console serves itself, when it has relays
+
+    @field_validator("relay", "relay_public", mode="before")
+    @classmethod
+    def _split_relays(cls, value: object) -> object:
+        return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
+
+    @field_validator("relay")
+    @classmethod
+    def _check_relays(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        engines = {parse_relay_url(each).engine for each in value}
+        if "livekit" in engines and len(value) > 1:
+            raise ValueError("one LiveKit is all there can be: it grows by itself")
+        return value
+
+    @field_validator("relay_public")
+    @classmethod
+    def _check_public(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        for each in value:
+            if urlsplit(each).scheme not in ("ws", "wss") or not urlsplit(each).hostname:
+                raise ValueError(f"{each!r} is not ws(s)://host[:port]")
+        return value
+
+    @model_validator(mode="after")
+    def _check_pairs(self) -> Self:
+        if self.relay_public and len(self.relay_public) != len(self.relay):
+            raise ValueError("relay_public names every relay, in the same order, or none")
+        return self
+
+    @property
+    def relay_urls(self) -> list[RelayUrl]:
+        return [parse_relay_url(each) for each in self.relay]
+
+    @property
+    def relay_origins(self) -> tuple[str, ...]:
+        """What a page may connect to besides its own server."""
+        addresses = self.relay_public or tuple(each.address for each in self.relay_urls if each.engine == "janus")
+        parts = [urlsplit(each) for each in addresses]
+        return tuple(dict.fromkeys(f"{part.scheme}://{part.netloc}" for part in parts))

@@ -1,0 +1,29 @@
+"""One relay as the console sees it: where it is, whether it carries the session now, and since when it does not."""
+
+from dataclasses import dataclass
+
+from robot_bridge.protocol.console import StreamInfo
+from server.relay.relay_url import RelayUrl
+
+__all__ = ["Station"]
+
+
+@dataclass
+class Station:
+    """State of one configured relay. `RelayDesk` changes it, nobody else."""
+
+    name: str  # its number among the settings: "0"
+    url: RelayUrl
+    public: str  # the address that observers use: "wss://relay.example.org"
+    feed: int = 0  # that observers subscribe to there; 0: it does not carry the session now
+    streams: tuple[StreamInfo, ...] = ()
+    trouble: str = ""  # why it does not; "" before the first try
+    failed_at: float = float("-inf")  # when it was tried last in vain, s on the monotonic clock
+
+    @property
+    def live(self) -> bool:
+        return self.feed != 0
+
+    @property
+    def room(self) -> int:
+        return int(self.url.room)
