@@ -20,7 +20,16 @@ from bench.table import render_markdown, render_table
 
 __all__ = ["SECTIONS", "Measured", "main", "measure"]
 
-SECTIONS = ("command_to_feedback", "lossy", "capture_to_shown", "first_picture", "start", "observers", "memory")
+SECTIONS = (
+    "command_to_feedback",
+    "lossy",
+    "capture_to_shown",
+    "first_picture",
+    "start",
+    "observers",
+    "robot_cost",
+    "memory",
+)
 BUSY_PERCENT = 8.0  # of the machine, by others, above which the figures say more about them
 LOOK_SECONDS = 1.5  # at the neighbours before each section
 

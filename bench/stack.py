@@ -72,12 +72,13 @@ async def running_bridge(robot: str) -> AsyncIterator[Bridge]:
 
 
 @asynccontextmanager
-async def running_stack(robot: str) -> AsyncIterator[Stack]:
+async def running_stack(robot: str, **more: str) -> AsyncIterator[Stack]:
+    """`more`: settings of the console besides, LOCKSTEP_…"""
     async with running_bridge(robot) as bridge:
         lockstep = str(Path(sys.executable).with_name("lockstep"))
         command = (lockstep, "serve", "--robot", bridge.address, "--port", "0", "--json", "--quiet")
         settings = {"LOCKSTEP_STATE_DIR": str(bridge.event_log.parent / "state"), "LOCKSTEP_MAX_PEERS": str(MAX_PEERS)}
-        async with running_process(*command, environment=settings) as (console, links):
+        async with running_process(*command, environment=settings | more) as (console, links):
             yield Stack(bridge, console, links["console"], links["operator"], links["observer"])
 
 

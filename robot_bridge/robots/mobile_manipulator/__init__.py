@@ -1,7 +1,7 @@
 """A mobile manipulator in MuJoCo: a holonomic drum base with a 6-axis arm, in a lab with things to push."""
 
 from robot_bridge.robots.base import Robot
-from robot_bridge.robots.mobile_manipulator.graphics import choose_graphics, graphics_unavailable
+from robot_bridge.robots.mujoco_view.graphics import choose_graphics, graphics_unavailable
 
 __all__ = ["create"]
 

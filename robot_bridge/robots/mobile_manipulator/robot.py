@@ -9,14 +9,14 @@ from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.robots.base import Measurement, MediaSource, Robot
 from robot_bridge.robots.mobile_manipulator.arm_drive import ArmDrive
 from robot_bridge.robots.mobile_manipulator.base_drive import BaseDrive
-from robot_bridge.robots.mobile_manipulator.camera import CameraSource
 from robot_bridge.robots.mobile_manipulator.contact_sense import ContactSense
 from robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE, describe
 from robot_bridge.robots.mobile_manipulator.hearing import Hearing
 from robot_bridge.robots.mobile_manipulator.microphone import MicrophoneSource
 from robot_bridge.robots.mobile_manipulator.range_ring import RangeSensors
-from robot_bridge.robots.mobile_manipulator.renderer import Renderer
 from robot_bridge.robots.mobile_manipulator.simulation import BASE, Simulation
+from robot_bridge.robots.mujoco_view.camera import CameraSource
+from robot_bridge.robots.mujoco_view.renderer import Renderer
 
 __all__ = ["MobileManipulator"]
 

@@ -9,12 +9,12 @@ import pytest
 
 from robot_bridge.protocol.messages import Media
 from robot_bridge.robots.base import MediaSource, Stamp
-from robot_bridge.robots.mobile_manipulator.camera import CameraSource
 from robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE
 from robot_bridge.robots.mobile_manipulator.hearing import Heard
 from robot_bridge.robots.mobile_manipulator.microphone import SEGMENT_SECONDS, MicrophoneSource
-from robot_bridge.robots.mobile_manipulator.renderer import Renderer
 from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
+from robot_bridge.robots.mujoco_view.camera import CameraSource
+from robot_bridge.robots.mujoco_view.renderer import Renderer
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
 
 

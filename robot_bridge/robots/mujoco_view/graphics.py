@@ -26,6 +26,4 @@ def choose_graphics() -> None:
 def graphics_unavailable(cause: BaseException) -> RobotUnavailable:
     """The error for an OpenGL that failed with `cause`."""
     choice = os.environ.get("MUJOCO_GL", "")
-    return RobotUnavailable(
-        f"mobile-manipulator: OpenGL is not available (MUJOCO_GL={choice}: {type(cause).__name__}: {cause}). {ADVICE}"
-    )
+    return RobotUnavailable(f"OpenGL is not available (MUJOCO_GL={choice}: {type(cause).__name__}: {cause}). {ADVICE}")

@@ -11,7 +11,7 @@ from robot_bridge.metronome import Metronome
 from robot_bridge.protocol.description import Camera
 from robot_bridge.protocol.messages import Media
 from robot_bridge.robots.base import MediaSource, Stamp
-from robot_bridge.robots.mobile_manipulator.renderer import Renderer
+from robot_bridge.robots.mujoco_view.renderer import Renderer
 
 __all__ = ["CameraSource"]
 

@@ -1,0 +1,87 @@
+"""What the default robot costs of one core: simulation, cameras and sound in its bridge, and encoding in the console.
+
+Processor time is what the kernel has counted for each process, all threads, so a neighbour makes it longer to measure
+but hardly changes it. An operator drives and receives everything, at full size and rate: the quality controller is
+off. The operator's own process is not counted.
+"""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import NamedTuple
+
+from bench.context import Context
+from bench.driving import console_trips
+from bench.event_log import capture_times, robot_times
+from bench.results import Result
+from bench.stack import DEFAULT_ROBOT, Stack, running_stack
+from client import Console
+
+__all__ = ["run"]
+
+SECTION = "robot_cost"
+SECONDS, QUICK_SECONDS = 25, 3
+WARM_UP = 2.0  # s
+EVENTS = 1_000_000  # more than fit
+TARGET = 60.0  # % of one core
+RATE_TARGET = 29.0  # pictures a second of 30
+
+
+class Cost(NamedTuple):
+    """Of one spell."""
+
+    bridge: float  # % of one core
+    console: float
+    pictures: float  # of the main camera per second
+    events: float  # per second
+
+
+async def run(context: Context) -> list[Result]:
+    if DEFAULT_ROBOT not in context.robots:
+        missing = f"{DEFAULT_ROBOT} does not start here"
+        return [Result(section=SECTION, name="both together", value=None, unit="%", target=TARGET, conditions=missing)]
+    seconds = float(context.scale(SECONDS, QUICK_SECONDS))
+    async with running_stack(DEFAULT_ROBOT, LOCKSTEP_MEDIA__QUALITY="false") as stack, _driven(stack) as console:
+        cost = await _spell(stack, console, seconds)
+    return _results(cost, console.description.cameras[0].label, seconds)
+
+
+@asynccontextmanager
+async def _driven(stack: Stack) -> AsyncIterator[Console]:
+    """An operator who drives all the time and receives everything, decoding nothing."""
+    async with Console(stack.operator, name="operator", decode=False) as console, asyncio.TaskGroup() as tasks:
+        await console.take_seat()
+        driving = tasks.create_task(console_trips(console, EVENTS, seconds=1e6))
+        await asyncio.sleep(WARM_UP)
+        yield console
+        driving.cancel()
+
+
+async def _spell(stack: Stack, console: Console, seconds: float) -> Cost:
+    processes, log = (stack.bridge.process, stack.console), stack.bridge.event_log
+    driven = len(robot_times(log))
+    began, before = time.monotonic(), [process.cpu_seconds() for process in processes]
+    await asyncio.sleep(seconds)
+    ended, after = time.monotonic(), [process.cpu_seconds() for process in processes]
+    bridge, server = (100 * (late - early) / (ended - began) for early, late in zip(before, after, strict=True))
+    events = len(robot_times(log)) - driven
+    pictures = sum(began <= each < ended for each in capture_times(log, console.description.cameras[0].name))
+    return Cost(bridge, server, pictures / (ended - began), events / (ended - began))
+
+
+def _results(cost: Cost, camera: str, seconds: float) -> list[Result]:
+    conditions = (
+        f"{DEFAULT_ROBOT} driven at {cost.events:.0f} events/s by one peer that receives all; all cameras at full size "
+        f"and rate, quality controller off; {seconds:.0f} s of processor time"
+    )
+
+    def row(name: str, value: float, unit: str, **more: object) -> Result:
+        return Result(section=SECTION, name=name, value=value, unit=unit, conditions=conditions, **more)  # type: ignore[arg-type]
+
+    return [
+        row("bridge: simulation, cameras, sound", cost.bridge, "% of one core"),
+        row("console: encoding, and all else for one peer", cost.console, "% of one core"),
+        row("both together", cost.bridge + cost.console, "% of one core", target=TARGET),
+        row(f"pictures of {camera}", cost.pictures, "per second", target=RATE_TARGET, bound="at least"),
+    ]
