@@ -45,6 +45,7 @@ __all__ = [
 ]
 
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
+RETRANSMISSION_CEILING = 1.5  # s; above every round trip that one drives over, satellites' included
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
 RECORD = 1500  # bytes, the most that a DTLS record carries here
 WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
@@ -234,7 +235,9 @@ def hasten_sctp(pc: RTCPeerConnection) -> None:
 
     def update(round_trip: float) -> None:
         measure(round_trip)
-        sctp._rto = max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar)
+        # A network that was cut and delivers everything at its end is no path of ten seconds: with a wait of that
+        # order, whatever is lost next would keep the operator from the seat for as long.
+        sctp._rto = min(max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar), RETRANSMISSION_CEILING)
 
     def expired() -> None:
         expire()

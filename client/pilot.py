@@ -33,7 +33,9 @@ SALVO_SPACING = 0.003  # s
 SALVO_LEAST = 0.050  # s; with a shorter interval single repeats are as quick
 LOSSY_SPELL = 60.0  # s to go on doubling after the last loss that was seen
 PATIENT_REASONS = {"late", "out_of_order", "rested", "not_neutral"}  # another try, on fresh feedback, can succeed
-NEEDLESS = 0.25  # an answer that follows the last repeat within this part of the whole wait answers an earlier sending
+NEEDLESS = 0.75  # an answer within this part of a ping's round trip after the last repeat answers an earlier sending
+NEEDLESS_BLIND = 0.25  # of the whole wait, while no ping is known
+PINGS = 8  # of which the shortest counts
 FEW_SAMPLES = 8
 NEVER = float("inf")
 
@@ -89,6 +91,7 @@ class Pilot:
         self._idle_at = NEVER
         self._flight: _Flight | None = None
         self._lossy_until = float("-inf")
+        self._pings: deque[float] = deque(maxlen=PINGS)  # round trips; none of a command is shorter
         self._void: int | None = None  # an event that only neutral values may use
         self._unproven = False  # this console has the seat and no neutral command of it was answered yet
         self._used_up: tuple[int, int] | None = None  # a feedback that can no longer be answered
@@ -144,6 +147,7 @@ class Pilot:
 
     def ping_answered(self, round_trip: float) -> None:
         """A ping's round trip: stands in for that of a command while few of those are known."""
+        self._pings.append(round_trip)
         if len(self.samples) < FEW_SAMPLES:
             self.timer.sample(round_trip)
 
@@ -282,7 +286,8 @@ class Pilot:
         self._unproven = False  # whatever it carried, the console let it pass
         taken = now - flight.first_sent_at
         self.samples.append(taken)
-        if flight.sends == 1 or now - flight.last_sent_at < NEEDLESS * taken:
+        soonest = NEEDLESS * min(self._pings) if self._pings else NEEDLESS_BLIND * taken
+        if flight.sends == 1 or now - flight.last_sent_at < soonest:
             self.timer.sample(taken)  # an echo makes a sample at most ECHO too long, which is the safe side
         else:
             self.loss(now)  # and no sample, by Karn's rule

@@ -20,6 +20,7 @@ from OpenSSL import SSL
 __all__ = ["tune_data_transport"]
 
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
+RETRANSMISSION_CEILING = 1.5  # s; above every round trip that one drives over, satellites' included
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
 CONNECT_CEILING = 3.0  # s, to which the interval grows while nobody answers; aiortc gives up after eight
 RECORD = 1500  # bytes, the most that a DTLS record carries here
@@ -69,7 +70,9 @@ def _hasten_sctp(sctp: Any) -> None:
 
     def update(round_trip: float) -> None:
         measure(round_trip)
-        sctp._rto = max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar)
+        # A network that was cut and delivers everything at its end is no path of ten seconds: with a wait of that
+        # order, whatever is lost next would keep the operator from the seat for as long.
+        sctp._rto = min(max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar), RETRANSMISSION_CEILING)
 
     def expired_connecting() -> None:
         # The wait grows: eight short ones would end before a path that was gone for five seconds is back.

@@ -287,3 +287,5 @@ async def test_a_lost_message_is_found_out_sooner_and_does_not_shut_the_window()
         sctp._t3_cancel()
         sctp._t3_expired()
         assert sctp._cwnd >= aiortc_private.WINDOW_FLOOR
+        sctp._update_rto(10.0)
+        assert sctp._rto == aiortc_private.RETRANSMISSION_CEILING

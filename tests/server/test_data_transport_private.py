@@ -10,7 +10,7 @@ import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSctpTransport, RTCSessionDescription
 from aiortc.rtcdtlstransport import RTCDtlsTransport
 
-from server.data_transport_private import RETRANSMISSION_FLOOR, WINDOW_FLOOR, tune_data_transport
+from server.data_transport_private import RETRANSMISSION_CEILING, RETRANSMISSION_FLOOR, WINDOW_FLOOR, tune_data_transport
 from server.media.aiortc_private import create_peer_connection
 from tests.server.rig import PATIENCE, running_rig
 
@@ -167,6 +167,14 @@ async def test_the_timeout_stays_above_a_delayed_acknowledgement(ends: Ends) -> 
     assert RETRANSMISSION_FLOOR <= sctp._rto < SOON
     sctp._update_rto(2.0)
     assert sctp._rto > SOON
+
+
+async def test_what_an_outage_held_for_ten_seconds_does_not_lengthen_the_wait_to_that(ends: Ends) -> None:
+    await ends.exchange()
+    sctp: Any = ends.server.transport
+    for held in (10.0, 8.0, 5.0):
+        sctp._update_rto(held)
+    assert sctp._rto == RETRANSMISSION_CEILING
 
 
 async def test_a_timeout_does_not_shut_the_window(ends: Ends) -> None:

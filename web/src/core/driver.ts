@@ -26,8 +26,12 @@ const SALVO_SPACING_MS = 3;
 const SALVO_LEAST_MS = 50;
 /** To go on doubling after the last loss that was seen. */
 const LOSSY_SPELL_MS = 60_000;
-/** An answer that follows the last repeat within this part of the whole wait answers an earlier sending. */
-const NEEDLESS = 0.25;
+/** An answer within this part of a ping's round trip after the last repeat answers an earlier sending. */
+const NEEDLESS = 0.75;
+/** Of the whole wait, while no ping is known. */
+const NEEDLESS_BLIND = 0.25;
+/** Of which the shortest counts. */
+const PINGS = 8;
 const FEW_SAMPLES = 8;
 
 /** What the operator wants now. */
@@ -54,6 +58,7 @@ export interface Driver {
   echoAtMs: number; // Infinity when no copy is due
   echoesLeft: number;
   lossyUntilMs: number; // -Infinity before the first loss
+  readonly pings: number[]; // their round trips in ms, newest last; none of a command is shorter
   lastValues: readonly number[]; // sent last
   neutralOwed: boolean; // one neutral command is due after disarming
   barrier: number | null; // events up to this one were voided by a rest: only neutral goes under their numbers
@@ -77,6 +82,7 @@ export function createDriver(
     echoAtMs: Infinity,
     echoesLeft: 0,
     lossyUntilMs: -Infinity,
+    pings: [],
     lastValues: neutral,
     neutralOwed: false,
     barrier: null,
@@ -108,12 +114,15 @@ export function driverFeedback(
  */
 function landed(driver: Driver, takenMs: number, now: number): void {
   // An echo makes a sample at most ECHO_MS too long, which is the safe side.
-  if (driver.sends === 1 || now - driver.lastSentMs < NEEDLESS * takenMs) takeSample(driver.repeat, takenMs);
+  const soonest = driver.pings.length > 0 ? NEEDLESS * Math.min(...driver.pings) : NEEDLESS_BLIND * takenMs;
+  if (driver.sends === 1 || now - driver.lastSentMs < soonest) takeSample(driver.repeat, takenMs);
   else driverLoss(driver, now);
 }
 
 /** A ping's round trip: stands in for that of a command while few of those are known. */
 export function driverPingAnswered(driver: Driver, roundTripMs: number): void {
+  driver.pings.push(roundTripMs);
+  if (driver.pings.length > PINGS) driver.pings.shift();
   if (knowsFewCommands(driver)) takeSample(driver.repeat, roundTripMs);
 }
 
