@@ -6,6 +6,7 @@ from collections.abc import Iterable
 import msgspec
 
 from client.command_gate import GateState
+from client.media_gate import GateMode
 from robot_bridge.protocol.carriers import Carrier
 from robot_bridge.protocol.console import StreamReport
 from robot_bridge.protocol.serial import event_gap
@@ -44,6 +45,7 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
     discarded: int = 0
     held: int = 0
     violations: int = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
+    gate: GateMode = "event"
     packets: int = 0
     frames: int = 0  # complete encoded frames
     lost: int = 0  # packets that never came
@@ -63,6 +65,8 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
             held=self.held,
             tolerance=self.tolerance,
             lag=self.lag,
+            violations=self.violations,
+            gate=self.gate,
         )
 
 

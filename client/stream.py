@@ -202,6 +202,7 @@ class Stream:
             discarded=gate.discarded,
             held=gate.held,
             violations=gate.violations,
+            gate=gate.mode,
             packets=self._packets,
             frames=self._frames,
             lost=self._assembler.lost if self._assembler is not None else 0,

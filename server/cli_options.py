@@ -12,6 +12,8 @@ __all__ = [
     "Microphones",
     "ObserversDirect",
     "PublicUrl",
+    "Speaker",
+    "Record",
     "Relay",
     "SpeedCap",
     "Stun",
@@ -73,4 +75,14 @@ Relay = Annotated[
 ]
 ObserversDirect = Annotated[
     int | None, typer.Option(min=0, help="Observers that the console serves itself when it has a relay; 10 unless set.")
+]
+Record = Annotated[
+    Path | None, typer.Option("--record", help="Record from the start on, into this directory.", metavar="DIR")
+]
+Speaker = Annotated[
+    str | None,
+    typer.Option(
+        help="Loudspeaker at the robot for the voice of who drives: pulse:[sink], alsa:device, file:path.wav.",
+        metavar="OUTPUT",
+    ),
 ]

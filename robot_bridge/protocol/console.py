@@ -92,6 +92,8 @@ class StreamReport(msgspec.Struct, frozen=True, kw_only=True):
     held: Count = 0
     tolerance: Count = 0  # events; what the person at the client allows
     lag: int = 0  # largest feedback - stamp among what arrived since the last report, rendered or not
+    violations: Count = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
+    gate: Literal["event", "off", "age"] = "event"  # how it is gated now
 
 
 class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="report"):

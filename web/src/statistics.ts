@@ -57,6 +57,9 @@ export interface Statistics {
   readonly stop: { readonly stopped: boolean; readonly by: string; readonly reason: string };
   readonly stale: string | null; // why the large view must not be trusted
   readonly at_rest: boolean | null;
+  readonly axes: Readonly<Record<string, number | null>>; // measured; null where that is not known
+  readonly layer: string | null; // the control layer that is active
+  readonly faults: readonly string[];
   readonly first_picture_ms: number | null;
   readonly sound: "on" | "off";
   readonly pad: { readonly id: string; readonly ready: boolean; readonly calibrated: boolean } | null;
@@ -104,6 +107,9 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     stop: { ...state.stop },
     stale: main === undefined ? null : stalenessOf(app, main, now),
     at_rest: state.feedback?.at_rest ?? null,
+    axes: axesOf(app),
+    layer: state.robot?.description.layers[app.layer]?.name ?? null,
+    faults: state.feedback?.faults ?? [],
     first_picture_ms: app.firstPictureMs,
     sound: app.room.isAudible() ? "on" : "off",
     pad: padOf(app),
@@ -114,6 +120,15 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
 function padOf(app: ConsoleApp): Statistics["pad"] {
   const { state } = app.controls.pad;
   return state === null ? null : { id: state.id, ready: state.ready, calibrated: state.setup.calibrated };
+}
+
+function axesOf(app: ConsoleApp): Statistics["axes"] {
+  const { robot, feedback } = app.state;
+  const named = (robot?.description.axes ?? []).map(({ name }, index) => {
+    const known = feedback?.unknown.includes(name) === false;
+    return [name, known ? (feedback.axes[index] ?? null) : null] as const;
+  });
+  return Object.fromEntries(named);
 }
 
 /** Why a view must not be trusted; null when it may. */
@@ -129,8 +144,8 @@ export function reportOf(app: ConsoleApp): Report {
     event: app.state.feedback?.event ?? 0,
     armed: app.arming.state !== "disarmed",
     streams: [
-      ...[...app.room.videos.values()].map((stream) => streamReport(stream, settings.tolerance.video)),
-      ...[...app.room.sounds.values()].map((stream) => streamReport(stream, settings.tolerance.audio)),
+      ...[...app.room.videos.values()].map((stream) => streamReport(stream, settings.tolerance.video, settings.gate)),
+      ...[...app.room.sounds.values()].map((stream) => streamReport(stream, settings.tolerance.audio, settings.gate)),
     ],
     picture_delay_ms: app.viewDelayMs,
     round_trip_ms: app.state.roundTripMs,
@@ -138,7 +153,7 @@ export function reportOf(app: ConsoleApp): Report {
   };
 }
 
-function streamReport(stream: VideoStream | SoundStream, tolerance: number): StreamReport {
+function streamReport(stream: VideoStream | SoundStream, tolerance: number, gate: GateMode): StreamReport {
   const { counts } = stream.gate;
   return {
     stream: stream.info.stream,
@@ -151,6 +166,8 @@ function streamReport(stream: VideoStream | SoundStream, tolerance: number): Str
     held: counts.held,
     tolerance,
     lag: takeLag(counts),
+    violations: counts.violations,
+    gate,
   };
 }
 

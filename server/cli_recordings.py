@@ -1,0 +1,252 @@
+"""The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`, `report`."""
+
+import asyncio
+import secrets
+import sys
+from collections.abc import Callable
+from datetime import datetime
+from enum import StrEnum
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import httpx
+import msgspec
+import typer
+
+from server.access import Access
+from server.cli_access import MakeSettings, StateDirOption
+from server.console_address import read_address
+from server.recording.errors import RecordingError
+from server.recording.recorder import recordings_directory
+from server.recording.replay_app import create_replay_app
+from server.recording.shelf import RecordingEntry, Shelf
+from server.recording.verify import Verdict
+from server.recording.verify_file import verify_file
+from server.serve import PortTaken, bind, running, wait_for_signal
+from server.settings import Settings
+from server.state import ConsoleState, open_state, state_path
+from server.state_dir import StateDirUnusable
+
+__all__ = ["add_recording_commands"]
+
+EXIT_BROKEN = 1  # a promise is not kept
+EXIT_USAGE = 2
+EXIT_PORT_TAKEN = 3
+HTTP_SECONDS = 30.0
+TICKET_SECONDS = 600.0
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+File = Annotated[Path, typer.Argument(help="A recording, or its id in the recordings' directory.")]
+DirectoryOption = Annotated[
+    Path | None, typer.Option("--dir", help="The recordings' directory; unset: that of the console's settings.")
+]
+
+
+class ExportFormat(StrEnum):
+    MP4 = "mp4"
+    CSV = "csv"
+    PARQUET = "parquet"
+    LEROBOT = "lerobot"
+
+
+def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
+    """`make_settings` turns flags into settings, as for the other commands."""
+    record = typer.Typer(no_args_is_help=True, help="Start and end the recording of a running console.")
+    app.add_typer(record, name="record")
+
+    @record.command("start")
+    def record_start(
+        name: Annotated[str, typer.Option(help="What it is called in the list.")] = "",
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Start to record."""
+        _say_state(_ask(make_settings(state_dir=state_dir), "POST", "/api/recordings", {"name": name}), as_json)
+
+    @record.command("stop")
+    def record_stop(state_dir: StateDirOption = None, as_json: Json = False) -> None:
+        """End the recording; returns when the file is closed."""
+        _say_state(_ask(make_settings(state_dir=state_dir), "POST", "/api/recordings/stop"), as_json)
+
+    @record.command("status")
+    def record_status(state_dir: StateDirOption = None, as_json: Json = False) -> None:
+        """Say whether the session is recorded."""
+        _say_state(_ask(make_settings(state_dir=state_dir), "GET", "/api/recordings")["state"], as_json)
+
+    @app.command()
+    def recordings(directory: DirectoryOption = None, state_dir: StateDirOption = None, as_json: Json = False) -> None:
+        """List the recordings that are complete."""
+        found = _shelf(make_settings(state_dir=state_dir), directory).entries()
+        if as_json:
+            sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
+            return
+        for entry in found:
+            sys.stdout.write(_line(entry) + "\n")
+
+    @app.command()
+    def replay(
+        file: File,
+        host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+        port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes any free one.")] = 0,
+        directory: DirectoryOption = None,
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Serve the player for one recording, without a robot, and print its link."""
+        path = _found(file, make_settings(state_dir=state_dir), directory)
+        try:
+            asyncio.run(_replay(path, host, port, as_json))
+        except PortTaken as error:
+            _say(f"{error}; choose another with --port")
+            raise typer.Exit(EXIT_PORT_TAKEN) from error
+
+    @app.command()
+    def verify(
+        file: File, directory: DirectoryOption = None, state_dir: StateDirOption = None, as_json: Json = False
+    ) -> None:
+        """Check what is promised against a recording. Exit code 1: it is not kept; 2: it cannot be read."""
+        path = _found(file, make_settings(state_dir=state_dir), directory)
+        verdict = _or_usage(lambda: verify_file(path))
+        if as_json:
+            sys.stdout.write(msgspec.json.encode({"file": str(path), **msgspec.to_builtins(verdict)}).decode() + "\n")
+        else:
+            sys.stdout.write(_in_words(verdict))
+        if not verdict.ok:
+            raise typer.Exit(EXIT_BROKEN)
+
+    @app.command()
+    def export(
+        file: File,
+        to: Annotated[ExportFormat, typer.Option(help="mp4: pictures and sound; csv, parquet: tables; lerobot: v3.")],
+        out: Annotated[
+            Path | None, typer.Option(help="File or directory to write; unset: beside the recording.")
+        ] = None,
+        task: Annotated[str, typer.Option(help="lerobot: what was done, in words.")] = "",
+        directory: DirectoryOption = None,
+        state_dir: StateDirOption = None,
+    ) -> None:
+        """Write a recording in another form."""
+        path = _found(file, make_settings(state_dir=state_dir), directory)
+        # Loaded only here: parquet and lerobot need pyarrow, the extra "export".
+        exporter: Any = import_module(f"server.recording.export_{to.value}")
+        written = _or_usage(lambda: exporter.export(path, out, task))
+        for each in written:
+            sys.stdout.write(f"{each}\n")
+
+    @app.command()
+    def report(
+        file: File,
+        out: Annotated[Path | None, typer.Option(help="HTML file to write; unset: beside the recording.")] = None,
+        directory: DirectoryOption = None,
+        state_dir: StateDirOption = None,
+    ) -> None:
+        """Draw the thesis' figures from a recorded session."""
+        path = _found(file, make_settings(state_dir=state_dir), directory)
+        reporting: Any = import_module("server.recording.report")  # needs matplotlib, the extra "report"
+        sys.stdout.write(f"{_or_usage(lambda: reporting.write_report(path, out))}\n")
+
+
+async def _replay(path: Path, host: str, port: int, as_json: bool) -> None:
+    listener = bind(host, port)
+    try:
+        access = Access(secrets.token_urlsafe(32), token_seconds=30 * 86_400.0, ticket_seconds=TICKET_SECONDS)
+        own_host, own_port = listener.getsockname()[:2]
+        url = f"http://{f'[{own_host}]' if ':' in own_host else own_host}:{own_port}"
+        link = f"{url}/recordings#token={access.issue('observer', 'replay')}&recording={path.stem}"
+        async with running(create_replay_app(path, access, host), listener):
+            if as_json:
+                sys.stdout.write(
+                    msgspec.json.encode({"console": url, "recording": path.stem, "link": link}).decode() + "\n"
+                )
+            else:
+                sys.stdout.write(f"\n  To look at {path.name}, open:   {link}\n\n")
+            sys.stdout.flush()
+            await wait_for_signal()
+    finally:
+        listener.close()
+
+
+def _ask(settings: Settings, method: str, path: str, body: dict[str, str] | None = None) -> dict[str, Any]:
+    """What the console of this state directory answers."""
+    state = _state(settings)
+    url = settings.public_url or read_address(state.directory)
+    if not url:
+        raise _usage("no console has run with this state directory")
+    headers = {"Authorization": f"Bearer {state.access.issue('operator', 'command line')}"}
+    try:
+        # Its certificate may be its own; whoever can write the state directory can name any address there anyway.
+        with httpx.Client(verify=not settings.tls, trust_env=False, timeout=HTTP_SECONDS) as http:
+            answer = http.request(method, f"{url}{path}", headers=headers, json=body)
+    except httpx.HTTPError as error:
+        raise _usage(f"the console at {url} does not answer: {error}") from error
+    found: dict[str, Any] = answer.json()
+    if answer.is_error:
+        raise _usage(f"{found.get('error')}: {found.get('detail')}")
+    return found
+
+
+def _say_state(state: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        sys.stdout.write(msgspec.json.encode(state).decode() + "\n")
+        return
+    words = {"off": "not recording", "failed": f"failed: {state['detail']}"}
+    running = f"recording {state['recording']}, {state['bytes'] / 1e6:.1f} MB"
+    sys.stdout.write(words.get(state["state"], running) + "\n")
+
+
+def _state(settings: Settings) -> ConsoleState:
+    try:
+        return open_state(settings)
+    except StateDirUnusable as error:
+        raise _usage(str(error)) from error
+
+
+def _shelf(settings: Settings, directory: Path | None) -> Shelf:
+    return Shelf(directory or recordings_directory(settings.recording, state_path(settings)), settings.recording)
+
+
+def _found(file: Path, settings: Settings, directory: Path | None) -> Path:
+    """`file` itself, or the recording of that id."""
+    if file.is_file():
+        return file
+    found = _shelf(settings, directory).path(file.name)
+    if found is None:
+        raise _usage(f"there is no recording {file}")
+    return found
+
+
+def _or_usage(work: Callable[[], Any]) -> Any:
+    try:
+        return work()
+    except (RecordingError, OSError, ImportError) as error:
+        raise _usage(str(error)) from error
+
+
+def _line(entry: RecordingEntry) -> str:
+    began = datetime.fromtimestamp(entry.started / 1e6).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    seconds = (entry.ended - entry.started) / 1e6
+    events = f"s={entry.first_event}–{entry.last_event}"
+    interrupted = "  interrupted" if entry.interrupted else ""
+    size = f"{entry.bytes / 1e6:.1f} MB"
+    return (
+        f"{entry.id:28}  {began}  {seconds:7.1f} s  {events:18}  {size:>10}  {entry.robot}  {entry.name}{interrupted}"
+    )
+
+
+def _in_words(verdict: Verdict) -> str:
+    lines = [f"{verdict.commands} commands, {verdict.events} events, {verdict.pictures_and_sounds} pictures and sounds"]
+    for name, check in verdict.checks.items():
+        looked = f" ({check.looked} looked at)" if check.looked else ""
+        lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name}{looked}{'' if check.ok else f': {check.count} times'}")
+        lines += [f"        s={each.event}: {each.text}" for each in check.violations[:5]]
+    return "\n".join(lines) + "\n"
+
+
+def _usage(text: str) -> typer.Exit:
+    _say(text)
+    return typer.Exit(EXIT_USAGE)
+
+
+def _say(text: str) -> None:
+    typer.echo(f"lockstep: {text}", err=True)

@@ -1,0 +1,64 @@
+"""Checks a recording file: `lockstep verify`."""
+
+from pathlib import Path
+
+from server.recording.errors import RecordingError
+from server.recording.payload import own_record_of
+from server.recording.reader import Record, RecordingReader
+from server.recording.records import RobotRecord
+from server.recording.topics import stream_of
+from server.recording.verify import Verdict, Verifier
+
+__all__ = ["verify_file"]
+
+
+def verify_file(path: Path) -> Verdict:
+    """What a recording keeps of Lockstep's promises.
+
+    Raises:
+        RecordingDamaged: it is no recording at all.
+        OSError: it cannot be read.
+    """
+    with RecordingReader(path) as reader:
+        verifier = Verifier(reader.info.epoch)
+        if reader.interrupted:
+            verifier.fail("readable", "it was interrupted, and ends where it was")
+        robots: set[str] = set()
+        counts: dict[str, int] = {}
+        ended = reader.index.started
+        for number in range(len(reader.index.chunks)):
+            try:
+                for record in reader.chunk(number):
+                    ended = max(ended, record.arrived // 1000)
+                    counts[record.topic] = counts.get(record.topic, 0) + 1
+                    _show(verifier, record, robots)
+            except RecordingError as error:
+                verifier.fail("readable", error.detail)
+        _compare(verifier, reader, counts)
+        return verifier.verdict(ended)
+
+
+def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:
+    stream = stream_of(record.topic)
+    if stream:
+        if stream in robots:  # those of the console's own go by another clock
+            verifier.medium(stream, record.event, record.arrived, record.captured)
+        return
+    own = own_record_of(record.schema, record.data)
+    if own is None:
+        return
+    if own.event != record.event:
+        text = f"{record.topic}: the record says event {own.event}, its reference {record.event}"
+        verifier.fail("monotonic", text, record.event, record.arrived // 1000)
+    if isinstance(own, RobotRecord):
+        robots.update(camera.name for camera in own.description.cameras)
+        robots.update(microphone.name for microphone in own.description.microphones)
+    verifier.record(own, record.arrived, record.captured)
+
+
+def _compare(verifier: Verifier, reader: RecordingReader, counts: dict[str, int]) -> None:
+    """The index was written with the file: what is missing since then shows."""
+    for topic in sorted({*reader.index.counts, *counts}):
+        said, found = reader.index.counts.get(topic, 0), counts.get(topic, 0)
+        if said != found:
+            verifier.fail("complete", f"{topic}: the index says {said} records, there are {found}")
