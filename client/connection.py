@@ -3,7 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from client.command_gate import CommandGate, Pacing
@@ -16,6 +16,7 @@ from client.peer import Peer, Route
 from client.pilot import Pilot
 from client.ping_ledger import PingLedger
 from client.reception import Reception
+from client.relay import RelayMedia, RelayTicket
 from client.render_log import LIMIT, FeedbackArrival
 from client.sdp import Section
 from client.session import Session
@@ -38,6 +39,7 @@ from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Stop, 
 __all__ = ["Connection", "ConnectionOptions"]
 
 HEARTBEAT = 0.5  # s between two reports, and between two pings
+RELAYED_HEARTBEAT = 5.0  # s, of an observer that nobody waits for
 EARLY_PINGS = 5  # to know the path before the first command
 EARLY_PING = 0.05  # s between them
 STOP_SECONDS = 0.3  # for the stop to be confirmed before HTTP is tried as well
@@ -64,6 +66,7 @@ class ConnectionOptions:
     route: Route | None
     tls_ca: Path | None = None
     relay_only: bool = False
+    through_relay: bool = False
 
 
 class Connection:
@@ -86,9 +89,10 @@ class Connection:
         self._heard_at = self._loop.time()
         self._running: asyncio.Task[None] | None = None
         self._peer = self._new_peer()
+        self._relay: RelayMedia | None = None
         self.session = Session(lambda channel, message: self._peer.send(channel, message), self._until)
 
-    def _new_peer(self) -> Peer:
+    def _new_peer(self, relay: str = "") -> Peer:
         options = self.options
         return Peer(
             options.link,
@@ -100,6 +104,7 @@ class Connection:
             tls_ca=options.tls_ca,
             relay_only=options.relay_only,
             on_message=self._received,
+            relay=relay,
         )
 
     # Its life
@@ -107,9 +112,15 @@ class Connection:
     async def open(self) -> None:
         """Connect; returns when the robot is known. Raises SignallingRefused or ConnectFailed."""
         deadline = self._loop.time() + self.options.connect_seconds
+        ticket = await self._peer.relay_ticket() if self.options.through_relay else None
+        if ticket is not None:
+            await self._go_through(ticket)
         sections = await self._negotiate(deadline)
-        self.media.prepare(self._peer, sections, self.options.decode)
+        if self._relay is None:
+            self.media.prepare(self._peer, sections, self.options.decode)
         await self._peer.connect(deadline - self._loop.time())
+        if self._relay is not None:
+            await self._relay.connect()
         self._heard_at = self._loop.time()
         self._peer.send("session", Rename(name=self.options.name))
         self._running = self._loop.create_task(self._run(), name="console connection")
@@ -120,6 +131,17 @@ class Connection:
             raise ConnectFailed("connected, but the console said nothing of its robot") from None
         except ConsoleLost as error:
             raise ConnectFailed(error.detail) from error
+
+    async def _go_through(self, ticket: RelayTicket) -> None:
+        """Media and feedback come from the relay; the console's connection keeps the data channels alone."""
+        wanted = {"video": self.options.video, "audio": int(self.options.audio)}
+        self.options = options = replace(self.options, video=0, audio=False, carrier="trailer")
+        self.media = Reception("trailer", options.tolerance, options.gate, self._rendered)
+        relay = self._relay = RelayMedia(ticket, self._received_from_relay)
+        await self._peer.close()
+        self._peer = self._new_peer(ticket.relay)
+        first = [each for kind in wanted for each in [s for s in ticket.streams if s.kind == kind][: wanted[kind]]]
+        self.media.prepare(relay, await relay.negotiate(lambda stream: stream in first), options.decode)
 
     async def _negotiate(self, deadline: float) -> list[Section]:
         """Try again while the console does not reach its robot."""
@@ -138,11 +160,17 @@ class Connection:
         try:
             async with asyncio.TaskGroup() as group:
                 tasks = [group.create_task(self.media.run()), group.create_task(self._heartbeat())]
+                if self._relay is not None:
+                    tasks += [group.create_task(self._relay.run()), group.create_task(self._end_with(self._relay))]
                 await self._peer.ended.wait()
                 for task in tasks:
                     task.cancel()
         finally:
             self._end(ConsoleLost(self._peer.why or "closed"))
+
+    async def _end_with(self, relay: RelayMedia) -> None:
+        await relay.ended.wait()
+        self._peer.lose(relay.why)
 
     def _end(self, lost: ConsoleLost) -> None:
         if self.lost is not None:
@@ -158,6 +186,8 @@ class Connection:
     async def close(self) -> None:
         """End everything. Idempotent."""
         await self._peer.close()
+        if self._relay is not None:
+            await self._relay.close()
         if self._running is not None:
             await self._running
         self._end(ConsoleLost("closed"))
@@ -190,9 +220,19 @@ class Connection:
                 continue
             self._peer.send("control", self._report())
             self.media.reported()
-            await asyncio.sleep(HEARTBEAT)
+            await asyncio.sleep(HEARTBEAT if self._relay is None else RELAYED_HEARTBEAT)
 
     # What the console says
+
+    def _received_from_relay(self, data: str | bytes) -> None:
+        """A relay is believed what it is asked for, and nothing else."""
+        try:
+            message = decode_server_message(data)
+        except MessageError:
+            self.malformed += 1
+            return
+        if isinstance(message, Feedback | Pong):
+            self._received(data)
 
     def _received(self, data: str | bytes) -> None:
         try:

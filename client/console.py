@@ -48,6 +48,7 @@ class Console:
         silence_seconds: without any message from the console after which it counts as lost
         tls_ca: file with a certificate to trust instead of the system's, as a console's own (tls-cert.pem)
         relay_only: through the console's TURN server or not at all
+        through_relay: an observer watches through a relay (docs/relay.md) if the console has one for it
         route: passes the connection through a relay; for measurements
     """
 
@@ -71,6 +72,7 @@ class Console:
         route: Route | None = None,
         tls_ca: str | Path | None = None,
         relay_only: bool = False,
+        through_relay: bool = False,
     ) -> None:
         if pacing == "media" and not (decode and video):
             raise ValueError("pacing by media needs decoded pictures")
@@ -93,6 +95,7 @@ class Console:
             route=route,
             tls_ca=None if tls_ca is None else Path(tls_ca),
             relay_only=relay_only,
+            through_relay=through_relay,
         )
         self._connection: Connection | None = None
 

@@ -31,6 +31,7 @@ from client.aiortc_private import (
 from client.errors import ConnectFailed, ConsoleError
 from client.ice_restart_private import IceRestart
 from client.link import ConsoleLink
+from client.relay import RelayTicket
 from client.sdp import Section, offer_extension, read_sections
 from client.whep import Whep
 from robot_bridge.protocol.carriers import (
@@ -79,6 +80,7 @@ class Peer:
         tls_ca: Path | None,
         relay_only: bool,
         on_message: Callable[[str | bytes], None],
+        relay: str = "",
     ) -> None:
         self.ended = asyncio.Event()
         self.why = ""  # the connection ended
@@ -88,6 +90,7 @@ class Peer:
         self._route = route
         self._on_message = on_message
         self._relay_only = relay_only
+        self._relay = relay  # that media come from; "": from the console
         self._ice_servers: list[RTCIceServer] = []
         self._whep = Whep(link, tls_ca)
         self._resource = ""
@@ -129,6 +132,10 @@ class Peer:
             self.ended.set()
             self._stepped.set()
 
+    async def relay_ticket(self) -> RelayTicket | None:
+        """Where the console wants this observer to watch; raises as `negotiate`."""
+        return await self._whep.relay()
+
     async def negotiate(self) -> list[Section]:
         """Offer, and take the answer: its media sections.
 
@@ -146,7 +153,7 @@ class Peer:
         await self._pc.setLocalDescription(RTCSessionDescription(offer_extension(offer.sdp, uri), "offer"))
         sdp = self._pc.localDescription.sdp
         sent = sdp if self._route is None else self._route.offer(sdp)
-        answer = await self._whep.offer(sent, trailer=self._carrier == "trailer")
+        answer = await self._whep.offer(sent, trailer=self._carrier == "trailer", relay=self._relay)
         self._resource = answer.resource
         self._answer = answer.sdp if self._route is None else self._route.answer(answer.sdp)
         return read_sections(self._answer)

@@ -12,6 +12,7 @@ from aiortc import RTCIceServer
 
 from client.errors import ConnectFailed, SignallingRefused
 from client.link import ConsoleLink
+from client.relay import RelayTicket
 
 __all__ = ["Answer", "Whep"]
 
@@ -31,6 +32,10 @@ class _IceServer(msgspec.Struct):
 
 class _IceServers(msgspec.Struct):
     ice_servers: list[_IceServer]
+
+
+class _RelayAnswer(msgspec.Struct):
+    relay: RelayTicket | None
 
 
 class _Problem(msgspec.Struct):
@@ -72,14 +77,23 @@ class Whep:
             raise SignallingRefused(response.status_code, "", "not a list of ICE servers") from error
         return [RTCIceServer(each.urls, each.username, each.credential) for each in found]
 
-    async def offer(self, sdp: str, *, trailer: bool) -> Answer:
-        """Offer, and get the answer.
+    async def relay(self) -> RelayTicket | None:
+        """Where the console wants this observer to watch; None: with itself. Raises as `offer`."""
+        response = await self._request("GET", self._base + "/api/relay")
+        try:
+            return msgspec.json.decode(response.content, type=_RelayAnswer).relay
+        except msgspec.DecodeError as error:
+            raise SignallingRefused(response.status_code, "", "not an answer about relays") from error
+
+    async def offer(self, sdp: str, *, trailer: bool, relay: str = "") -> Answer:
+        """Offer, and get the answer. `relay`: the relay that media come from.
 
         Raises:
             SignallingRefused: the console answered with an error.
             ConnectFailed: it did not answer.
         """
-        url = self._base + "/whep" + ("?stamp=trailer" if trailer else "")
+        query = f"?relay={relay}" if relay else "?stamp=trailer" if trailer else ""
+        url = self._base + "/whep" + query
         response = await self._request("POST", url, content=sdp.encode(), headers={"Content-Type": "application/sdp"})
         location = response.headers.get("Location", "")
         resource = urljoin(url, location)

@@ -5,16 +5,20 @@ by an event with the same transaction. It stands here because the console publis
 """
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from robot_bridge.protocol.errors import MessageError
 
-__all__ = ["JANUS_PROTOCOL", "VIDEO_ROOM", "Heard", "janus_request", "parse_janus"]
+__all__ = ["JANUS_PROTOCOL", "VIDEO_ROOM", "Heard", "complete_description", "janus_request", "parse_janus"]
 
 JANUS_PROTOCOL = "janus-protocol"  # WebSocket subprotocol
 VIDEO_ROOM = "janus.plugin.videoroom"
+SIZE_LINE = "a=max-message-size:65536"
+H264_FORMAT = "profile-level-id=42e01f;packetization-mode=1"
+RTPMAP_H264 = re.compile(r"a=rtpmap:(\d+) H264/")
 Kind = Literal["ack", "success", "event", "error", "ended", "other"]
 ENDED = ("hangup", "detached", "timeout")  # of a handle, or of the whole session
 
@@ -82,3 +86,17 @@ def _mapping(value: object) -> Mapping[str, Any]:
 
 def _number(value: object) -> int:
     return value if isinstance(value, int) else 0
+
+
+def complete_description(sdp: str) -> str:
+    """What Janus 1.1 leaves out: the largest data channel message (RFC 8841 6.1), and H.264's format when the feed
+    came from another Janus. aiortc starts no data channel without the one, and takes no H.264 without the other."""
+    lines: list[str] = []
+    for line in sdp.splitlines():
+        lines.append(line)
+        h264 = RTPMAP_H264.match(line)
+        if h264 and f"a=fmtp:{h264[1]} " not in sdp:
+            lines.append(f"a=fmtp:{h264[1]} {H264_FORMAT}")
+        elif line.startswith("a=sctp-port:") and "a=max-message-size:" not in sdp:
+            lines.append(SIZE_LINE)
+    return "\r\n".join(lines) + "\r\n"

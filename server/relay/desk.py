@@ -76,6 +76,7 @@ class RelayDesk:
         self._pin = ""  # of the present publication; another one with each
         self._publication: Publication | None = None
         self._wanted = asyncio.Event()
+        self._asked_at = float("-inf")  # when somebody last asked for a relay
         self._changed = asyncio.Event()  # replaced whenever a station became live or was lost
         self._watching: set[RelayedPeer] = set()  # at the last look
 
@@ -109,6 +110,7 @@ class RelayDesk:
         if not self.stations or (peer is None and not self._handout.full(now, direct)):
             self._handout.choose(now, direct, {})
             return None
+        self._asked_at = now
         self._wanted.set()
         usable = await self._usable(lost)
         watching = {station.name: 0 for station in usable}
@@ -176,7 +178,9 @@ class RelayDesk:
         return self._clock() - station.failed_at < DISTRUST_SECONDS, int(station.name)
 
     def _in_demand(self) -> bool:
-        return self._handout.expected(self._clock()) or any(each.relay for each in self._peers())
+        now = self._clock()
+        waiting = now - self._asked_at < WAIT_SECONDS or self._handout.expected(now)
+        return waiting or any(each.relay for each in self._peers())
 
     async def _carry(self, origin: Station) -> None:
         """From here into one relay, and from there into the others; returns when it ended or nobody watches."""

@@ -8,7 +8,7 @@ from typing import Protocol
 from aiortc import RTCBundlePolicy, RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
 from robot_bridge.protocol.console import StreamInfo
-from robot_bridge.protocol.janus import Heard
+from robot_bridge.protocol.janus import Heard, complete_description
 from server.channel_writer import ChannelWriter
 from server.data_transport_private import tune_data_transport
 from server.media.peer_media import PeerMedia
@@ -22,7 +22,6 @@ __all__ = ["Publication", "PublishedMedia", "publish"]
 CONNECT_SECONDS = 5.0
 CLOSE_SECONDS = 2.0
 FEEDBACK = "feedback"  # label of the data channel
-SIZE_LINE = "a=max-message-size:65536"  # the default of RFC 8841 6.1, which Janus leaves out and aiortc needs
 
 
 class PublishedMedia(Protocol):
@@ -82,7 +81,7 @@ async def publish(
         mids = [transceiver.mid or "" for transceiver in pc.getTransceivers()]
         streams = [_with_mid(stream, mid) for stream, mid in zip(given.streams, mids, strict=True)]
         names = {stream.mid: stream.stream for stream in streams}
-        answer = with_message_size(await room.publish(handle, feed, pc.localDescription.sdp, names))
+        answer = complete_description(await room.publish(handle, feed, pc.localDescription.sdp, names))
         publication = Publication(feed, streams, writer)
         found.append(publication)
         await _connect(pc, answer, publication)
@@ -121,14 +120,6 @@ async def _connect(pc: RTCPeerConnection, answer: str, publication: Publication)
         raise RelaySilent("no path for media") from error
     if publication.ended.is_set():
         raise RelaySilent(publication.why)
-
-
-def with_message_size(sdp: str) -> str:
-    if "a=max-message-size:" in sdp:
-        return sdp
-    return "".join(
-        f"{line}\r\n{SIZE_LINE}\r\n" if line.startswith("a=sctp-port:") else f"{line}\r\n" for line in sdp.splitlines()
-    )
 
 
 def _with_mid(stream: StreamInfo, mid: str) -> StreamInfo:

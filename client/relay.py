@@ -1,0 +1,235 @@
+"""Watching through a Janus: pictures, sound and feedback come from there, everything else from the console."""
+
+import asyncio
+import itertools
+import secrets
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+from aiortc import RTCBundlePolicy, RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import InvalidHandshake, WebSocketException
+from websockets.typing import Subprotocol
+
+from client.aiortc_private import PacketSink, drain_dtls, hasten_sctp, send_control, take_packets, take_raw_rtp
+from client.errors import ConnectFailed
+from client.sdp import Section, read_sections
+from robot_bridge.protocol.console import StreamInfo
+from robot_bridge.protocol.errors import MessageError
+from robot_bridge.protocol.janus import (
+    JANUS_PROTOCOL,
+    VIDEO_ROOM,
+    Heard,
+    complete_description,
+    janus_request,
+    parse_janus,
+)
+
+__all__ = ["RelayMedia", "RelayTicket"]
+
+ANSWER_SECONDS = 5.0
+KEEPALIVE_SECONDS = 25.0  # Janus forgets a session after 60 s
+SILENCE_SECONDS = 1.5  # without a word on the feedback channel; the console says something there every 0.4 s
+MAX_MESSAGE = 256 * 1024  # bytes
+
+
+class RelayTicket(msgspec.Struct, frozen=True, kw_only=True):
+    """What GET /api/relay answers."""
+
+    engine: str
+    relay: str
+    url: str
+    room: int
+    pin: str
+    feed: int
+    streams: list[StreamInfo]
+
+
+class RelayMedia:
+    """Order: `negotiate`, then `take_packets` or `take_raw_rtp`, then `connect`; `run` until `ended`, then `close`."""
+
+    def __init__(self, ticket: RelayTicket, on_message: Callable[[str | bytes], None]) -> None:
+        self.ended = asyncio.Event()
+        self.why = ""
+        self._ticket = ticket
+        self._on_message = on_message
+        self._socket: ClientConnection | None = None
+        self._session: int | None = None
+        self._handle: int | None = None
+        self._numbers = itertools.count(1)
+        self._prefix = secrets.token_hex(4)
+        self._heard = asyncio.Event()
+        self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
+        self._pc.on("datachannel", self._listen)
+        self._pc.on("connectionstatechange", self._state_changed)
+
+    async def negotiate(self, wanted: Callable[[StreamInfo], bool] = lambda _: True) -> list[Section]:
+        """Subscribe: the sections of what will come. Raises ConnectFailed."""
+        try:
+            self._socket = await connect(
+                self._ticket.url,
+                subprotocols=[Subprotocol(JANUS_PROTOCOL)],
+                open_timeout=ANSWER_SECONDS,
+                max_size=MAX_MESSAGE,
+                ping_interval=None,
+                proxy=None,
+            )
+        except (OSError, TimeoutError, InvalidHandshake) as error:
+            raise ConnectFailed(f"no relay at {self._ticket.url} ({error or type(error).__name__})") from error
+        self._session = _identifier(await self._ask("create"))
+        self._handle = _identifier(await self._ask("attach", plugin=VIDEO_ROOM))
+        streams = [stream for stream in self._ticket.streams if wanted(stream)]
+        mids = [stream.mid for stream in streams] + [str(len(self._ticket.streams))]  # feedback is the last
+        body = {
+            "request": "join",
+            "ptype": "subscriber",
+            "room": self._ticket.room,
+            "pin": self._ticket.pin,
+            "streams": [{"feed": self._ticket.feed, "mid": mid} for mid in mids],
+        }
+        heard = await self._ask("message", body=body)
+        if heard.jsep is None:
+            raise ConnectFailed("the relay offered nothing")
+        offer = complete_description(str(heard.jsep["sdp"]))
+        try:
+            await self._pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
+        except Exception as error:
+            # aiortc has no error of its own for an offer that it cannot use.
+            raise ConnectFailed(f"the relay's offer cannot be used: {error}") from error
+        # Janus tells a subscriber of data only when the subscriber has a channel of its own.
+        self._listen(self._pc.createDataChannel("feedback", ordered=False, maxRetransmits=0))
+        hasten_sctp(self._pc)
+        drain_dtls(self._pc)
+        return _named(read_sections(offer), heard.data, {stream.mid: stream.stream for stream in streams})
+
+    def extension_id(self, sections: list[Section]) -> int | None:
+        """The stamp is behind the frame."""
+        return None
+
+    def take_packets(self, sinks: dict[str, PacketSink], extension_id: int | None) -> None:
+        take_packets(self._pc, sinks, extension_id, lambda _: None)
+
+    def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
+        take_raw_rtp(self._pc, take, control)
+
+    async def send_control(self, packet: bytes) -> None:
+        await send_control(self._pc, packet)
+
+    async def connect(self) -> None:
+        """Returns when feedback can come. Raises ConnectFailed."""
+        await self._pc.setLocalDescription(await self._pc.createAnswer())
+        jsep = {"type": "answer", "sdp": self._pc.localDescription.sdp}
+        await self._ask("message", body={"request": "start"}, jsep=jsep)
+        try:
+            async with asyncio.timeout(ANSWER_SECONDS):
+                await self._heard.wait()
+        except TimeoutError:
+            raise ConnectFailed("nothing came from the relay: is UDP between here and there blocked?") from None
+
+    async def run(self) -> None:
+        """Until cancelled: keeps the session, and notices when the relay is gone."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._listen_to_events())
+            tasks.create_task(self._keep_alive())
+            tasks.create_task(self._watch())
+
+    async def close(self) -> None:
+        """Idempotent."""
+        self.ended.set()
+        await self._pc.close()
+        if self._socket is not None:
+            await self._socket.close()
+
+    def _listen(self, channel: RTCDataChannel) -> None:
+        channel.on("message", self._received)
+
+    def _received(self, data: str | bytes) -> None:
+        self._heard.set()
+        self._on_message(data)
+
+    def _state_changed(self) -> None:
+        if self._pc.connectionState in ("failed", "closed"):
+            self._lose("the relay closed the connection")
+
+    def _lose(self, why: str) -> None:
+        if not self.ended.is_set():
+            self.why = why
+            self.ended.set()
+
+    async def _ask(self, kind: str, **fields: Any) -> Heard:
+        """Before `run`, which reads what comes afterwards."""
+        transaction = f"{self._prefix}-{next(self._numbers)}"
+        if self._socket is None:
+            raise ConnectFailed("not connected to the relay")
+        try:
+            async with asyncio.timeout(ANSWER_SECONDS):
+                await self._socket.send(self._request(kind, transaction, **fields))
+                while True:
+                    heard = parse_janus(await self._socket.recv())
+                    if heard.transaction == transaction and heard.kind != "ack":
+                        break
+        except (TimeoutError, WebSocketException, MessageError) as error:
+            raise ConnectFailed(f"the relay did not answer ({type(error).__name__})") from error
+        if heard.kind == "error":
+            raise ConnectFailed(f"the relay refused: {heard.detail}")
+        return heard
+
+    def _request(self, kind: str, transaction: str, **fields: Any) -> str:
+        return janus_request(kind, transaction, session_id=self._session, handle_id=self._handle, **fields)
+
+    async def _listen_to_events(self) -> None:
+        if self._socket is None:
+            return
+        try:
+            async for text in self._socket:
+                if _ends(text):
+                    self._lose("the relay ended the subscription")
+        except WebSocketException:
+            pass  # told below
+        self._lose("the connection to the relay was closed")
+
+    async def _keep_alive(self) -> None:
+        while self._socket is not None:
+            await asyncio.sleep(KEEPALIVE_SECONDS)
+            text = janus_request("keepalive", f"{self._prefix}-{next(self._numbers)}", session_id=self._session)
+            try:
+                await self._socket.send(text)
+            except WebSocketException:
+                return  # the listener says so
+
+    async def _watch(self) -> None:
+        while not self.ended.is_set():
+            self._heard.clear()
+            try:
+                async with asyncio.timeout(SILENCE_SECONDS):
+                    await self._heard.wait()
+            except TimeoutError:
+                self._lose(f"nothing came from the relay for {SILENCE_SECONDS:g} s")
+
+
+def _ends(text: str | bytes) -> bool:
+    try:
+        return parse_janus(text).kind == "ended"
+    except MessageError:
+        return False
+
+
+def _identifier(heard: Heard) -> int:
+    found = heard.data.get("id")
+    if not isinstance(found, int):
+        raise ConnectFailed("the relay's answer has no id")
+    return found
+
+
+def _named(sections: list[Section], data: dict[str, Any], names: dict[str, str]) -> list[Section]:
+    """The sections with their streams' names, which Janus tells beside its offer."""
+    streams = data.get("streams")
+    by_mid = {
+        str(each.get("mid")): names.get(str(each.get("feed_mid")), "")
+        for each in (streams if isinstance(streams, list) else [])
+        if isinstance(each, dict)
+    }
+    for section in sections:
+        section.stream = by_mid.get(section.mid, "")
+    return sections
