@@ -9,7 +9,7 @@
     effects,
     playEffect: (type, effect) => {
       if (!effects.includes(type)) return Promise.reject(new DOMException("no such effect", "NotSupportedError"));
-      window.testPad.rumbles.push({ type, pad: index, ...effect });
+      window.testPad.rumbles.push({ type, pad: index, noted: window.testPad.onplay?.(), ...effect });
       window.testPad.felt.push(type);
       return Promise.resolve("complete");
     },
@@ -20,6 +20,7 @@
   });
 
   window.testPad = {
+    onplay: undefined, // what it returns stays with the effect
     rumbles: [],
     felt: [],
     // Plugs in another pad; returns its index.

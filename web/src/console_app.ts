@@ -11,7 +11,6 @@ import {
   note,
   robotIsUp,
 } from "./core/console_state";
-import { forceOf } from "./core/contact";
 import { capHolds, cappedShare, viewDelay } from "./core/speed_cap";
 import { STALE_MS } from "./core/freshness";
 import { notePicture } from "./core/latency";
@@ -65,10 +64,9 @@ export class ConsoleApp {
   values: readonly number[] = []; // commanded now
   viewDelayMs: number | null = null; // how late the pictures are now; null: not known
   speedShare = 1; // of full speed that the cap leaves
-  force = 0; // N
   firstPictureMs: number | null = null;
   private readonly reader = StampReader.isSupported() ? new StampReader() : null;
-  private readonly feeling = new ContactFeeling(this.audio);
+  readonly touch = new ContactFeeling(this);
   private readonly disposal = new Disposal();
   private peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
@@ -160,7 +158,7 @@ export class ConsoleApp {
   disarm(reason: arming.DisarmReason): void {
     if (!arming.disarm(this.arming, reason)) return;
     this.controls.release();
-    this.feeling.still();
+    this.touch.still();
     if (this.driver !== null) driver.driverDisarm(this.driver, performance.now());
     this.drive(performance.now());
     this.page.armedChanged();
@@ -208,7 +206,7 @@ export class ConsoleApp {
     this.connection.close();
     this.room.close();
     this.reader?.close();
-    this.feeling.close();
+    this.touch.close();
     await this.audio.close();
   }
 
@@ -242,6 +240,7 @@ export class ConsoleApp {
 
   private connectionClosed(): void {
     this.disarm("connection_lost");
+    this.touch.forget();
     this.peer = null;
     this.driver = null;
     this.room.close();
@@ -288,7 +287,7 @@ export class ConsoleApp {
   private tookFeedback(feedback: Feedback, before: Feedback | null, now: number): void {
     if (before?.event !== feedback.event) noteHappening(this.events, now);
     this.measuredMs = now;
-    this.force = forceOf(feedback.wrench);
+    this.touch.took(feedback, now);
     if (this.driver !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
     this.drive(now);
     this.room.changed();
@@ -342,7 +341,7 @@ export class ConsoleApp {
     this.room.listen();
     this.stopping.step(this.state.stop.stopped, now);
     this.charts.step(now);
-    if (this.feeling.isDue(now)) this.feel(now);
+    this.touch.step(now);
     if (this.state.welcome !== null) this.pulse.step(now);
     this.connection.step(now);
   }
@@ -377,16 +376,6 @@ export class ConsoleApp {
 
   private tell(channel: ChannelName, message: ClientMessage): boolean {
     return this.connection.send(channel, JSON.stringify(message));
-  }
-
-  /** Force is felt only while driving is possible. */
-  private feel(now: number): void {
-    const { visible, stopped, connected } = this.conditions(now);
-    const mayFeel = visible && connected && !stopped;
-    const sensor = mayFeel ? (this.state.robot?.description.wrench ?? null) : null;
-    const pad = this.isArmed() ? (this.controls.pad.state?.gamepad ?? null) : null;
-    const audible = this.state.settings.contactTone && this.room.isAudible();
-    this.feeling.feel({ force: this.force, sensor, pad, audible }, now);
   }
 
   private drawn(stream: VideoStream, stamp: number | null, at: number): void {

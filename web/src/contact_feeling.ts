@@ -1,47 +1,71 @@
-import { contactStrength } from "./core/contact";
+import type { ConsoleApp } from "./console_app";
+import { contactStrength, feelingOf, forceOf } from "./core/contact";
+import { clearTrace, createForceTrace, noteForce } from "./core/force_trace";
 import { Rumble } from "./input/rumble";
-import type { AudioDesk } from "./media/audio_desk";
 import { ContactTone } from "./media/contact_tone";
-import type { WrenchSensor } from "./wire";
+import type { Feedback, ForceFeeling } from "./wire";
 
-const FEEL_MS = 50;
+const REFRESH_MS = 50;
+const FELT_MS = 1000; // a force that was measured longer ago is not felt
 
-/** What of a contact may be felt and heard now. */
-export interface Feeling {
-  readonly force: number; // N
-  readonly sensor: WrenchSensor | null; // null: nothing may be felt
-  readonly pad: Gamepad | null; // null: not by rumble
-  readonly audible: boolean;
-}
-
-/** Lets the operator feel a contact as rumble and hear it as a tone. */
+/** Lets the operator feel a contact as rumble and hear it as a tone: from the feedback itself, before any picture of it. */
 export class ContactFeeling {
+  readonly trace = createForceTrace();
+  private force = 0; // N
   private readonly rumble = new Rumble();
   private readonly tone: ContactTone;
   private dueMs = 0;
 
-  constructor(audio: AudioDesk) {
-    this.tone = new ContactTone(audio);
+  constructor(private readonly app: ConsoleApp) {
+    this.tone = new ContactTone(app.audio);
   }
 
-  isDue(now: number): boolean {
-    return now >= this.dueMs;
+  took(feedback: Feedback, now: number): void {
+    this.force = forceOf(feedback.wrench);
+    noteForce(this.trace, feedback.event, this.force);
+    this.feel(now);
   }
 
-  feel({ force, sensor, pad, audible }: Feeling, now: number): void {
-    this.dueMs = now + FEEL_MS;
-    const strength = sensor === null ? 0 : contactStrength(force, sensor);
-    this.rumble.feel(pad, strength, now);
-    this.tone.sound(audible ? strength : 0);
+  /** Called at a fixed rate: effects end by themselves and are renewed. */
+  step(now: number): void {
+    if (now >= this.dueMs) this.feel(now);
   }
 
-  /** No more rumble until the next feeling. */
+  /** Nothing is felt or heard until the next feeling. */
   still(): void {
     this.rumble.stop();
+    this.tone.sound(0);
+  }
+
+  /** What was felt belonged to a connection that ended. */
+  forget(): void {
+    this.still();
+    this.force = 0;
+    clearTrace(this.trace);
   }
 
   close(): void {
     this.still();
     this.tone.close();
+  }
+
+  private feel(now: number): void {
+    this.dueMs = now + REFRESH_MS;
+    const { app } = this;
+    const { settings } = app.state;
+    const by = this.feeling(now);
+    const strength = by === null ? 0 : contactStrength(this.force, by);
+    const pad = settings.rumble && app.isArmed() ? app.controls.pad.state : null;
+    this.rumble.feel(pad?.gamepad ?? null, strength, now);
+    this.tone.sound(settings.contactTone && app.room.isAudible() ? strength : 0);
+  }
+
+  /** How a contact feels; null while nothing may be felt. */
+  private feeling(now: number): ForceFeeling | null {
+    const { visible, stopped, connected } = this.app.conditions(now);
+    const { robot } = this.app.state;
+    const { measuredMs } = this.app;
+    if (!visible || stopped || !connected || robot === null) return null;
+    return measuredMs !== null && now - measuredMs < FELT_MS ? feelingOf(robot.description) : null;
   }
 }

@@ -42,6 +42,8 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     position_limits: [],
     planar_base: null,
     geofences: [],
+    force_feeling: null,
+    body_twists: [],
     hold: 0.3,
     max_event_age: 2,
     max_event_rate: 25,

@@ -28,6 +28,7 @@ export interface Settings {
   gate: GateMode; // "off" and "age" are what the rule is compared with
   speedCap: boolean; // slower the later the picture
   contactTone: boolean;
+  rumble: boolean;
   soundWanted: boolean;
 }
 
@@ -73,6 +74,7 @@ export function createConsoleState(): ConsoleState {
       gate: "event",
       speedCap: false,
       contactTone: false,
+      rumble: true,
       soundWanted: true,
     },
     log: [],

@@ -1,34 +1,68 @@
-/** Lets the pad rumble with the contact force. */
-const EFFECT_MS = 140;
-const REPEAT_MS = 90;
+import {
+  createRumblePlan,
+  planRumble,
+  stopRumble,
+  type RumbleEffect,
+  type RumbleOrder,
+} from "../core/rumble_plan";
 
+/** Lets one pad at a time rumble with the contact force: its triggers too where it has motors in them. */
 export class Rumble {
-  private lastMs = -Infinity;
-  private actuator: GamepadHapticActuator | null = null;
+  private plan = createRumblePlan();
+  private pad: {
+    readonly index: number;
+    readonly id: string;
+    readonly actuator: GamepadHapticActuator;
+  } | null = null;
 
   /** `strength`: 0 to 1. `gamepad` is null when nothing may be felt. */
   feel(gamepad: Gamepad | null, strength: number, now: number): void {
-    const actuator = gamepad?.vibrationActuator ?? null;
-    if (actuator === null || strength <= 0) {
+    const actuator = gamepad === null ? null : actuatorOf(gamepad);
+    if (gamepad === null || actuator === null) {
       this.stop();
       return;
     }
-    if (now - this.lastMs < REPEAT_MS) return;
-    this.lastMs = now;
-    this.actuator = actuator;
-    const effect = {
-      duration: EFFECT_MS,
-      strongMagnitude: strength,
-      weakMagnitude: Math.min(1, 0.25 + strength),
-    };
-    // A pad may refuse an effect it does not have, or be preempted by the next one.
-    actuator.playEffect("dual-rumble", effect).catch(() => undefined);
+    if (this.pad !== null && (this.pad.index !== gamepad.index || this.pad.id !== gamepad.id)) this.stop();
+    this.pad = { index: gamepad.index, id: gamepad.id, actuator };
+    this.carryOut(planRumble(this.plan, strength, now));
   }
 
   stop(): void {
-    if (this.actuator === null) return;
-    this.actuator.reset().catch(() => undefined);
-    this.actuator = null;
-    this.lastMs = -Infinity;
+    this.carryOut(stopRumble(this.plan));
+    this.pad = null;
   }
+
+  private carryOut(order: RumbleOrder): void {
+    if (this.pad === null || order.kind === "keep") return;
+    const { actuator } = this.pad;
+    // A pad that is gone, or lacks the effect, refuses it; one that is preempted by the next says so.
+    const done = order.kind === "play" ? play(actuator, order.effect) : reset(actuator);
+    done.catch(() => undefined);
+  }
+}
+
+/** What browsers with the older interface have instead. */
+interface PulseActuator extends GamepadHapticActuator {
+  pulse?(value: number, duration: number): Promise<boolean>;
+}
+
+function actuatorOf(gamepad: Gamepad): GamepadHapticActuator | null {
+  const { vibrationActuator, hapticActuators } = gamepad as {
+    vibrationActuator?: GamepadHapticActuator | null;
+    hapticActuators?: readonly GamepadHapticActuator[];
+  };
+  return vibrationActuator ?? hapticActuators?.[0] ?? null;
+}
+
+function play(actuator: PulseActuator, effect: RumbleEffect): Promise<unknown> {
+  if (!("playEffect" in actuator))
+    return (actuator as PulseActuator).pulse?.(effect.weakMagnitude, effect.duration) ?? Promise.resolve();
+  const effects = (actuator as { effects?: readonly string[] }).effects ?? [];
+  const kind = effects.includes("trigger-rumble") ? "trigger-rumble" : "dual-rumble";
+  return actuator.playEffect(kind, effect);
+}
+
+function reset(actuator: PulseActuator): Promise<unknown> {
+  if ("reset" in actuator) return actuator.reset();
+  return (actuator as PulseActuator).pulse?.(0, 0) ?? Promise.resolve();
 }

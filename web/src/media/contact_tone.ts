@@ -1,5 +1,7 @@
 import type { AudioDesk } from "./audio_desk";
 
+const LASTS_SECONDS = 0.3;
+
 /** A tone that rises with the contact force, for operators who look elsewhere. */
 export class ContactTone {
   private voice: { oscillator: OscillatorNode; gain: GainNode } | null = null;
@@ -12,7 +14,10 @@ export class ContactTone {
     this.voice ??= this.createVoice();
     const { oscillator, gain } = this.voice;
     const now = gain.context.currentTime;
+    gain.gain.cancelScheduledValues(now);
     gain.gain.setTargetAtTime(strength > 0 ? 0.04 + 0.1 * strength : 0, now, 0.02);
+    // It ends by itself: a page that stands still must not go on sounding a contact that is over.
+    if (strength > 0) gain.gain.setTargetAtTime(0, now + LASTS_SECONDS, 0.02);
     if (strength > 0) oscillator.frequency.setTargetAtTime(220 + 660 * strength, now, 0.02);
   }
 

@@ -1,9 +1,13 @@
-import { contactStrength, forceOf } from "../core/contact";
+import { contactStrength, feelingOf, forceOf } from "../core/contact";
+import { TRACE_EVENTS, tracePath } from "../core/force_trace";
 import { quantity, scaleFor } from "../core/units";
 import type { ConsoleApp } from "../console_app";
+import type { ForceFeeling } from "../wire";
 import { h, setData, setHidden, setText, svg, type Panel } from "./dom";
 import { createStaleMark } from "./stale_mark";
 
+const TRACE_WIDTH = 120;
+const TRACE_HEIGHT = 28;
 const REACH = 44; // of the arrow, in the drawing's units
 
 /**
@@ -25,6 +29,7 @@ export function createForceGauge(app: ConsoleApp, onContact: boolean): Panel {
   const fill = h("span", "meter-fill");
   const threshold = h("span", "meter-mark");
   const meter = h("span", "meter", { "aria-hidden": "true" }, fill, threshold);
+  const trace = createTrace();
   const element = h(
     "div",
     onContact ? "gauge force contact" : "gauge force",
@@ -34,6 +39,7 @@ export function createForceGauge(app: ConsoleApp, onContact: boolean): Panel {
     value,
     stale.element,
     meter,
+    trace.element,
   );
   return {
     element,
@@ -42,15 +48,42 @@ export function createForceGauge(app: ConsoleApp, onContact: boolean): Panel {
       const sensor = app.state.robot?.description.wrench ?? null;
       const wrench = app.state.feedback?.wrench ?? [];
       const force = forceOf(wrench);
-      const strength = sensor === null ? 0 : contactStrength(force, sensor);
+      const description = app.state.robot?.description;
+      const feeling = description === undefined ? null : feelingOf(description);
+      const strength = feeling === null ? 0 : contactStrength(force, feeling);
       setHidden(element, sensor === null || wrench.length < 3 || (onContact && strength === 0));
-      if (sensor === null) return;
+      if (sensor === null || feeling === null) return;
+      trace.show(tracePath(app.touch.trace, feeling.full_newtons, TRACE_WIDTH, TRACE_HEIGHT), feeling);
       setData(element, "tone", strength >= 0.7 ? "bad" : strength > 0 ? "wait" : "good");
       arrow.setAttribute("d", arrowPath(wrench[0] ?? 0, wrench[1] ?? 0, sensor.full_scale_force));
       const scale = scaleFor("N", sensor.full_scale_force);
       setText(value, quantity(force, { ...scale, digits: force * scale.factor < 100 ? 1 : 0 }));
       fill.style.width = `${Math.min(100, (100 * force) / sensor.full_scale_force).toFixed(1)}%`;
       threshold.style.left = `${((100 * sensor.threshold_force) / sensor.full_scale_force).toFixed(1)}%`;
+    },
+  };
+}
+
+/** The force over the last events, between nothing and what is felt at its strongest. */
+function createTrace(): { element: SVGElement; show(path: string, feeling: ForceFeeling): void } {
+  const area = svg("path", { class: "trace-area" });
+  const threshold = svg("line", { x1: "0", x2: String(TRACE_WIDTH), class: "trace-threshold" });
+  const element = svg("svg", {
+    viewBox: `0 0 ${TRACE_WIDTH} ${TRACE_HEIGHT}`,
+    preserveAspectRatio: "none",
+    class: "force-trace",
+    role: "img",
+    "aria-label": `Force over the last ${TRACE_EVENTS} events`,
+  });
+  element.append(area, threshold);
+  return {
+    element,
+    show(path, feeling) {
+      if (area.getAttribute("d") !== path) area.setAttribute("d", path);
+      const level = (TRACE_HEIGHT * (1 - feeling.threshold_newtons / feeling.full_newtons)).toFixed(1);
+      if (threshold.getAttribute("y1") === level) return;
+      threshold.setAttribute("y1", level);
+      threshold.setAttribute("y2", level);
     },
   };
 }

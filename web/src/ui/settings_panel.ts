@@ -14,6 +14,7 @@ export function createSettingsPanel(app: ConsoleApp): Panel {
     createStepper(app, "Sound tolerance", "audio"),
     createPacing(app),
     createCap(app),
+    createFlag(app, "Rumble", "rumble", "The gamepad rumbles with the force, while armed"),
     createFlag(app, "Contact tone", "contactTone", "A tone that rises with the force"),
     createGate(app),
   ];
@@ -69,7 +70,7 @@ function createPacing(app: ConsoleApp): Part {
   };
 }
 
-function createFlag(app: ConsoleApp, label: string, name: "contactTone", about: string): Part {
+function createFlag(app: ConsoleApp, label: string, name: "contactTone" | "rumble", about: string): Part {
   const { settings } = app.state;
   return createSwitch(
     app,
