@@ -84,7 +84,7 @@ async def session(request: Request, caller: Caller) -> Response:
             you={"role": caller.role, "name": caller.name},
             peers={peer.id: peer.streams for peer in console.peers},
             streams=services(request).media.offers,
-            voice=services(request).media.takes_voice,
+            voice=services(request).voice.enabled,
             description=console.robot.description,
             feedback=console.clock.feedback,
         )

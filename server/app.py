@@ -39,6 +39,7 @@ from server.security import SAFE_METHODS, SecurityHeaders, check_origin
 from server.services import Services, services
 from server.settings import Settings
 from server.state import ConsoleState, open_state
+from server.voice import VoiceService
 
 __all__ = ["create_app"]
 
@@ -76,17 +77,28 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
         )
         if sources.sources:
             console.further_news.append(sources.state)
+        voice = VoiceService(
+            settings.speaker_spec,
+            console.seat.rules.holds,
+            metrics.registry,
+            lambda news: console.peers.tell("session", news),
+        )
+        if voice.enabled:
+            console.further_news.append(voice.state)
         follow_clock(console.clock)
         audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
         warden = LinkWarden(opened.invitations, console.peers, console.audit, metrics)
         guard = Guard(settings)
-        app.state.services = Services(settings, metrics, console, media, opened, audit, warden, guard, scene, relays)
+        app.state.services = Services(
+            settings, metrics, console, media, opened, audit, warden, guard, scene, relays, voice
+        )
         try:
             async with asyncio.TaskGroup() as tasks:
                 running = [
                     tasks.create_task(console.run(), name="console"),
                     tasks.create_task(warden.run(), name="links"),
                     tasks.create_task(sources.run(), name="sources"),
+                    tasks.create_task(voice.run(), name="voice"),
                     tasks.create_task(recorder.run(), name="recorder"),
                     tasks.create_task(relays.run(), name="relays"),
                 ]

@@ -30,7 +30,9 @@ from server.cli_options import (
     Microphones,
     ObserversDirect,
     PublicUrl,
+    Record,
     Relay,
+    Speaker,
     SpeedCap,
     Stun,
     Tls,
@@ -39,6 +41,7 @@ from server.cli_options import (
     Turn,
     TurnSecret,
 )
+from server.cli_recordings import add_recording_commands
 from server.console_address import write_address
 from server.guarded_http import guarded_by
 from server.link_access import link_access
@@ -104,8 +107,10 @@ def up(
     ice_host: IceHosts = None,
     camera: Cameras = None,
     microphone: Microphones = None,
+    speaker: Speaker = None,
     quality: Quality = None,
     speed_cap: SpeedCap = None,
+    record: Record = None,
     relay: Relay = None,
     observers_direct: ObserversDirect = None,
     public_url: PublicUrl = None,
@@ -130,7 +135,9 @@ def up(
         media=_media(quality),
         cameras=_words(camera),
         microphones=_words(microphone),
+        speaker=speaker,
         speed_cap=speed_cap,
+        recording=_recording(record),
         relay=relay,
         observers_direct=observers_direct,
         log_format=log_format,
@@ -161,8 +168,10 @@ def serve(
     ice_host: IceHosts = None,
     camera: Cameras = None,
     microphone: Microphones = None,
+    speaker: Speaker = None,
     quality: Quality = None,
     speed_cap: SpeedCap = None,
+    record: Record = None,
     relay: Relay = None,
     observers_direct: ObserversDirect = None,
     public_url: PublicUrl = None,
@@ -192,7 +201,9 @@ def serve(
         media=_media(quality),
         cameras=_words(camera),
         microphones=_words(microphone),
+        speaker=speaker,
         speed_cap=speed_cap,
+        recording=_recording(record),
         relay=relay,
         observers_direct=observers_direct,
         log_format=log_format,
@@ -209,6 +220,10 @@ def _media(quality: Switch | None) -> dict[str, bool] | None:
 def _words(texts: list[str] | None) -> tuple[str, ...] | None:
     """As a setting that is given several times, and may hold any character."""
     return tuple(texts) if texts else None
+
+
+def _recording(directory: Record) -> dict[str, object] | None:
+    return None if directory is None else {"directory": directory, "automatic": True}
 
 
 def _network(
@@ -353,6 +368,7 @@ async def _announce(here: Services, links: ConsoleLinks, as_json: bool) -> None:
 
 
 add_access_commands(app, _settings)
+add_recording_commands(app, _settings)
 
 
 def _say(text: str) -> None:

@@ -190,7 +190,9 @@ class Console:
         elif channel == "stop":
             peer.send("stop", StopStateNotice(stop=self.clock.stop, event=self.clock.event))
         elif channel == "session":
-            peer.send("session", Welcome(peer=peer.id, role=peer.role, name=peer.name, streams=peer.streams))
+            peer.send(
+                "session", Welcome(peer=peer.id, role=peer.role, name=peer.name, streams=peer.streams, voice=peer.voice)
+            )
             if self.robot.description is not None:
                 peer.send("session", self.state_of_robot(self.robot.description))
             peer.send("session", self.seat.message())

@@ -62,6 +62,8 @@ class PeerStreams(Protocol):
     @property
     def streams(self) -> list[StreamInfo]: ...
     @property
+    def voice(self) -> str: ...
+    @property
     def tier(self) -> Tier | None: ...
     @property
     def loss(self) -> float | None: ...
@@ -137,6 +139,11 @@ class Peer:
     @property
     def streams(self) -> list[StreamInfo]:
         return self._media.streams
+
+    @property
+    def voice(self) -> str:
+        """The media section in which its voice is taken; "" when it is not."""
+        return self._media.voice
 
     async def run(self) -> None:
         structlog.contextvars.bind_contextvars(peer=self.id)

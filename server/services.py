@@ -17,6 +17,7 @@ from server.relay.desk import RelayDesk
 from server.scene import SceneView
 from server.settings import Settings
 from server.state import ConsoleState
+from server.voice import VoiceService
 
 __all__ = ["Services", "authorized", "services"]
 
@@ -33,6 +34,7 @@ class Services:
     guard: Guard
     scene: SceneView | None  # None when it is switched off or could not start
     relays: RelayDesk
+    voice: VoiceService
 
     @property
     def access(self) -> Access:

@@ -155,7 +155,14 @@ async def _negotiate(
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
             await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
             tune_data_transport(pc)
-            media = here.media.attach(pc, offer, priority=identity.role == "operator", trailer=trailer)
+            line = here.voice.line(identity.role)
+            media = here.media.attach(
+                pc,
+                offer,
+                priority=identity.role == "operator",
+                trailer=trailer,
+                voice=None if line is None else line.take,
+            )
             try:
                 # Before the answer: the first events can come while it is still on its way.
                 refused = here.metrics.bad_input.labels
@@ -167,6 +174,8 @@ async def _negotiate(
                     lambda name: refused("transport", name).inc(),
                 )
                 peer = Peer(pc, media, session, identity, here.console, here.settings)
+                if line is not None:
+                    line.peer = peer
                 guard_data(pc, peer.transport_refused)
                 await pc.setLocalDescription(await pc.createAnswer())
             except BaseException:

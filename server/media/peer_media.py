@@ -29,6 +29,7 @@ class PeerMedia:
         self, deliveries: list[Delivery], quality: PeerQuality, on_close: Callable[["PeerMedia"], None]
     ) -> None:
         self.quality = quality
+        self.voice = ""  # mid of the section in which the peer's own sound is taken; "" when it is not
         self._deliveries = deliveries
         self._on_close = on_close
 

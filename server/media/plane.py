@@ -40,6 +40,7 @@ from server.media.recorded_output import FrameTaker, RecordedOutput
 from server.media.settings import MediaSettings
 from server.media.sources.source_url import SourceSpec
 from server.media.video_stream import VideoStream
+from server.media.voice_private import VoicePacket, take_voice
 
 __all__ = ["MediaPlane", "MediaSettings", "PeerMedia"]
 
@@ -67,7 +68,6 @@ class MediaPlane:
         self._settings = settings
         self._attached = {spec.name: spec for spec in attached}
         self._stream_names: dict[str, str] = {}  # of those, by the source's name
-        self.takes_voice = False  # whether the voice of who holds the seat is taken
         self._metrics = MediaMetrics(metrics_registry)
         self._wall_clock = wall_clock
         self._capture_clock = CaptureClock()
@@ -169,12 +169,21 @@ class MediaPlane:
         """The streams that a peer can ask for, in the order of an offer's sections of their kind."""
         return [StreamOffer(stream=each.name, label=each.label, kind=each.kind) for each in self._streams.values()]
 
-    def attach(self, pc: RTCPeerConnection, offer_sdp: str, *, priority: bool, trailer: bool) -> PeerMedia:
+    def attach(
+        self,
+        pc: RTCPeerConnection,
+        offer_sdp: str,
+        *,
+        priority: bool,
+        trailer: bool,
+        voice: Callable[[VoicePacket], None] | None = None,
+    ) -> PeerMedia:
         """Give a peer its streams. Call after setRemoteDescription(offer), before createAnswer.
 
         The i-th video section gets the i-th camera, the i-th audio section the i-th microphone; sections without
         one, or without a codec in common, are answered inactive. `priority` is for the operator: served first and at
-        once. `trailer` asks for the trailer carrier; otherwise the offer's header extensions decide.
+        once. `trailer` asks for the trailer carrier; otherwise the offer's header extensions decide. `voice` takes
+        the peer's own sound, from the first audio section in which it would only send.
         """
         guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc())
         extensions = offered_extensions(offer_sdp)
@@ -185,6 +194,12 @@ class MediaPlane:
         deliveries: list[Delivery] = []
         peer = PeerMedia(deliveries, self._peer_quality(pc, priority), self._detached)
         for transceiver in pc.getTransceivers():
+            if offered_direction(transceiver) == "recvonly":  # it would send
+                transceiver.direction = "inactive"
+                wanted = voice is not None and transceiver.kind == "audio" and not peer.voice
+                if wanted and voice is not None and take_voice(transceiver, voice):
+                    peer.voice = transceiver.mid or ""
+                continue
             stream = next(sources[transceiver.kind], None)
             codec = None
             if stream is not None and offered_direction(transceiver) in ("sendonly", "sendrecv"):

@@ -44,9 +44,10 @@ class PulseStream:
 
     @classmethod
     def playing(cls, device: str, rate: int, channels: int, buffered: int) -> Self:
-        """Holds about `buffered` samples back, and begins at once."""
+        """Holds at most about `buffered` samples back, and begins with a fifth of that."""
         size = buffered * 2 * channels
-        return cls(PLAYBACK, device, rate, channels, _BufferAttributes(2 * size, size, 0, UNSET, UNSET))
+        prebuffer = size // 5 // (2 * channels) * 2 * channels
+        return cls(PLAYBACK, device, rate, channels, _BufferAttributes(2 * size, size, prebuffer, UNSET, UNSET))
 
     def read(self, count: int) -> bytes:
         """Raises OSError when the server has gone."""

@@ -441,6 +441,8 @@ export interface StreamReport {
   readonly held?: number;
   readonly tolerance?: number;
   readonly lag?: number;
+  readonly violations?: number;
+  readonly gate?: "age" | "event" | "off";
 }
 
 /** Who is heard at the robot now; sent to everyone when it changes. */

@@ -6,6 +6,7 @@ from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode
 
 from server.media.sources.source_url import BadSource, SourceSpec, parse_sources
+from server.media.speaker.speaker_url import BadSpeaker, SpeakerSpec, parse_speaker
 
 __all__ = ["SourceSettings"]
 
@@ -17,6 +18,7 @@ class SourceSettings(BaseSettings):
 
     cameras: Sources = Field(default=(), repr=False)  # there may be passwords in them
     microphones: Sources = Field(default=(), repr=False)
+    speaker: str | None = None  # at the robot, for the voice of who drives; None: nobody's voice is taken
 
     @field_validator("cameras", "microphones", mode="before")
     @classmethod
@@ -33,7 +35,15 @@ class SourceSettings(BaseSettings):
         names = [spec.name for spec in self.sources]
         if len(set(names)) != len(names):
             raise ValueError("camera, microphone: two have the same name")
+        try:
+            _ = self.speaker_spec
+        except BadSpeaker as error:
+            raise ValueError(f"speaker: {error}") from None
         return self
+
+    @property
+    def speaker_spec(self) -> SpeakerSpec | None:
+        return parse_speaker(self.speaker) if self.speaker else None
 
     @property
     def sources(self) -> tuple[SourceSpec, ...]:

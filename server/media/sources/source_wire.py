@@ -5,7 +5,7 @@ from typing import BinaryIO, Literal
 
 import msgspec
 
-__all__ = ["Captured", "Said", "SourceState", "Trouble", "Working", "read_said", "write_said"]
+__all__ = ["Captured", "Said", "SourceState", "Trouble", "Working", "decode_said", "read_said", "write_said"]
 
 MAX_LENGTH = 16_000_000  # bytes: a picture of 8 million pixels
 _LENGTH = struct.Struct("!I")
@@ -64,6 +64,11 @@ def read_said(file: BinaryIO) -> Said | None:
     data = file.read(length)
     if len(data) < length:
         return None
+    return decode_said(data)
+
+
+def decode_said(data: bytes) -> Said | None:
+    """One message without its length; None when it makes no sense."""
     try:
         return _decoder.decode(data)
     except msgspec.DecodeError:
