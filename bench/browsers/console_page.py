@@ -98,6 +98,17 @@ class ConsolePage:
         await self.tilt(LEFT_Y, -1)
         await self.until("s.driving && s.at_rest === false")
 
+    async def reset(self) -> None:
+        """Hold the button until the robot says that it is no longer stopped."""
+        await self.page.locator(".banner").wait_for(state="hidden")  # its row goes, and the button moves up
+        box = await self.page.get_by_role("button", name="Hold to reset").bounding_box()
+        if box is None:
+            raise AssertionError("the button to reset is not to be seen")
+        await self.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        await self.page.mouse.down()
+        await self.until("!s.stop.stopped")
+        await self.page.mouse.up()
+
     async def strip(self, stream: str) -> tuple[int, int | None] | None:
         """The stamp the page believes its picture has, and the event that is drawn into it; None before the first."""
         found = await self.page.evaluate(READ_STRIP, stream)

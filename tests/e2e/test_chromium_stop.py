@@ -120,7 +120,7 @@ async def test_an_observer_stops_by_key_pad_button_and_http_and_all_see_who_and_
                 await console.page.locator(".plate").get_by_text(f"By observer: {reason}").wait_for()
             await observer.press(STOP_BUTTON, False)
             await operator.press(RB, False)
-            await _reset(operator)
+            await operator.reset()
     assert _executed_after_the_stop(stack) == []
 
 
@@ -135,7 +135,7 @@ async def test_a_supervisor_stops_and_resets_what_an_operator_drives(stack: Stac
         await operator.drive_forward()
         await supervisor.page.keyboard.press("Escape")
         await _stopped(operator)
-        await _reset(supervisor)
+        await supervisor.reset()
         await operator.until("!s.stop.stopped")
         assert not (await operator.stats())["armed"]
 
@@ -155,12 +155,12 @@ async def test_stop_works_while_a_dialogue_is_open_and_says_so_above_it(stack: S
         await operator.page.locator(".banner").get_by_text("Stopped by Dee").wait_for()
         assert await dialogue.is_visible()
         await dialogue.get_by_role("button", name="Close").click()
-        await _reset(operator)
+        await operator.reset()
         await operator.page.get_by_role("button", name="Invite…").click()
         await operator.page.get_by_role("button", name="Stop the robot").click()
         await operator.until("s.stop.stopped")
         await dialogue.get_by_role("button", name="Close").click()
-        await _reset(operator)
+        await operator.reset()
         await operator.page.get_by_role("button", name="Invite…").click()
         await dialogue.get_by_label("Name").fill("half written")
         await operator.page.keyboard.press("Escape")
@@ -180,17 +180,6 @@ async def test_a_stop_key_works_inside_the_3d_scene(stack: Stack, chromium: Brow
         await observer.until("s.stop.stopped")
 
 
-async def _reset(console: ConsolePage) -> None:
-    """Hold the button until the robot says that it is no longer stopped."""
-    await console.page.locator(".banner").wait_for(state="hidden")  # its row goes, and the button moves up
-    box = await console.page.get_by_role("button", name="Hold to reset").bounding_box()
-    assert box is not None
-    await console.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    await console.page.mouse.down()
-    await console.until("!s.stop.stopped")
-    await console.page.mouse.up()
-
-
 async def test_reset_moves_nothing_and_driving_needs_arming_again(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
@@ -198,7 +187,7 @@ async def test_reset_moves_nothing_and_driving_needs_arming_again(stack: Stack, 
         await console.drive_forward()
         await console.page.keyboard.press("Escape")
         await _stopped(console)
-        await _reset(console)
+        await console.reset()
         # Deadman and stick are still held as they were.
         rendered = (await console.stats())["streams"]["overview"]["rendered"]
         await console.until(f"s.streams.overview.rendered > {rendered + 15}")

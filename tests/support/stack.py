@@ -5,13 +5,13 @@ import json
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Stack", "running_stack"]
+__all__ = ["Stack", "running_console", "running_stack"]
 
 START_SECONDS = 40.0  # a loaded two-core machine importing everything and opening GL
 STOP_SECONDS = 15.0
@@ -79,18 +79,38 @@ def _frozen(pid: int) -> Iterator[None]:
 
 @asynccontextmanager
 async def running_stack(
-    directory: Path, *, robot: str = "planar", port: int = 0, extra: tuple[str, ...] = ()
+    directory: Path,
+    *,
+    robot: str = "planar",
+    port: int = 0,
+    extra: tuple[str, ...] = (),
+    settings: Mapping[str, str] | None = None,
 ) -> AsyncIterator[Stack]:
     """Start `lockstep up`, wait until it says that it is ready, and end it on leaving."""
     event_log = directory / "events.jsonl"
-    command = [
-        *(str(Path(sys.executable).with_name("lockstep")), "up", "--json", "--robot", robot),
-        *("--port", str(port), "--robot-port", "0", "--event-log", str(event_log), *extra),
-    ]
+    command = ("up", "--json", "--robot", robot, "--port", str(port), "--robot-port", "0")
+    async with _running(directory, (*command, "--event-log", str(event_log), *extra), event_log, settings) as stack:
+        yield stack
+
+
+@asynccontextmanager
+async def running_console(directory: Path, robot: str, event_log: Path) -> AsyncIterator[Stack]:
+    """Start `lockstep serve` for a robot that runs already, at "tcp://host:port"; `event_log` is its own."""
+    async with _running(directory, ("serve", "--json", "--robot", robot, "--port", "0"), event_log) as stack:
+        yield stack
+
+
+@asynccontextmanager
+async def _running(
+    directory: Path, arguments: tuple[str, ...], event_log: Path, settings: Mapping[str, str] | None = None
+) -> AsyncIterator[Stack]:
     # One state directory for all runs of a test: the key in it lets a page's token outlive a restart of the console.
     environment = os.environ | {"PYTHONWARNINGS": "default", "LOCKSTEP_STATE_DIR": str(directory / "state")}
     process = await asyncio.create_subprocess_exec(
-        *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, env=environment
+        *(str(Path(sys.executable).with_name("lockstep")), *arguments),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+        env=environment | dict(settings or {}),
     )
     output: list[str] = []
     reader = asyncio.create_task(_keep_last_lines(process, output))

@@ -4,6 +4,7 @@ import type { FeedbackArrival } from "./media_room";
 import type { Rendering } from "./media/render_log";
 import type { Page } from "./page";
 import { statisticsOf, type Statistics } from "./statistics";
+import type { RobotDescription } from "./wire";
 
 /** What may be set by code; a field that is left out stays as it is. */
 export interface Configuration {
@@ -15,6 +16,8 @@ export interface Configuration {
 /** `window.lockstep`: live figures for tests and operators' own tools (docs/console-api.md). */
 export interface LockstepHook {
   stats(): Statistics;
+  /** What the robot says about itself; null before it has. */
+  robot(): RobotDescription | null;
   /** The newest pictures drawn, or segments heard, of one stream. */
   rendered(stream: string): readonly Rendering[];
   /** The newest events and when their feedback came. */
@@ -33,6 +36,7 @@ export function installHook(page: Page): void {
   const { room } = app;
   window.lockstep = {
     stats: () => statisticsOf(app, page.board.mainStream()),
+    robot: () => app.state.robot?.description ?? null,
     rendered: (stream) => (room.videos.get(stream) ?? room.sounds.get(stream))?.log.all() ?? [],
     feedbacks: () => room.feedbacks.all(),
     configure({ gate, pacing, tolerance }) {

@@ -1,1 +1,94 @@
 """A ROS 2 robot for tests: a real node in a process of its own, over DDS on loopback."""
+
+import json
+import platform
+import random
+import socket
+import sys
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bench.processes import Running, running_process
+
+__all__ = ["EXAMPLES", "RosRobot", "have_ros", "ros_environment", "ros_python", "running_ros_robot"]
+
+ROOT = Path(__file__).parents[3]
+EXAMPLES = ROOT / "docs" / "examples" / "ros2"
+NODE = Path(__file__).with_name("robot_node.py")
+# RTPS well-known ports (DDSI-RTPS 9.6.1.1): 7400 + 250 x domain is where a domain's participants find each other.
+DOMAINS = range(1, 100)
+FIRST_PORT, PORTS_PER_DOMAIN = 7400, 250
+
+
+def have_ros() -> bool:
+    """Whether there are wheels of ROS 2 for this machine."""
+    return (platform.system(), platform.machine()) == ("Linux", "x86_64") and sys.version_info < (3, 14)
+
+
+def ros_python() -> str:
+    """The interpreter that has ROS 2.
+
+    Raises:
+        RuntimeError: it was not installed.
+    """
+    python = ROOT / ".ros2" / "bin" / "python"
+    if not python.exists():
+        raise RuntimeError("ROS 2 is not installed for the tests: make test does it")
+    return str(python)
+
+
+def ros_environment() -> dict[str, str]:
+    """A domain that nobody else uses now, on this machine only."""
+    return {
+        "ROS_DOMAIN_ID": str(_free_domain()),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+        "PYTHONPATH": str(ROOT),
+    }
+
+
+def _free_domain() -> int:
+    for domain in random.SystemRandom().sample(DOMAINS, len(DOMAINS)):
+        base = FIRST_PORT + PORTS_PER_DOMAIN * domain
+        if all(_is_free(base + offset) for offset in (0, 10, 11, 12, 13)):
+            return domain
+    raise RuntimeError("every ROS domain is in use")
+
+
+def _is_free(port: int) -> bool:
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as trial:
+        try:
+            trial.bind(("", port))
+        except OSError:
+            return False
+        return True
+
+
+@dataclass
+class RosRobot:
+    """The running node, and what it has noted: commands that reached it, pictures it took."""
+
+    process: Running
+    environment: dict[str, str]  # puts another process on the same topics
+    log: Path
+
+    def notes(self, *kinds: str) -> Iterator[dict[str, Any]]:
+        for line in self.log.read_text().splitlines():
+            note = json.loads(line)
+            if note["kind"] in kinds:
+                yield note
+
+    async def tell(self, line: str) -> None:
+        """`hush /odom`, `speak /odom`, `freeze /odom`, `spoil /odom`; see robot_node.py. Returns when it is done."""
+        await self.process.ask(line, 20)
+
+
+@asynccontextmanager
+async def running_ros_robot(directory: Path) -> AsyncIterator[RosRobot]:
+    log = directory / "robot_node.jsonl"
+    environment = ros_environment()
+    async with running_process(ros_python(), str(NODE), str(log), environment=environment) as (process, _):
+        yield RosRobot(process, environment, log)

@@ -6,6 +6,7 @@ out. Each command and each picture is a JSON line in the log. Lines on standard 
 """
 
 import array
+import io
 import json
 import math
 import sys
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import PIL.Image
 import rclpy
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
@@ -45,6 +47,7 @@ class RobotNode(Node):  # type: ignore[misc]
         self._velocities = [0.0] * len(JOINTS)
         self._ticks = 0
         self._pictures = 0
+        self._captured = 0.0  # s, when the message that is made now shows the robot
         self._hushed: set[str] = set()
         self._frozen: dict[str, Any] = {}
         self._spoilt: set[str] = set()
@@ -78,7 +81,6 @@ class RobotNode(Node):  # type: ignore[misc]
             self._frozen[topic] = None
         elif verb == "spoil":
             self._spoilt.add(topic)
-        self.note("told", line=line)
 
     def note(self, kind: str, **fields: object) -> None:
         self._log.write(json.dumps({"kind": kind, "time": time.monotonic(), **fields}) + "\n")
@@ -124,10 +126,12 @@ class RobotNode(Node):  # type: ignore[misc]
         if self._ticks % PICTURE_EVERY == 0:
             self._pictures += 1
             self._send("/image", self._image)
+            self._send("/jpeg", self._jpeg)
 
     def _send(self, topic: str, make: Any) -> None:
         if topic in self._hushed:
             return
+        self._captured = time.monotonic()
         message = self._frozen.get(topic) or make(self.get_clock().now().to_msg(), topic in self._spoilt)
         self._spoilt.discard(topic)
         if topic in self._frozen:
@@ -168,27 +172,43 @@ class RobotNode(Node):  # type: ignore[misc]
         message.ranges[170:190] = array.array("f", [ahead] * 20)
         return message
 
-    def _image(self, stamp: Any, spoilt: bool) -> Image:
-        """The picture's number in the strip that elsewhere has the event, and the base's place as a dot below."""
-        number = self._pictures
+    def _picture(self) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        """The picture's number in the strip that elsewhere has the event; dots for the base's and a joint's place."""
         grey = np.full((HEIGHT, WIDTH), 60, np.uint8)
-        draw_event_strip(grey, number)
+        draw_event_strip(grey, self._pictures)
         picture = np.repeat(grey[:, :, None], 3, axis=2)
+        joint = int(WIDTH / 2 + self._positions[0] * 100) % WIDTH
+        picture[HEIGHT - 30 : HEIGHT - 10, max(0, joint - 10) : joint + 10] = (60, 200, 120)
         x = int(WIDTH / 2 + self._pose[0] * 50) % WIDTH
         y = HEIGHT // 2 + int(self._pose[1] * 50) % (HEIGHT // 2)
         picture[max(14, y - 10) : y + 10, max(0, x - 10) : x + 10] = (240, 120, 30)
+        return picture
+
+    def _image(self, stamp: Any, spoilt: bool) -> Image:
+        picture = self._picture()
         message = Image()
         message.header.stamp = stamp
         message.width, message.height, message.encoding = WIDTH, HEIGHT, "16UC1" if spoilt else "rgb8"
         message.step = 3 * WIDTH
         message.data = array.array("B", picture.tobytes())
-        self.note("picture", number=number)
+        self.note("picture", number=self._pictures, captured=self._captured)
+        return message
+
+    def _jpeg(self, stamp: Any, spoilt: bool) -> CompressedImage:
+        encoded = io.BytesIO()
+        PIL.Image.fromarray(self._picture()).save(encoded, "JPEG", quality=85)
+        message = CompressedImage()
+        message.header.stamp = stamp
+        message.format = "rgb8; jpeg compressed bgr8"
+        message.data = array.array("B", b"no JPEG" if spoilt else encoded.getvalue())
+        self.note("jpeg", number=self._pictures, captured=self._captured)
         return message
 
 
 def listen(node: RobotNode) -> None:
     for line in sys.stdin:
         node.tell(line.strip())
+        print(json.dumps({"done": line.strip()}), flush=True)
 
 
 def main() -> None:
