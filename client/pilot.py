@@ -28,7 +28,7 @@ __all__ = ["Outcome", "Pilot"]
 
 IDLE = 0.2  # s; 5 Hz
 ECHO = 0.020  # s; longer than the console's own path to the robot and back
-SALVO = 8
+SALVO = 12
 SALVO_SPACING = 0.003  # s
 SALVO_LEAST = 0.050  # s; with a shorter interval single repeats are as quick
 LOSSY_SPELL = 60.0  # s to go on doubling after the last loss that was seen

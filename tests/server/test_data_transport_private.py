@@ -10,7 +10,12 @@ import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSctpTransport, RTCSessionDescription
 from aiortc.rtcdtlstransport import RTCDtlsTransport
 
-from server.data_transport_private import RETRANSMISSION_CEILING, RETRANSMISSION_FLOOR, WINDOW_FLOOR, tune_data_transport
+from server.data_transport_private import (
+    RETRANSMISSION_CEILING,
+    RETRANSMISSION_FLOOR,
+    WINDOW_FLOOR,
+    tune_data_transport,
+)
 from server.media.aiortc_private import create_peer_connection
 from tests.server.rig import PATIENCE, running_rig
 

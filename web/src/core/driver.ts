@@ -20,7 +20,7 @@ const REST_GIVE_UP_MS = 5000;
 /** A copy comes this much later: longer than the console's own path to the robot and back. */
 const ECHO_MS = 20;
 /** The first repeat on such a path: so many copies, until the answer. Losses come in a row. */
-const SALVO = 8;
+const SALVO = 12;
 const SALVO_SPACING_MS = 3;
 /** With a shorter interval single repeats are as quick. */
 const SALVO_LEAST_MS = 50;

@@ -62,7 +62,7 @@ describe("commands", () => {
     expect(driverStep(driver, MOVING, true, 99)).toEqual([]);
     expect(driverStep(driver, MOVING, true, 100)).toEqual(sent);
     expect(driverStep(driver, MOVING, true, 107)).toHaveLength(2);
-    expect(driverStep(driver, MOVING, true, 180)).toHaveLength(5);
+    expect(driverStep(driver, MOVING, true, 180)).toHaveLength(9);
     expect(driverStep(driver, MOVING, true, 199)).toEqual([]);
     driverFeedback(driver, feedbackOf(2), true, 199);
     expect(commands(driverStep(driver, DISARMED, true, 500))).toEqual([]);
