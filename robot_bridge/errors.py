@@ -4,6 +4,7 @@ BridgeError
 ├── RobotUnavailable        something that the robot needs is missing on this machine
 ├── UnknownRobot            no robot of that name
 ├── SettingsError           a settings file cannot be used; names its line and key
+├── ModelError              a MuJoCo model cannot be driven
 ├── DescriptionError        the robot's description contradicts itself
 ├── ListenError             the bridge cannot listen on the address
 ├── InsecureLink            the bridge will not listen there without a secret or client certificates
@@ -15,6 +16,7 @@ __all__ = [
     "DescriptionError",
     "InsecureLink",
     "ListenError",
+    "ModelError",
     "RobotFailed",
     "RobotUnavailable",
     "SettingsError",
@@ -50,6 +52,10 @@ class UnknownRobot(BridgeError):
 
 class SettingsError(BridgeError):
     name = "settings"
+
+
+class ModelError(BridgeError):
+    name = "model"
 
 
 class DescriptionError(BridgeError):
