@@ -12,6 +12,7 @@ import {
   robotIsUp,
 } from "./core/console_state";
 import { capHolds, cappedShare, viewDelay } from "./core/speed_cap";
+import { sceneDue } from "./core/scene_gate";
 import { STALE_MS } from "./core/freshness";
 import { notePicture } from "./core/latency";
 import { noteShown } from "./core/command_gate";
@@ -20,7 +21,7 @@ import { parseServerMessage } from "./core/wire_parser";
 import { ARM_REFUSAL_WORDS } from "./core/words";
 import { Controls, type ControlSample } from "./input/controls";
 import { Disposal } from "./input/disposal";
-import { onNetworkChange } from "./input/network_change";
+import { watchPage } from "./input/page_watch";
 import type { TouchSticks } from "./input/touch_sticks";
 import { AudioDesk } from "./media/audio_desk";
 import { MediaRoom } from "./media_room";
@@ -34,6 +35,7 @@ import { StampReader } from "./rtc/stamp_reader";
 import { SessionDesk } from "./session_desk";
 import { reportOf } from "./statistics";
 import { StopSender } from "./stop_sender";
+import { VoiceDesk } from "./voice_desk";
 import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, Welcome } from "./wire";
 
 const STALL_MS = 300; // without a tick, which comes every 10 ms
@@ -44,6 +46,7 @@ export interface ConsoleAppEvents {
   isOccupied(): boolean; // a text field has the keyboard, or something stands over the pictures
   armedChanged(): void;
   feedbackTaken(now: number): void; // pictures may have become stale
+  pictureDrawn(): void; // of the main stream
 }
 
 /** The page's engine: connection, driving and media. What it shows is read from its fields. */
@@ -58,6 +61,7 @@ export class ConsoleApp {
   readonly events = createRateMeter();
   readonly audio = new AudioDesk();
   readonly charts = new ChartSampler(this);
+  readonly voice = new VoiceDesk(this);
   link: LinkState = { kind: "connecting" };
   driver: driver.Driver | null = null;
   layer = 0;
@@ -94,6 +98,7 @@ export class ConsoleApp {
       state: (link) => this.linkChanged(link),
       message: (channel, data) => this.received(channel, data),
       opened: (peer) => (this.peer = peer),
+      streams: (peer, streams) => this.room.reopen(peer, streams, performance.now()),
       closed: () => this.connectionClosed(),
     });
     this.stopping = new StopSender(api, this.connection);
@@ -185,6 +190,13 @@ export class ConsoleApp {
       driver.driverRelease(this.driver, performance.now());
   }
 
+  /** Newest event that the 3D scene may show beside the picture on screen. */
+  sceneDue(): number | "all" | null {
+    const name = this.page.mainStream();
+    const video = name === null ? undefined : this.room.videos.get(name);
+    return sceneDue(this.room.context("video"), video?.gate.shown ?? null);
+  }
+
   releaseSeat(): void {
     this.disarm("operator");
     this.session.release();
@@ -201,6 +213,7 @@ export class ConsoleApp {
 
   async close(): Promise<void> {
     this.disarm("operator");
+    this.voice.close();
     this.disposal.close();
     this.controls.close();
     this.connection.close();
@@ -211,21 +224,18 @@ export class ConsoleApp {
   }
 
   private watchPage(): void {
-    this.disposal.listen(window, "blur", () => this.disarm("blur"));
-    this.disposal.listen(window, "pagehide", () => {
-      this.disarm("hidden");
-      this.connection.close();
+    watchPage(this.disposal, {
+      blurred: () => this.disarm("blur"),
+      left: () => {
+        this.disarm("hidden");
+        this.connection.close();
+      },
+      visibilityChanged: () => {
+        if (document.hidden) this.disarm("hidden");
+        this.room.listen();
+      },
+      networkChanged: () => this.connection.alarm(),
     });
-    this.disposal.listen(window, "pageshow", (event) => {
-      if (event.persisted) location.reload();
-    });
-    this.disposal.add(onNetworkChange(() => this.connection.alarm()));
-    const visibility = (): void => {
-      if (document.hidden) this.disarm("hidden");
-      this.room.listen();
-    };
-    document.addEventListener("visibilitychange", visibility);
-    this.disposal.add(() => document.removeEventListener("visibilitychange", visibility));
   }
 
   private startTicking(): void {
@@ -303,7 +313,12 @@ export class ConsoleApp {
 
   private welcomed(welcome: Welcome): void {
     this.link = { kind: "connected" };
-    if (this.peer !== null) this.room.open(this.peer, welcome.streams, this.heardMs);
+    if (this.peer !== null) {
+      this.peer.id = welcome.peer;
+      this.pulse.isSlow = this.peer.isRelayed;
+      this.room.open(this.peer, welcome.streams, this.heardMs);
+    }
+    this.voice.attach(this.peer?.voiceSender(welcome.voice) ?? null);
     this.session.welcomed(welcome);
   }
 
@@ -339,6 +354,7 @@ export class ConsoleApp {
     if (change === "taped_down") this.page.armedChanged();
     this.drive(now);
     this.room.listen();
+    this.voice.step(now);
     this.stopping.step(this.state.stop.stopped, now);
     this.charts.step(now);
     this.touch.step(now);
@@ -383,6 +399,7 @@ export class ConsoleApp {
     if (stamp === null || stream.info.stream !== this.page.mainStream() || this.driver === null) return;
     notePicture(this.driver.latency, stamp, at);
     noteShown(this.driver.gate, stamp);
+    this.page.pictureDrawn();
     if (this.state.settings.pacing === "media") this.drive(at);
   }
 }

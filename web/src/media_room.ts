@@ -54,6 +54,12 @@ export class MediaRoom {
     this.changed();
   }
 
+  /** The same streams come from elsewhere now. What is on screen stays until they do. */
+  reopen(peer: Peer, streams: readonly StreamInfo[], now: number): void {
+    this.close();
+    this.open(peer, streams, now);
+  }
+
   /** The feedback or a setting changed: everything is judged again. */
   changed(): void {
     const event = this.state.feedback?.event ?? null;

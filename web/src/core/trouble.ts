@@ -7,6 +7,7 @@ export type LinkTrouble =
   | "no_relay"
   | "origin_refused"
   | "refused"
+  | "relay_lost"
   | "robot_unreachable"
   | "shutting_down"
   | "silent"
@@ -60,6 +61,10 @@ export const TROUBLE_WORDS: Readonly<Record<LinkTrouble, Words>> = {
     text: "The console does not serve pages at this address. Open the link exactly as it was given to you.",
   },
   refused: { title: "The console refused the connection", text: "" },
+  relay_lost: {
+    title: "The relay is gone",
+    text: "No other one is left: this page watches at the console itself in a moment.",
+  },
   robot_unreachable: {
     title: "Robot unreachable",
     text: "The console runs, but it has no link to the robot yet. Check that the robot is switched on and its bridge runs.",

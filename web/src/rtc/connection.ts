@@ -11,6 +11,7 @@ import {
 import { troubleOf, type LinkEnd, type LinkTrouble } from "../core/trouble";
 import { ConsoleError, type ConsoleApi } from "./console_api";
 import { Peer, PeerEnd, type ChannelName, type PeerOptions } from "./peer";
+import type { StreamInfo } from "../wire";
 import type { StampReader } from "./stamp_reader";
 
 /** How the page stands with the console. */
@@ -30,6 +31,7 @@ export interface ConnectionEvents {
   state(state: LinkState): void;
   message(channel: ChannelName, data: unknown): void;
   opened(peer: Peer): void;
+  streams(peer: Peer, streams: readonly StreamInfo[]): void; // media come from a relay, or from another one
   closed(): void; // after every `opened`
 }
 
@@ -111,6 +113,7 @@ export class Connection {
       },
       troubled: () => resumeAlarm(this.resume, performance.now()),
       ended: (end) => ending.resolve(end),
+      streams: (streams) => this.events.streams(peer, streams),
     });
     this.peer = peer;
     this.resume = createResume();

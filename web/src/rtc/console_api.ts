@@ -1,4 +1,5 @@
 import { parseIceServers, type IceServer } from "../core/ice_servers";
+import { parseRelayAnswer, type RelayTicket } from "../core/relay";
 import { isRecord } from "../core/schema_check";
 
 /** What the console said instead of doing what it was asked. */
@@ -29,7 +30,7 @@ export interface RestartAnswer {
 export interface MediaOffer {
   readonly cameras: number;
   readonly microphones: number;
-  readonly voice: boolean; // whether the console takes the voice of who drives
+  readonly voice: boolean; // whether the console takes this person's voice while they drive
 }
 
 const FRAGMENT = "application/trickle-ice-sdpfrag";
@@ -45,12 +46,20 @@ export class ConsoleApi {
     const streams = isRecord(session) && Array.isArray(session["streams"]) ? session["streams"] : [];
     const count = (kind: string): number =>
       streams.filter((each: unknown) => isRecord(each) && each["kind"] === kind).length;
-    const voice = isRecord(session) && session["voice"] === true;
+    const you = isRecord(session) && isRecord(session["you"]) ? session["you"] : {};
+    const voice = isRecord(session) && session["voice"] === true && you["role"] !== "observer";
     return { cameras: count("video"), microphones: count("audio"), voice };
   }
 
-  async offer(sdp: string, trailer: boolean, signal: AbortSignal): Promise<WhepAnswer> {
-    const path = trailer ? "/whep?stamp=trailer" : "/whep";
+  /** Where the console wants this observer to watch; null: with itself. `lost` is what the peer watched until now. */
+  async relay(peer: string, lost: string, signal: AbortSignal): Promise<RelayTicket | null> {
+    const query = new URLSearchParams({ peer, lost });
+    return parseRelayAnswer(await this.json("GET", `/api/relay?${query}`, undefined, signal));
+  }
+
+  /** `query` of the URL: "stamp=trailer", "relay=0". */
+  async offer(sdp: string, query: string, signal: AbortSignal): Promise<WhepAnswer> {
+    const path = query === "" ? "/whep" : `/whep?${query}`;
     const response = await this.fetch("POST", path, { "Content-Type": "application/sdp" }, sdp, signal);
     const { headers } = response;
     return {

@@ -2,6 +2,9 @@ import { iceCandidates, iceFragment, restartedAnswer } from "../core/ice_fragmen
 import { hasRelay, type IceServer } from "../core/ice_servers";
 import type { LinkTrouble } from "../core/trouble";
 import { ConsoleError, type ConsoleApi } from "./console_api";
+import type { RelayTicket } from "../core/relay";
+import type { StreamInfo } from "../wire";
+import { RelayWatch } from "./relay_watch";
 import { askForCaptureTime } from "./header_extensions";
 import type { ReceiverStamps, StampReader } from "./stamp_reader";
 
@@ -18,6 +21,7 @@ export interface Section {
 export interface PeerOptions {
   readonly trailer: boolean; // the event reference travels in trailers
   readonly relayOnly: boolean; // through TURN or not at all
+  readonly watches: boolean; // the link is an observer's: the console may send it to a relay
 }
 
 /** How a connection ended. */
@@ -34,6 +38,7 @@ export interface PeerEvents {
   message(channel: ChannelName, data: unknown): void;
   troubled(): void; // WebRTC misses the other side
   ended(end: PeerEnd): void; // once, unless closed from here
+  streams(streams: readonly StreamInfo[]): void; // media come from a relay, or from another one
 }
 
 /** Offered before the console has said how many there are; sections too many are answered inactive. */
@@ -46,9 +51,12 @@ const REQUEST_LIMIT_MS = 5000;
 export class Peer {
   readonly sections: Section[] = [];
   isConnected = false; // once it was
+  id = ""; // what the console calls it; "" before it has said so
+  private relay: RelayWatch | null = null; // null: media come from the console
   private readonly connection: RTCPeerConnection;
   private readonly channels: Record<ChannelName, RTCDataChannel>;
   private readonly abort = new AbortController();
+  private voice: RTCRtpTransceiver | null = null; // nothing is sent in it before somebody talks
   private location = "";
   private servers: readonly IceServer[] = [];
   private tag = ""; // of the ICE session
@@ -73,6 +81,35 @@ export class Peer {
   /** Returns when the answer is set; the channels open shortly after. Raises ConsoleError. */
   async connect(): Promise<void> {
     const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(CONNECT_LIMIT_MS)]);
+    // Without an answer about relays there is still the console.
+    const ticket = this.options.watches ? await this.api.relay("", "", signal).catch(() => null) : null;
+    if (ticket === null) await this.connectForMedia(signal);
+    else await this.connectBeside(ticket, signal);
+    this.connection.onicegatheringstatechange = () => this.sendCandidates();
+    this.sendCandidates();
+    this.endAfter(CONNECT_LIMIT_MS);
+  }
+
+  /** For data channels alone: media come from the relay. */
+  private async connectBeside(ticket: RelayTicket, signal: AbortSignal): Promise<void> {
+    await this.refresh().catch(() => undefined);
+    await this.connection.setLocalDescription();
+    await this.exchange(`relay=${encodeURIComponent(ticket.relay)}`, signal);
+    this.relay = new RelayWatch(
+      this.api,
+      this.reader,
+      () => this.servers,
+      () => this.id,
+      {
+        feedback: (data) => this.events.message("control", data),
+        opened: ({ streams }) => this.events.streams(streams),
+        direct: () => this.finish(new PeerEnd("relay_lost", "")),
+      },
+    );
+    void this.relay.watch(ticket);
+  }
+
+  private async connectForMedia(signal: AbortSignal): Promise<void> {
     const media = this.api.media(AbortSignal.any([signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]));
     // Without these servers there may still be a direct path.
     const servers = this.refresh().catch(() => undefined);
@@ -81,17 +118,24 @@ export class Peer {
     const [offer, usual] = await Promise.all([media, this.connection.createOffer(), servers]);
     const cameras = Math.max(0, offer.cameras - USUAL_CAMERAS);
     const microphones = Math.max(0, offer.microphones - USUAL_MICROPHONES);
-    const more = cameras + microphones > 0;
-    if (more) trailer = this.addSections(cameras, microphones) || trailer;
+    const more = cameras + microphones > 0 || offer.voice;
+    if (offer.voice) this.voice = this.connection.addTransceiver("audio", { direction: "sendonly" });
+    if (cameras + microphones > 0) trailer = this.addSections(cameras, microphones) || trailer;
     await this.connection.setLocalDescription(more ? await this.connection.createOffer() : usual);
-    const answer = await this.api.offer(this.localSdp(), trailer, signal);
+    await this.exchange(trailer ? "stamp=trailer" : "", signal);
+  }
+
+  private async exchange(query: string, signal: AbortSignal): Promise<void> {
+    const answer = await this.api.offer(this.localSdp(), query, signal);
     this.location = answer.location;
     this.tag = answer.tag;
     if (this.isOver) throw new ConsoleError(0, "closed", "closed while connecting", null);
     await this.connection.setRemoteDescription({ type: "answer", sdp: answer.sdp });
-    this.connection.onicegatheringstatechange = () => this.sendCandidates();
-    this.sendCandidates();
-    this.endAfter(CONNECT_LIMIT_MS);
+  }
+
+  /** Whether pictures and feedback come from a relay. */
+  get isRelayed(): boolean {
+    return this.relay !== null;
   }
 
   /** Takes the console's STUN and TURN servers, for what is gathered from now on. Raises ConsoleError. */
@@ -128,7 +172,13 @@ export class Peer {
   }
 
   section(mid: string): Section | undefined {
+    if (this.relay !== null) return this.relay.section(mid);
     return this.sections.find((section) => section.transceiver.mid === mid);
+  }
+
+  /** What sends this person's voice in the section that the console named; null when it takes none. */
+  voiceSender(mid: string): RTCRtpSender | null {
+    return mid !== "" && this.voice?.mid === mid ? this.voice.sender : null;
   }
 
   /** Ends it from here; the session is deleted, also while the page is being left. */
@@ -210,6 +260,7 @@ export class Peer {
     this.isOver = true;
     clearTimeout(this.timer);
     this.abort.abort();
+    this.relay?.close();
     for (const { stamps } of this.sections) if (stamps !== null) this.reader?.detach(stamps);
     this.connection.close();
     // The console notices a lost peer by itself; asking it to end the session only makes that quicker.

@@ -1,0 +1,109 @@
+import { completeOffer, feedMids, wantedMids, type RelayTicket } from "../core/relay";
+import type { IceServer } from "../core/ice_servers";
+import { askForCaptureTime } from "./header_extensions";
+import { JanusSocket } from "./janus_socket";
+import type { Section } from "./peer";
+import type { StampReader } from "./stamp_reader";
+
+/** The console says something on the feedback channel every 0.4 s, whatever the robot does. */
+const SILENCE_MS = 1300;
+const FIRST_WORD_MS = 5000;
+
+export interface RelayMediaEvents {
+  feedback(data: unknown): void;
+  lost(why: string): void; // once, unless closed from here
+}
+
+/** Pictures, sound and feedback through a Janus. It ends once. */
+export class RelayMedia {
+  readonly sections = new Map<string, Section>(); // by the publisher's mid
+  private readonly connection: RTCPeerConnection;
+  private readonly socket: JanusSocket;
+  private timer: ReturnType<typeof setTimeout> | undefined;
+  private isOver = false;
+
+  constructor(
+    readonly ticket: RelayTicket,
+    private readonly reader: StampReader | null,
+    servers: readonly IceServer[],
+    private readonly events: RelayMediaEvents,
+  ) {
+    const iceServers = servers.map((server) => ({ ...server, urls: [...server.urls] }));
+    this.connection = new RTCPeerConnection({ bundlePolicy: "max-bundle", iceServers });
+    this.connection.onconnectionstatechange = () => {
+      if (this.connection.connectionState === "failed") this.lose("no path to the relay");
+    };
+    this.connection.ondatachannel = ({ channel }) => this.listen(channel);
+    // A Janus tells a subscriber of data only when the subscriber has a channel of its own.
+    this.listen(this.connection.createDataChannel("feedback", { ordered: false, maxRetransmits: 0 }));
+    this.socket = new JanusSocket(ticket.url, (why) => this.lose(why));
+    this.expectWord(FIRST_WORD_MS);
+  }
+
+  /** Returns when pictures are on their way, and says then what it has; raises Error. */
+  async open(): Promise<void> {
+    const { ticket } = this;
+    await this.socket.begin();
+    const streams = wantedMids(ticket).map((mid) => ({ feed: ticket.feed, mid }));
+    const join = { request: "join", ptype: "subscriber", room: ticket.room, pin: ticket.pin, streams };
+    const { sdp, data } = await this.socket.message(join, null);
+    if (sdp === null) throw new Error("the relay offered nothing");
+    await this.connection.setRemoteDescription({ type: "offer", sdp: completeOffer(sdp) });
+    this.readStamps(feedMids(data));
+    await this.connection.setLocalDescription(await this.connection.createAnswer());
+    await this.gathered();
+    await this.socket.message({ request: "start" }, this.connection.localDescription?.sdp ?? "");
+  }
+
+  close(): void {
+    this.isOver = true;
+    clearTimeout(this.timer);
+    for (const { stamps } of this.sections.values()) if (stamps !== null) this.reader?.detach(stamps);
+    this.socket.close();
+    this.connection.close();
+  }
+
+  private readStamps(mids: ReadonlyMap<string, string>): void {
+    const kinds = new Map(this.ticket.streams.map((stream) => [stream.mid, stream.kind]));
+    for (const transceiver of this.connection.getTransceivers()) {
+      const mid = mids.get(transceiver.mid ?? "");
+      const kind = kinds.get(mid ?? "");
+      if (mid === undefined || kind === undefined) continue;
+      askForCaptureTime(transceiver, kind); // playout-delay, which a Janus hands on
+      const stamps = this.reader?.attach(transceiver.receiver, kind, true) ?? null;
+      this.sections.set(mid, { kind, transceiver, stamps });
+    }
+  }
+
+  /** A Janus takes candidates one by one too, but those of this device are known at once. */
+  private async gathered(): Promise<void> {
+    const { connection } = this;
+    if (connection.iceGatheringState === "complete") return;
+    await new Promise<void>((resolve) => {
+      const timer = setTimeout(resolve, 500); // a STUN server that does not answer
+      connection.onicegatheringstatechange = () => {
+        if (connection.iceGatheringState !== "complete") return;
+        clearTimeout(timer);
+        resolve();
+      };
+    });
+  }
+
+  private listen(channel: RTCDataChannel): void {
+    channel.onmessage = (event: MessageEvent<unknown>) => {
+      this.expectWord(SILENCE_MS);
+      this.events.feedback(event.data);
+    };
+  }
+
+  private expectWord(withinMs: number): void {
+    clearTimeout(this.timer);
+    if (!this.isOver) this.timer = setTimeout(() => this.lose("the relay fell silent"), withinMs);
+  }
+
+  private lose(why: string): void {
+    if (this.isOver) return;
+    this.close();
+    this.events.lost(why);
+  }
+}
