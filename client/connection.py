@@ -318,6 +318,10 @@ class Connection:
             raise ConsoleLost("not connected yet")
         return self.session.welcome
 
+    @property
+    def relay(self) -> str:
+        return "" if self._relay is None else self._relay.name
+
     def statistics(self) -> ConsoleStatistics:
         now = self._loop.time()
         pilot, delays = self.driver.pilot, self.driver.picture_delay.samples

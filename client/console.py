@@ -164,6 +164,11 @@ class Console:
         return self._live().welcome.peer
 
     @property
+    def relay(self) -> str:
+        """The relay that media come through, as the console counts them: "0"; "": they come from the console."""
+        return self._live().relay
+
+    @property
     def role(self) -> Role:
         """What this link permits."""
         return self._live().welcome.role

@@ -64,6 +64,11 @@ class RelayMedia:
         self._pc.on("datachannel", self._listen)
         self._pc.on("connectionstatechange", self._state_changed)
 
+    @property
+    def name(self) -> str:
+        """As the console counts its relays."""
+        return self._ticket.relay
+
     async def negotiate(self, wanted: Callable[[StreamInfo], bool] = lambda _: True) -> list[Section]:
         """Subscribe: the sections of what will come. Raises ConnectFailed."""
         try:

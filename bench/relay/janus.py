@@ -16,6 +16,7 @@ general: {{
     session_timeout = 60
     server_name = "lockstep"
 }}
+media: {{ rtp_port_range = "{first_port}-{last_port}" }}
 nat: {{ ignore_mdns = true }}
 plugins: {{ disable = "{other_plugins}" }}
 transports: {{ disable = "{other_transports}" }}
@@ -39,10 +40,11 @@ OTHER_PLUGINS = (
 OTHER_TRANSPORTS = ("http", "mqtt", "nanomsg", "pfunix", "rabbitmq")
 
 
-def janus_command(folder: Path, address: str, port: int, *, admin_key: str = "") -> list[str]:
+def janus_command(folder: Path, address: str, port: int, *, number: int = 0, admin_key: str = "") -> list[str]:
     """Write its configuration into `folder`; the command that runs it until it is killed.
 
     Args:
+        number: of several in one network; each has ports of its own for media
         address: on which it listens; media go over every address but loopback, which Janus leaves out
         admin_key: that creating a room takes; "": nothing
 
@@ -55,6 +57,8 @@ def janus_command(folder: Path, address: str, port: int, *, admin_key: str = "")
     folder.mkdir(parents=True, exist_ok=True)
     core = CORE.format(
         folder=folder,
+        first_port=20_000 + 5_000 * number,
+        last_port=24_999 + 5_000 * number,
         other_plugins=",".join(f"libjanus_{name}.so" for name in OTHER_PLUGINS),
         other_transports=",".join(f"libjanus_{name}.so" for name in OTHER_TRANSPORTS),
     )
