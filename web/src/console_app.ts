@@ -12,7 +12,6 @@ import {
   robotIsUp,
 } from "./core/console_state";
 import { capHolds, cappedShare, viewDelay } from "./core/speed_cap";
-import { sceneDue } from "./core/scene_gate";
 import { STALE_MS } from "./core/freshness";
 import { notePicture } from "./core/latency";
 import { noteShown } from "./core/command_gate";
@@ -95,7 +94,7 @@ export class ConsoleApp {
       drawn: (stream, stamp, at) => this.drawn(stream, stamp, at),
     });
     this.connection = new Connection(api, this.reader, options, {
-      state: (link) => this.linkChanged(link),
+      state: (link) => (this.link = link),
       message: (channel, data) => this.received(channel, data),
       opened: (peer) => (this.peer = peer),
       streams: (peer, streams) => this.room.reopen(peer, streams, performance.now()),
@@ -190,13 +189,6 @@ export class ConsoleApp {
       driver.driverRelease(this.driver, performance.now());
   }
 
-  /** Newest event that the 3D scene may show beside the picture on screen. */
-  sceneDue(): number | "all" | null {
-    const name = this.page.mainStream();
-    const video = name === null ? undefined : this.room.videos.get(name);
-    return sceneDue(this.room.context("video"), video?.gate.shown ?? null);
-  }
-
   releaseSeat(): void {
     this.disarm("operator");
     this.session.release();
@@ -242,10 +234,6 @@ export class ConsoleApp {
     const worker = new Worker(new URL("./input/tick_worker.ts", import.meta.url), { type: "module" });
     worker.onmessage = () => this.tick(performance.now());
     this.disposal.add(() => worker.terminate());
-  }
-
-  private linkChanged(link: LinkState): void {
-    this.link = link;
   }
 
   private connectionClosed(): void {

@@ -8,6 +8,7 @@ import "./style/gauges.css";
 import "./style/overlay.css";
 import "./style/controls.css";
 import "./style/seat.css";
+import "./style/talk.css";
 import "./style/tabs.css";
 import "./style/people.css";
 import "./style/notes.css";

@@ -13,6 +13,7 @@ const ALWAYS: readonly Line[] = [
   [["Shift"], "Slow while held; pad: left bumper"],
   [["Tab"], "Next control layer, while armed; pad: Y"],
   [["F8", "F9"], "Grant or decline the control seat to whoever asks first"],
+  [["V"], "Hold to talk, where the robot has a loudspeaker and you have control"],
   [["C"], "Live charts, open and close"],
   [["F"], "Freeze the charts"],
   [["X"], "Save the charts that are shown as CSV and PNG"],

@@ -3,6 +3,7 @@ import { robotIsUp } from "../core/console_state";
 import { seatWords, type Obstacle } from "../core/seat_words";
 import type { SeatNews } from "../core/seat_news";
 import type { ConsoleApp } from "../console_app";
+import { createTalkButton } from "./talk_button";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
 
 /** News are told this long. */
@@ -20,7 +21,8 @@ export function createSeatBar(app: ConsoleApp): Panel {
   action.classList.add("seat-action");
   const words = h("div", "seat-words", {}, title, text);
   const spoken = h("span", "unseen", { role: "status" }); // without the seconds, which would be read out all the time
-  const buttons = h("div", "seat-buttons", {}, keep, grant, decline, why, action);
+  const talk = createTalkButton(app);
+  const buttons = h("div", "seat-buttons", {}, talk.element, keep, grant, decline, why, action);
   const element = h(
     "section",
     "seat",
@@ -62,6 +64,7 @@ export function createSeatBar(app: ConsoleApp): Panel {
       setHidden(decline, found.tone !== "asked");
       setHidden(keep, found.tone !== "idle");
       showAction(action, why, actionOf(app));
+      talk.update(now);
     },
   };
 }
