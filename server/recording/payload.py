@@ -2,6 +2,7 @@
 
 from typing import TypeVar
 
+import av
 import msgspec
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
@@ -11,7 +12,7 @@ from google.protobuf.message import DecodeError
 from server.recording.errors import RecordingDamaged
 from server.recording.records import OWN_RECORDS, OwnRecord
 
-__all__ = ["has_idr", "own_record", "own_record_of", "payload_of"]
+__all__ = ["has_idr", "own_record", "own_record_of", "payload_of", "picture_size"]
 
 MEDIA: dict[str, type[CompressedVideo | CompressedAudio | RawAudio]] = {
     "foxglove.CompressedVideo": CompressedVideo,
@@ -65,3 +66,13 @@ def has_idr(picture: bytes) -> bool:
             return kind == IDR
         at = picture.find(START_CODE, at + len(START_CODE))
     return False
+
+
+def picture_size(keyframe: bytes) -> tuple[int, int] | None:
+    """Width and height of an H.264 keyframe; None: it cannot be decoded."""
+    decoder = av.CodecContext.create("h264", "r")
+    try:
+        frames = [*decoder.decode(av.Packet(keyframe)), *decoder.decode(None)]
+    except av.FFmpegError:
+        return None
+    return (frames[0].width, frames[0].height) if frames else None

@@ -66,6 +66,7 @@ class RecordingThread:
         self._feedback: FeedbackItem | None = None
         self._writer: RecordingWriter | None = None
         self._part = 0
+        self._newest = 0  # ns, arrival of what was taken last
         self._bytes_before = 0  # of earlier parts
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
 
@@ -137,6 +138,7 @@ class RecordingThread:
 
     def _take(self, item: Item) -> None:
         """Records of another epoch than the file's belong into none."""
+        self._newest = max(self._newest, item.arrived)
         match item:
             case RobotItem():
                 self._meet_robot(item)
@@ -178,7 +180,7 @@ class RecordingThread:
             self._directory / f"{info.recording}{suffix}.mcap", info, robot.record.description, robot.codecs
         )
         self._writer = writer
-        now, epoch, event = self._now(), robot.record.epoch, robot.record.event
+        now, epoch, event = self._newest, robot.record.epoch, robot.record.event
         head: list[Item] = []
         if self._feedback is not None and self._feedback.epoch == epoch:
             event = self._feedback.feedback.event
@@ -209,7 +211,7 @@ class RecordingThread:
         if self._robot is not None:
             event = self._robot.record.event if self._feedback is None else self._feedback.feedback.event
             record = Degraded(epoch=self._robot.record.epoch, event=event, lost=lost)
-            self._write(writer, OwnItem(self._now(), record), self._robot.record.description)
+            self._write(writer, OwnItem(self._newest, record), self._robot.record.description)
 
     def _look_at_disk(self, writer: RecordingWriter) -> None:
         free = shutil.disk_usage(self._directory).free

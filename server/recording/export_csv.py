@@ -1,0 +1,24 @@
+"""`lockstep export --to csv`: one row for each event."""
+
+import csv
+from pathlib import Path
+
+from server.recording.event_rows import columns_of, event_rows, values_of
+from server.recording.reader import RecordingReader
+from server.recording.topics import stream_of
+
+__all__ = ["export"]
+
+
+def export(path: Path, out: Path | None, task: str) -> list[Path]:
+    """The file that was written: `out`, or beside `path`. Raises RecordingError, OSError."""
+    target = out or path.with_suffix(".csv")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingReader(path) as reader, target.open("w", newline="", encoding="utf-8") as file:
+        description = reader.description()
+        streams = [stream for each in reader.index.topics if (stream := stream_of(each.topic))]
+        writer = csv.writer(file)
+        writer.writerow(columns_of(description, streams))
+        for row in event_rows(reader):
+            writer.writerow(["" if value is None else value for value in values_of(row, description, streams)])
+    return [target]

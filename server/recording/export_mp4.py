@@ -1,0 +1,151 @@
+"""`lockstep export --to mp4`: one file for each camera, with sound. Pictures and sound are copied, not encoded again.
+
+Only where the size of the pictures changed on the way they are encoded anew, all in the largest size.
+"""
+
+from collections.abc import Iterator
+from fractions import Fraction
+from io import BytesIO
+from pathlib import Path
+from typing import NamedTuple
+
+import av
+from av.audio.stream import AudioStream
+from av.container import OutputContainer
+from av.video.stream import VideoStream
+
+from server.recording.errors import RecordingDamaged
+from server.recording.payload import picture_size
+from server.recording.reader import RecordingReader
+from server.recording.topics import CAMERA
+
+__all__ = ["export"]
+
+VIDEO_BASE = Fraction(1, 90_000)
+SECOND = 1_000_000_000
+OPUS_RATE = 48_000  # Hz
+SOUND_BASE = Fraction(1, OPUS_RATE)
+MILLISECOND = 1_000_000
+OPUS_STEREO = 0x04  # in the first byte of a packet (RFC 6716 3.1)
+
+
+class Timed(NamedTuple):
+    topic: str
+    captured: int  # ns since 1970
+    data: bytes
+    keyframe: bool
+
+
+def export(path: Path, out: Path | None, task: str) -> list[Path]:
+    """The files that were written.
+
+    Args:
+        out: with one camera the file, else the directory; None: beside `path`
+
+    Raises:
+        RecordingError: the recording cannot be read, or has no pictures.
+        OSError: a file cannot be written.
+    """
+    with RecordingReader(path) as reader:
+        cameras = [each.topic for each in reader.index.topics if each.topic.startswith(CAMERA)]
+        cameras = [topic for topic in cameras if reader.index.counts.get(topic)]
+        if not cameras:
+            raise RecordingDamaged("it has no pictures")
+        # MP4 holds Opus, not G.711.
+        sounds = [each.topic for each in reader.index.topics if each.schema == "foxglove.CompressedAudio"]
+        sound = next((topic for topic in sounds if reader.index.counts.get(topic)), "")
+        written = []
+        for topic in cameras:
+            target = _target(path, out, topic.removeprefix(CAMERA), len(cameras) == 1)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            _write(reader, topic, sound, target)
+            written.append(target)
+        return written
+
+
+def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
+    if out is not None and only and out.suffix == ".mp4":
+        return out
+    return (out or path.parent) / f"{path.stem}-{camera}.mp4"
+
+
+def _write(reader: RecordingReader, topic: str, sound: str, target: Path) -> None:
+    sizes = {size for each in _timed(reader, topic) if each.keyframe for size in [picture_size(each.data)] if size}
+    first = next(_timed(reader, topic), None)
+    if first is None or not sizes:
+        raise RecordingDamaged(f"{topic}: there is no picture that can be decoded")
+    packet = next(_timed(reader, sound), None) if sound else None
+    began = min(each.captured for each in (first, packet) if each is not None)
+    with av.open(str(target), "w", format="mp4", options={"movflags": "+faststart"}) as output:
+        pictures = _Copied(output, first.data) if len(sizes) == 1 else _Encoded(output, max(sizes))
+        audio = None if packet is None else _opus_stream(output, packet.data)
+        for each in _timed(reader, topic, sound):
+            if each.topic == topic:
+                pictures.take(each, began)
+            elif audio is not None:
+                _mux(output, audio, each, began, SOUND_BASE)
+        pictures.close()
+
+
+class _Copied:
+    """Pictures as they were recorded."""
+
+    def __init__(self, output: OutputContainer, keyframe: bytes) -> None:
+        self._output = output
+        # A muxer wants to be told of a stream by one that was read: that of the first picture alone.
+        with av.open(BytesIO(keyframe), format="h264") as first:
+            self._stream = output.add_stream_from_template(first.streams.video[0])
+        self._stream.time_base = VIDEO_BASE
+
+    def take(self, each: Timed, began: int) -> None:
+        _mux(self._output, self._stream, each, began, VIDEO_BASE)
+
+    def close(self) -> None: ...
+
+
+class _Encoded:
+    """Pictures of different sizes, all in one."""
+
+    def __init__(self, output: OutputContainer, size: tuple[int, int]) -> None:
+        self._output = output
+        self._decoder = av.CodecContext.create("h264", "r")
+        self._stream = output.add_stream("libx264", rate=25, options={"preset": "veryfast", "crf": "20"})
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = "yuv420p"
+        self._stream.codec_context.time_base = VIDEO_BASE
+
+    def take(self, each: Timed, began: int) -> None:
+        for frame in self._decoder.decode(av.Packet(each.data)):
+            whole = frame.reformat(self._stream.width, self._stream.height, interpolation="BILINEAR")
+            whole.pts, whole.time_base = round((each.captured - began) / SECOND / VIDEO_BASE), VIDEO_BASE
+            self._output.mux(self._stream.encode(whole))
+
+    def close(self) -> None:
+        self._output.mux(self._stream.encode(None))
+
+
+def _mux(output: OutputContainer, stream: VideoStream | AudioStream, each: Timed, began: int, base: Fraction) -> None:
+    packet = av.Packet(each.data)
+    packet.stream = stream
+    packet.time_base = base
+    packet.pts = packet.dts = round((each.captured - began) / SECOND / base)
+    packet.is_keyframe = each.keyframe
+    output.mux(packet)
+
+
+def _opus_stream(output: OutputContainer, packet: bytes) -> AudioStream:
+    """Of the encoder only its header is used."""
+    stream = output.add_stream("libopus", rate=OPUS_RATE, layout="stereo" if packet[0] & OPUS_STEREO else "mono")
+    stream.time_base = SOUND_BASE
+    return stream
+
+
+def _timed(reader: RecordingReader, *topics: str) -> Iterator[Timed]:
+    """In the order of arrival; pictures from the first keyframe on, times of each topic increasing."""
+    newest: dict[str, int] = {}
+    for record in reader.records(topics=topics):
+        if record.topic not in newest and not record.keyframe:
+            continue
+        captured = max(record.captured, newest.get(record.topic, 0) + MILLISECOND)
+        newest[record.topic] = captured
+        yield Timed(record.topic, captured, record.payload, record.keyframe)
