@@ -37,6 +37,7 @@ def run(
     ros2: Annotated[
         Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
     ] = None,
+    mjcf: Annotated[Path | None, typer.Option(help="Instead: a MuJoCo model of your own, this MJCF file.")] = None,
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any free one.")] = 5600,
     event_log: Annotated[
@@ -71,7 +72,7 @@ def run(
             insecure=insecure_link,
         )
         check_link(settings)  # before the robot is made, which can take long
-        label, make = (name, partial(create_robot, name)) if ros2 is None else (str(ros2), partial(_ros2, ros2))
+        label, make = _choice(name, ros2, mjcf)
         uvloop.run(_serve(label, make, settings, as_json))
     except (BridgeError, SecretError) as error:
         typer.echo(f"lockstep robot: {error.detail}", err=True)
@@ -95,9 +96,24 @@ def _tls(certificate: Path | None, key: Path | None, authority: Path | None) -> 
     return LinkTls(certificate=certificate, key=key, authority=authority)
 
 
+def _choice(name: str, ros2: Path | None, mjcf: Path | None) -> tuple[str, Callable[[], Robot]]:
+    """What is announced, and what makes the robot."""
+    if ros2 is not None and mjcf is not None:
+        raise typer.BadParameter("--ros2 and --mjcf are two robots; a bridge has one")
+    if ros2 is not None:
+        return str(ros2), partial(_ros2, ros2)
+    return (str(mjcf), partial(_mjcf, mjcf)) if mjcf is not None else (name, partial(create_robot, name))
+
+
 def _ros2(path: Path) -> Robot:
     """Imported only when asked for, as all robots are."""
     from robot_bridge.robots.ros2 import create
+
+    return create(path)
+
+
+def _mjcf(path: Path) -> Robot:
+    from robot_bridge.robots.mjcf import create
 
     return create(path)
 

@@ -94,6 +94,7 @@ def up(
     ros2: Annotated[
         Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
     ] = None,
+    mjcf: Annotated[Path | None, typer.Option(help="Instead: a MuJoCo model of your own, this MJCF file.")] = None,
     robot_python: Annotated[
         str | None,
         typer.Option(
@@ -146,6 +147,7 @@ def up(
     )
     options = [] if event_log is None else ["--event-log", str(event_log)]
     options += [] if ros2 is None else ["--ros2", str(ros2)]
+    options += [] if mjcf is None else ["--mjcf", str(mjcf)]
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
     bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, secret.reveal(), _say, robot_python)
