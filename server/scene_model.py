@@ -54,10 +54,11 @@ class SceneModel:
     def pose(self, feedback: Feedback) -> None:
         joints = dict(zip(self._joint_names, feedback.joints, strict=False))
         with self._server.atomic():
+            # First: viewers hold back all that follows until they show a picture of this event (web's scene_gate.ts).
+            self.label.text = f"s {feedback.event}{STOPPED if feedback.stop.stopped else ''}"
             for body in self._moving:
                 frame, pose = self.frames[body.name], body_pose(body, joints)
                 frame.position, frame.wxyz = pose.position, pose.orientation
-            self.label.text = f"s {feedback.event}{STOPPED if feedback.stop.stopped else ''}"
             self._pose_arrow(feedback.wrench)
             self._pose_points(feedback.ranges)
             self.fences.show(feedback.limits)

@@ -20,7 +20,7 @@ from server.scene import SceneView
 from server.security import check_origin
 from server.services import services
 
-__all__ = ["is_allowed", "router"]
+__all__ = ["HOOK", "is_allowed", "router"]
 
 log = structlog.get_logger(__name__)
 
@@ -32,6 +32,9 @@ TRY_AGAIN_LATER = 1013  # RFC 6455 7.4.1 and the IANA registry
 POLICY_VIOLATION = 1008
 GOING_AWAY = 1001
 UNSUPPORTED_DATA = 1003
+
+# The page around the frame puts its gate into it before viser's own script runs (web/src/ui/scene_frame.ts).
+HOOK = b"<head><script>window.parent.lockstepScene?.(window)</script>"
 
 router = APIRouter()
 
@@ -50,7 +53,8 @@ async def client(request: Request, path: str) -> Response:
     if answer.status_code != 200:
         raise NotFound("no such file")
     kind = answer.headers.get("content-type", "application/octet-stream")
-    return Response(answer.content, media_type=kind, headers={"Cache-Control": "no-cache"})
+    content = answer.content.replace(b"<head>", HOOK, 1) if kind.startswith("text/html") else answer.content
+    return Response(content, media_type=kind, headers={"Cache-Control": "no-cache"})
 
 
 @router.websocket("/scene/ws/{ticket}")

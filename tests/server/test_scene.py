@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
-from server.scene_proxy import is_allowed
+from server.scene_proxy import HOOK, is_allowed
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 
 VERSION = Subprotocol(f"viser-v{viser.__version__}")
@@ -32,6 +32,8 @@ async def test_the_client_is_served_and_its_stream_shows_the_robot() -> None:
         page = await rig.http.get(path)
         assert page.status_code == 200
         assert "text/html" in page.headers["content-type"]
+        # The page around it has to get at it before any script of viser's.
+        assert page.text.index(HOOK.decode()) < page.text.index("<script ")
         assert "frame-ancestors 'self'" in page.headers["content-security-policy"]
         assert address.startswith(rig.url.replace("http", "ws"))
         async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None) as websocket:

@@ -3,6 +3,7 @@ import type { GateMode } from "./core/media_gate";
 import type { FeedbackArrival } from "./media_room";
 import type { Rendering } from "./media/render_log";
 import type { Page } from "./page";
+import type { SceneStatistics } from "./ui/scene_view";
 import { statisticsOf, type Statistics } from "./statistics";
 import type { RobotDescription } from "./wire";
 
@@ -22,6 +23,8 @@ export interface LockstepHook {
   rendered(stream: string): readonly Rendering[];
   /** The newest events and when their feedback came. */
   feedbacks(): readonly FeedbackArrival[];
+  /** What the 3D scene shows. */
+  scene(): SceneStatistics;
   configure(configuration: Configuration): void;
 }
 
@@ -39,6 +42,7 @@ export function installHook(page: Page): void {
     robot: () => app.state.robot?.description ?? null,
     rendered: (stream) => (room.videos.get(stream) ?? room.sounds.get(stream))?.log.all() ?? [],
     feedbacks: () => room.feedbacks.all(),
+    scene: () => page.board.scene.statistics(),
     configure({ gate, pacing, tolerance }) {
       const { settings } = app.state;
       settings.gate = gate ?? settings.gate;

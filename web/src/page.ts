@@ -3,6 +3,7 @@ import { ConsoleApp } from "./console_app";
 import { holdsSeat, isOperator } from "./core/console_state";
 import type { PageAction } from "./core/page_keys";
 import { staleAge } from "./core/freshness";
+import { sceneDue } from "./core/scene_gate";
 import { countUnread, createUnread, markRead } from "./core/unread";
 import { FIELDS } from "./input/keyboard";
 import { TouchSticks } from "./input/touch_sticks";
@@ -64,13 +65,14 @@ export class Page {
   constructor(api: ConsoleApi, options: PeerOptions, name: string | null) {
     const left = h("div", "stick left", { "aria-label": "Left stick" });
     const right = h("div", "stick right", { "aria-label": "Right stick" });
-    this.board = new ViewBoard(new SceneView(api, (event) => this.app.controls.keyboard.foreign(event)));
+    this.board = new ViewBoard(this.scene(api));
     this.app = new ConsoleApp(api, options, name, new TouchSticks(left, right), {
       canvas: (info) => this.board.canvas(info),
       mainStream: () => this.board.mainStream(),
       isOccupied: () => this.isOccupied(),
       armedChanged: () => this.draw(performance.now()),
       feedbackTaken: (now) => this.board.update(this.app, now),
+      pictureDrawn: () => this.board.scene.settle(),
     });
     this.keys = createKeysSheet(this.app);
     this.pads = createPadSheet(this.app.controls.pad);
@@ -79,6 +81,17 @@ export class Page {
     );
     this.panels = this.build(left, right, new SessionApi(api));
     watchTouch();
+  }
+
+  private scene(api: ConsoleApi): SceneView {
+    return new SceneView(api, {
+      due: () => {
+        const video = this.app.room.videos.get(this.board.mainStream() ?? "");
+        return sceneDue(this.app.room.context("video"), video?.gate.shown ?? null);
+      },
+      context: () => this.app.room.context("video"),
+      onkey: (event) => this.app.controls.keyboard.foreign(event),
+    });
   }
 
   /** Shows the page and keeps it current. */

@@ -1,45 +1,77 @@
+import { createSceneGate, resetSceneGate, sceneStaleness, settleScene } from "../core/scene_gate";
+import { eventGap } from "../core/serial";
+import type { GateContext } from "../core/medium_counts";
 import type { ConsoleApi } from "../rtc/console_api";
-import { button, h, setText } from "./dom";
+import { button, h, setHidden, setText } from "./dom";
+import { gateScene } from "./scene_frame";
 
-type SceneState = "off" | "loading" | "on" | "failed";
+type SceneState = "off" | "loading" | "on" | "failed" | "empty";
+
+/** What the page knows that the scene has to keep to. */
+export interface SceneSurroundings {
+  /** Newest event that the scene may show. */
+  due(): number | "all" | null;
+  context(): GateContext;
+  /** Keys pressed while the frame has the focus, which the page itself never sees. */
+  onkey(event: KeyboardEvent): void;
+}
+
+/** `window.lockstep.scene()` */
+export interface SceneStatistics {
+  readonly state: SceneState;
+  readonly event: number | null; // shown
+  readonly gap: number | null; // feedback's event minus the shown one
+  readonly held: number; // updates that wait for their event
+  readonly forced: number; // updates that could not wait
+}
 
 const IDLE_WORDS = "The robot, posed from its feedback";
+const EMPTY_WORDS = "This robot does not describe its shape, so there is no 3D scene of it";
 const SETTLE_MS = 5000;
 
 /** The 3D scene in a frame of its own. It runs only while it is the large view: drawing it takes from the pictures. */
 export class SceneView {
   readonly element = h("div", "scene");
+  readonly gate = createSceneGate();
   private readonly words = h("p", "scene-words");
   private readonly open = button("wide-button", "Open the 3D scene", () => this.load());
   private frame: HTMLIFrameElement | null = null;
   private state: SceneState = "off";
   private openedMs = 0;
 
-  /** `onkey`: keys pressed while the frame has the focus, which the page itself never sees. */
   constructor(
     private readonly api: ConsoleApi,
-    private readonly onkey: (event: KeyboardEvent) => void,
+    private readonly page: SceneSurroundings,
   ) {
     this.element.append(h("div", "scene-idle", {}, this.words, this.open));
     this.show("off", IDLE_WORDS);
+    gateScene(this.gate, () => page.due());
   }
 
-  /** Opens the scene unless it is open. */
+  /** Opens the scene unless it is open, or there is nothing to show. */
   load(): void {
-    if (this.state === "on" || this.state === "loading") return;
+    if (this.state === "on" || this.state === "loading" || this.state === "empty") return;
     this.show("loading", "Opening the 3D scene…");
     this.api.scene().then(
       (path) => this.embed(path),
-      () => this.show("failed", "The 3D scene is not available"),
+      () => {
+        if (this.state === "loading") this.show("failed", "The 3D scene is not available");
+      },
     );
   }
 
   /** Ends it; what it drew is gone with it. */
   unload(words = IDLE_WORDS): void {
-    if (this.state === "off") return;
-    this.frame?.remove();
-    this.frame = null;
+    if (this.state === "off" || this.state === "empty") return;
+    this.discard();
     this.show("off", words);
+  }
+
+  /** Whether the robot has a shape to show. */
+  setPossible(possible: boolean): void {
+    if (possible === (this.state !== "empty")) return;
+    this.discard();
+    this.show(possible ? "off" : "empty", possible ? IDLE_WORDS : EMPTY_WORDS);
   }
 
   /** Whether it has run long enough that its loading no longer holds the page up. */
@@ -49,13 +81,31 @@ export class SceneView {
 
   /** Opens it anew if it is open. */
   reload(): void {
-    if (this.state === "off") return;
+    if (this.state === "off" || this.state === "empty") return;
     this.unload();
     this.load();
   }
 
+  /** Lets the scene go on to the event of the picture that is now on screen. */
+  settle(): void {
+    if (this.state === "on") settleScene(this.gate, this.page.due());
+  }
+
+  /** Why it must not be trusted; null when it may, or is not there. */
+  staleness(): string | null {
+    return this.state === "on" ? sceneStaleness(this.gate, this.page.context()) : null;
+  }
+
+  statistics(): SceneStatistics {
+    const { shown, held, forced } = this.gate;
+    const { feedback } = this.page.context();
+    const gap = shown === null || feedback === null ? null : eventGap(feedback, shown);
+    return { state: this.state, event: shown, gap, held: held.length, forced };
+  }
+
   private embed(path: string): void {
     if (this.state !== "loading") return;
+    resetSceneGate(this.gate);
     this.frame = h("iframe", "scene-frame", { src: path, title: "3D scene of the robot" });
     this.watchKeys(this.frame);
     this.element.append(this.frame);
@@ -63,16 +113,23 @@ export class SceneView {
     this.show("on", "");
   }
 
+  private discard(): void {
+    this.frame?.remove();
+    this.frame = null;
+    resetSceneGate(this.gate);
+  }
+
   /** The frame comes from our own origin, so its window can be listened to. */
   private watchKeys(frame: HTMLIFrameElement): void {
     frame.addEventListener("load", () => {
-      frame.contentWindow?.addEventListener("keydown", (event) => this.onkey(event), { capture: true });
+      frame.contentWindow?.addEventListener("keydown", (event) => this.page.onkey(event), { capture: true });
     });
   }
 
   private show(state: SceneState, words: string): void {
     this.state = state;
     this.element.dataset["state"] = state;
+    setHidden(this.open, state === "empty");
     setText(this.words, words);
   }
 }

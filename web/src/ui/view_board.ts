@@ -26,7 +26,7 @@ export class ViewBoard {
   private main: string | null = null;
   private epoch: string | null = null;
 
-  constructor(private readonly scene: SceneView) {
+  constructor(readonly scene: SceneView) {
     this.addView(SCENE, "3D scene", null, scene.element);
   }
 
@@ -46,11 +46,33 @@ export class ViewBoard {
     return [...this.views.keys()].find((name) => name !== SCENE) ?? null;
   }
 
+  /** The camera in the large view; null while the scene is there. */
+  largeStream(): string | null {
+    return this.main === SCENE ? null : this.main;
+  }
+
   update(app: ConsoleApp, now: number): void {
     this.element.classList.toggle("is-locked", app.isArmed());
     this.followEpoch(app.state.robot?.epoch ?? null);
     if (this.scene.hasSettled(now) && app.isHeldUp(now)) this.dropScene();
-    for (const view of this.views.values()) if (view.canvas !== null) showVeil(app, view, now);
+    const { robot } = app.state;
+    if (robot !== null) this.scene.setPossible(robot.description.bodies.length > 0);
+    this.scene.settle();
+    for (const view of this.views.values())
+      if (view.canvas !== null) showVeil(app, view, now);
+      else this.showSceneVeil(app, view);
+  }
+
+  /** The scene is judged like a picture: by how far its event is from the feedback. */
+  private showSceneVeil(app: ConsoleApp, view: View): void {
+    const { state, event, gap } = this.scene.statistics();
+    const words = state === "on" ? (unreachableWords(app) ?? this.scene.staleness()) : null;
+    setHidden(view.veil, words === null);
+    view.element.classList.toggle("is-stale", words !== null);
+    if (words !== null) setText(view.veilWords, words);
+    const { video } = app.state.settings.tolerance;
+    setText(view.detail, event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}`);
+    setData(view.element, "gap", words === null ? "good" : "bad");
   }
 
   /** Nothing may keep STOP waiting, so a scene that this machine cannot draw fast enough goes. */
@@ -122,7 +144,13 @@ function showVeil(app: ConsoleApp, view: View, now: number): void {
 function veilWords(app: ConsoleApp, view: View, now: number): string | null {
   const video = app.room.videos.get(view.name);
   if (video === undefined) return "Not connected";
-  if (!robotIsUp(app.state) && app.state.robot !== null) return "Robot unreachable";
+  const unreachable = unreachableWords(app);
+  if (unreachable !== null) return unreachable;
   const source = app.state.sources.find((each) => each.stream === view.name);
   return (source && sourceWords(source)) ?? stalenessOf(app, video, now);
+}
+
+function unreachableWords(app: ConsoleApp): string | null {
+  if (app.state.welcome === null) return "Not connected";
+  return app.state.robot !== null && !robotIsUp(app.state) ? "Robot unreachable" : null;
 }
