@@ -287,7 +287,8 @@ class Pilot:
         taken = now - flight.first_sent_at
         self.samples.append(taken)
         soonest = NEEDLESS * min(self._pings) if self._pings else NEEDLESS_BLIND * taken
-        if flight.sends == 1 or now - flight.last_sent_at < soonest:
+        # A later issue of this feedback came by itself, not as an answer.
+        if feedback.issue == 1 and (flight.sends == 1 or now - flight.last_sent_at < soonest):
             self.timer.sample(taken)  # an echo makes a sample at most ECHO too long, which is the safe side
         else:
             self.loss(now)  # and no sample, by Karn's rule

@@ -126,6 +126,13 @@ def test_a_needless_repeat_does_not_keep_the_timer_from_learning() -> None:
     assert pilot.due(1.0 + ECHO) == []
 
 
+def test_a_feedback_that_was_issued_again_by_itself_is_no_sample() -> None:
+    pilot = new_pilot()
+    flying(pilot)
+    pilot.feedback(feedback(2, 2), 0.09)
+    assert pilot.timer.round_trip is None
+
+
 def test_pings_stand_in_until_commands_are_known() -> None:
     pilot = new_pilot()
     pilot.ping_answered(0.3)

@@ -101,7 +101,7 @@ export function driverFeedback(
   const flying = gate.inFlight;
   if (!takeFeedback(gate, feedback.event, feedback.issue)) return false;
   const sample = noteFeedback(driver.latency, feedback.event, now);
-  if (sample !== null && flying === feedback.event) landed(driver, sample, now);
+  if (sample !== null && flying === feedback.event) landed(driver, feedback.issue, sample, now);
   if (driver.barrier !== null && !isNewer(driver.barrier, feedback.event)) driver.barrier = null;
   if (rest !== null && feedback.at_rest && (!canCommand || isNewer(feedback.event, rest.event)))
     driver.rest = null;
@@ -112,10 +112,12 @@ export function driverFeedback(
  * Karn's rule: a command whose repeat may have been the one answered is no sample. Taken to the letter, the first
  * repeat would come too soon for ever on a path longer than the interval, so a repeat that was needless still counts.
  */
-function landed(driver: Driver, takenMs: number, now: number): void {
+function landed(driver: Driver, issue: number, takenMs: number, now: number): void {
   // An echo makes a sample at most ECHO_MS too long, which is the safe side.
   const soonest = driver.pings.length > 0 ? NEEDLESS * Math.min(...driver.pings) : NEEDLESS_BLIND * takenMs;
-  if (driver.sends === 1 || now - driver.lastSentMs < soonest) takeSample(driver.repeat, takenMs);
+  const answers = driver.sends === 1 || now - driver.lastSentMs < soonest;
+  // A later issue of this feedback came by itself, not as an answer.
+  if (issue === 1 && answers) takeSample(driver.repeat, takenMs);
   else driverLoss(driver, now);
 }
 

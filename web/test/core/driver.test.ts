@@ -99,6 +99,12 @@ describe("commands", () => {
     expect(driver.repeat.smoothedMs).toBe(8);
   });
 
+  it("whose feedback was issued again by itself are no samples", () => {
+    driverStep(driver, MOVING, true, 0);
+    driverFeedback(driver, feedbackOf(2, { issue: 2 }), true, 90);
+    expect(driver.repeat.smoothedMs).toBeNull();
+  });
+
   it("an old feedback is no news", () => {
     expect(driverFeedback(driver, feedbackOf(1), true, 1)).toBe(false);
   });
