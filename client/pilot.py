@@ -9,8 +9,8 @@ and hand out what `outcomes` returns.
 - New in the control seat, the first command is neutral: the console refuses a moving one.
 - While the path loses packets every command is sent twice, `ECHO` apart: the copy covers the loss of the command,
   and, being answered from the stored feedback, the loss of the answer too. On a clean path nothing is doubled.
-- Losses come in a row. When both were lost on such a path, the first repeat is a salvo of `SALVO` copies, which ends
-  with the answer: of a row of lost packets, one that counts packets and not time, single repeats would wait out each.
+- Losses come in a row. When both were lost on such a path, the first repeat comes early and is a salvo of `SALVO`
+  copies, which ends with the answer: single repeats would wait out a row of lost packets one by one.
 """
 
 from collections import deque
@@ -231,6 +231,8 @@ class Pilot:
         flight.repeat_at = now + self._wait(1)
         if now < self._lossy_until:
             flight.echo_at, flight.echoes_left = now + ECHO, 1
+            if self.timer.early >= SALVO_LEAST:
+                flight.repeat_at = now + max(self._least(), self.timer.early)
         self._flight = flight
         self.gate.sent(now)
         self.sent_at.append((event, now))
@@ -269,9 +271,11 @@ class Pilot:
         return [again] * copies
 
     def _wait(self, sends: int) -> float:
+        return max(self._least(), self.timer.wait(sends))
+
+    def _least(self) -> float:
         """A ping does not reach the robot: until its share is known, pings may lengthen the wait but not shorten it."""
-        least = INITIAL if len(self.samples) < FEW_SAMPLES else 0.0
-        return max(least, self.timer.wait(sends))
+        return INITIAL if len(self.samples) < FEW_SAMPLES else 0.0
 
     def _only_neutral(self, event: int) -> bool:
         return self._unproven or event == self._void

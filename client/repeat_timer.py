@@ -42,6 +42,13 @@ class RepeatTimer:
         waited = self._smoothed + max(GRANULARITY, K * self._variation)
         self.interval = min(CAP, max(FLOOR, waited))
 
+    @property
+    def early(self) -> float:
+        """How long to wait for the first answer where losses are expected: shorter, and wrong now and then."""
+        if self._smoothed is None:
+            return self.interval
+        return min(CAP, max(FLOOR, self._smoothed + max(GRANULARITY, self._variation)))
+
     def wait(self, sends: int) -> float:
         """How long to wait after the `sends`-th sending of one event.
 

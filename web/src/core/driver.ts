@@ -10,7 +10,14 @@ import {
   type Pacing,
 } from "./command_gate";
 import { createLatency, noteCommandRefused, noteCommandSent, noteFeedback, type Latency } from "./latency";
-import { createRepeatTimer, INITIAL_MS, takeSample, waitAfter, type RepeatTimer } from "./repeat_timer";
+import {
+  createRepeatTimer,
+  earlyInterval,
+  INITIAL_MS,
+  takeSample,
+  waitAfter,
+  type RepeatTimer,
+} from "./repeat_timer";
 import { isNewer } from "./serial";
 
 /** While armed and at rest, neutral commands keep forces felt and the link proven. */
@@ -44,8 +51,8 @@ export interface Intention {
  * Turns intentions into commands, rests and repeats of them. Holds no clock and no socket.
  *
  * While the path loses packets every command is sent twice: the copy covers the loss of the command and, being
- * answered from the stored feedback, the loss of the answer too. When both were lost, the first repeat is a salvo:
- * a row of lost packets counts packets, not time. On a clean path nothing is doubled.
+ * answered from the stored feedback, the loss of the answer too. When both were lost, the first repeat comes
+ * early and is a salvo: single repeats would wait out a row of lost packets one by one. On a clean path nothing is doubled.
  */
 export interface Driver {
   readonly gate: CommandGate;
@@ -222,8 +229,11 @@ function noteSending(driver: Driver, sends: number, now: number): void {
   driver.repeatAtMs = now + waitMs;
   driver.echoesLeft = 0;
   if (now < driver.lossyUntilMs) {
-    if (sends === 1) driver.echoesLeft = 1;
-    else if (sends === 2 && waitMs >= SALVO_LEAST_MS) driver.echoesLeft = SALVO - 1;
+    const earlyMs = earlyInterval(driver.repeat);
+    if (sends === 1) {
+      driver.echoesLeft = 1;
+      if (earlyMs >= SALVO_LEAST_MS) driver.repeatAtMs = now + Math.max(least, earlyMs);
+    } else if (sends === 2 && waitMs >= SALVO_LEAST_MS) driver.echoesLeft = SALVO - 1;
   }
   driver.echoAtMs = driver.echoesLeft === 0 ? Infinity : now + (sends === 1 ? ECHO_MS : SALVO_SPACING_MS);
 }

@@ -31,6 +31,12 @@ export function repeatInterval(timer: RepeatTimer): number {
   return Math.min(CAP_MS, Math.max(FLOOR_MS, interval));
 }
 
+/** How long to wait for the first answer where losses are expected: shorter, and wrong now and then. */
+export function earlyInterval(timer: RepeatTimer): number {
+  if (timer.smoothedMs === null) return INITIAL_MS;
+  return Math.min(CAP_MS, Math.max(FLOOR_MS, timer.smoothedMs + Math.max(GRANULARITY_MS, timer.variationMs)));
+}
+
 /** How long to wait after the `sends`-th send of one event: the interval twice, then doubling up to the cap. */
 export function waitAfter(timer: RepeatTimer, sends: number): number {
   return Math.min(CAP_MS, repeatInterval(timer) * 2 ** Math.max(0, sends - 2));
