@@ -1,13 +1,13 @@
 """Chromium for a test, through Playwright; always the system's own browser with a profile of its own."""
 
 import shutil
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 from playwright.async_api import Browser, BrowserContext, Page, async_playwright
 
-__all__ = ["PAD", "open_page", "running_chromium"]
+__all__ = ["PAD", "chromium_program", "open_page", "running_chromium"]
 
 PAD = Path(__file__).with_name("test_pad.js")
 FLAGS = [
@@ -19,16 +19,26 @@ FLAGS = [
 ]
 
 
-@asynccontextmanager
-async def running_chromium(environment: dict[str, str] | None = None) -> AsyncIterator[Browser]:
-    """A headless Chromium, closed on leaving. It makes sound, which Playwright would otherwise mute."""
-    executable = shutil.which("chromium") or shutil.which("google-chrome")
-    if executable is None:
+def chromium_program() -> Path:
+    found = shutil.which("chromium") or shutil.which("google-chrome")
+    if found is None:
         raise RuntimeError("Chromium is not installed: make test installs Debian's chromium")
+    return Path(found)
+
+
+@asynccontextmanager
+async def running_chromium(
+    environment: dict[str, str] | None = None, flags: Sequence[str] = (), *, executable: Path | None = None
+) -> AsyncIterator[Browser]:
+    """A headless Chromium, closed on leaving. It makes sound, which Playwright would otherwise mute.
+
+    `executable`: a program that runs it, as one that enters a network namespace first; None: itself.
+    """
+    executable = executable or chromium_program()
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(
             executable_path=executable,
-            args=FLAGS,
+            args=[*FLAGS, *flags],
             ignore_default_args=["--mute-audio"],
             env=dict(environment) if environment else None,
         )

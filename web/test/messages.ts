@@ -51,7 +51,7 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
 }
 
 export function welcomeOf(role: Welcome["role"]): Welcome {
-  return { type: "welcome", peer: "me", role, name: "somebody", streams: [] };
+  return { type: "welcome", peer: "me", role, name: "somebody", streams: [], voice: "" };
 }
 
 export function seatOf(holder: string, name = ""): Seat {
