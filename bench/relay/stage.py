@@ -10,6 +10,9 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from playwright.async_api import Browser
+
+from bench.browsers.chromium import chromium_program, running_chromium
 from bench.emulator.namespaces import OPERATOR_ADDRESS, ROBOT_ADDRESS, Namespaces, Side
 from bench.relay.janus import JANUS_READY, janus_command
 
@@ -108,12 +111,23 @@ class RelayStage:
         self.console = await self.start("robot", command)
         self.links = json.loads(await self.console.line(r'^\{"console"'))
 
-    def within(self, side: Side) -> list[str]:
-        """A prefix that runs a command inside that side's network, from outside of this process' tree."""
-        anchor = self.console if side == "robot" else next(iter(self.janus[1:]), None)
-        if anchor is None:
-            raise RuntimeError("nothing runs on that side yet")
-        return ["nsenter", f"--net=/proc/{anchor.pid}/ns/net"]
+    @asynccontextmanager
+    async def chromium(self, side: Side) -> AsyncIterator[Browser]:
+        """Chromium in that side's network, started through a script that enters it first."""
+        anchor = await self.start(side, ["sleep", "infinity"])
+        script = self.folder / f"chromium-{side}"
+        script.write_text(f'#!/bin/sh\nexec nsenter --net=/proc/{anchor.pid}/ns/net {chromium_program()} "$@"\n')
+        script.chmod(0o700)
+        # The page is served without TLS, at an address that is not loopback.
+        secure = f"--unsafely-treat-insecure-origin-as-secure=http://{ROBOT_ADDRESS}:{CONSOLE_PORT}"
+        async with running_chromium(executable=script, flags=[secure]) as browser:
+            yield browser
+
+    async def add_driver(self) -> Process:
+        """An operator that drives from now on, on the operator's side."""
+        driver = await self.start("operator", [sys.executable, "-m", "bench.relay.driver", self.links["operator"]])
+        await driver.line(r'^\{"at"')
+        return driver
 
 
 async def _end(started: Process) -> None:

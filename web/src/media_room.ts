@@ -32,6 +32,7 @@ export interface MediaRoomEvents {
 export class MediaRoom {
   readonly videos = new Map<string, VideoStream>();
   readonly sounds = new Map<string, SoundStream>();
+  relay: string | null = null; // that the streams come through; null: from the console
   readonly feedbacks = new NewestLog<FeedbackArrival>();
   private newest: number | null = null; // event of the last feedback
   private waitingSounds: WaitingSound[] = [];
@@ -57,6 +58,7 @@ export class MediaRoom {
   /** The same streams come from elsewhere now. What is on screen stays until they do. */
   reopen(peer: Peer, streams: readonly StreamInfo[], now: number): void {
     this.close();
+    this.relay = peer.relayName;
     this.open(peer, streams, now);
   }
 
@@ -94,6 +96,7 @@ export class MediaRoom {
 
   close(): void {
     for (const stream of [...this.videos.values(), ...this.sounds.values()]) stream.close();
+    this.relay = null;
     this.videos.clear();
     this.sounds.clear();
     this.waitingSounds = [];

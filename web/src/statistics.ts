@@ -33,6 +33,7 @@ export interface StreamStatistics {
 export interface Statistics {
   readonly peer: string | null;
   readonly role: string | null;
+  readonly relay: string | null; // that media come through; null: from the console
   readonly connected: boolean;
   readonly event: number | null;
   readonly epoch: string | null;
@@ -75,6 +76,7 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
   return {
     peer: state.welcome?.peer ?? null,
     role: state.welcome?.role ?? null,
+    relay: app.room.relay,
     connected: state.welcome !== null,
     event: state.feedback?.event ?? null,
     epoch: state.robot?.epoch ?? null,
@@ -144,8 +146,12 @@ export function reportOf(app: ConsoleApp): Report {
     event: app.state.feedback?.event ?? 0,
     armed: app.arming.state !== "disarmed",
     streams: [
-      ...[...app.room.videos.values()].map((stream) => streamReport(stream, settings.tolerance.video, settings.gate)),
-      ...[...app.room.sounds.values()].map((stream) => streamReport(stream, settings.tolerance.audio, settings.gate)),
+      ...[...app.room.videos.values()].map((stream) =>
+        streamReport(stream, settings.tolerance.video, settings.gate),
+      ),
+      ...[...app.room.sounds.values()].map((stream) =>
+        streamReport(stream, settings.tolerance.audio, settings.gate),
+      ),
     ],
     picture_delay_ms: app.viewDelayMs,
     round_trip_ms: app.state.roundTripMs,

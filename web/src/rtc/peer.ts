@@ -133,6 +133,11 @@ export class Peer {
     await this.connection.setRemoteDescription({ type: "answer", sdp: answer.sdp });
   }
 
+  /** The relay that pictures come through now. */
+  get relayName(): string | null {
+    return this.relay?.name ?? null;
+  }
+
   /** Whether pictures and feedback come from a relay. */
   get isRelayed(): boolean {
     return this.relay !== null;

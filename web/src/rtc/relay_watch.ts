@@ -37,6 +37,11 @@ export class RelayWatch {
     if (!this.isOver) this.events.direct();
   }
 
+  /** As the console counts its relays. */
+  get name(): string | null {
+    return this.media?.ticket.relay ?? null;
+  }
+
   section(mid: string): Section | undefined {
     return this.media?.sections.get(mid);
   }

@@ -1,0 +1,41 @@
+"""An operator in a process of its own: `python -m bench.relay.driver LINK` drives without end.
+
+Every second it says in a JSON line how long each command took to its feedback, and when that was.
+"""
+
+import asyncio
+import json
+import math
+import sys
+import time
+
+from client import Console
+
+__all__ = ["main"]
+
+SWING_SECONDS = 4.0
+
+
+async def drive(link: str) -> None:
+    async with Console(link, video=False, audio=False, name="driver") as console:
+        await console.take_seat()
+        axis = console.description.axes[0]
+        reach = min(axis.maximum - axis.rest, axis.rest - axis.minimum) / 4
+        trips: list[float] = []
+        told = time.monotonic()
+        while True:
+            began = time.monotonic()
+            swing = math.sin(2 * math.pi * began / SWING_SECONDS)
+            await console.drive({axis.name: axis.rest + reach * swing})
+            trips.append(round((time.monotonic() - began) * 1000, 3))
+            if began - told >= 1.0:
+                print(json.dumps({"at": began, "event": console.stats().event, "trips_ms": trips}), flush=True)
+                trips, told = [], began
+
+
+def main() -> None:
+    asyncio.run(drive(sys.argv[1]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""A real Chromium behind console → Janus → Janus, each in its own network; a Janus is killed while it watches."""
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from bench.browsers.console_page import open_console
+from bench.emulator.errors import NamespacesUnavailable
+from bench.relay.stage import RelayStage, relay_stage
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
+
+
+@pytest.fixture
+async def stage(tmp_path: Path) -> AsyncIterator[RelayStage]:
+    try:
+        async with relay_stage(tmp_path) as ready:
+            await ready.add_janus("robot", 0)
+            await ready.add_janus("operator", 1)
+            await ready.add_console([("robot", 0), ("operator", 1)], "--observers-direct", "0")
+            yield ready
+    except NamespacesUnavailable as error:
+        pytest.skip(str(error))
+
+
+async def test_pictures_keep_their_events_through_two_relays_and_come_back_when_one_dies(stage: RelayStage) -> None:
+    await stage.add_driver()
+    link = stage.links["observer"]
+    async with (
+        stage.chromium("operator") as browser,
+        open_console(browser, link, pad=False) as near,
+        open_console(browser, link, pad=False) as far,
+    ):
+        await near.until("s.relay !== null && s.streams.overview?.rendered > 3", 40)
+        await far.until("s.relay !== null && s.streams.overview?.rendered > 3", 40)
+        before = [await page.stats() for page in (near, far)]
+        relays = [each["relay"] for each in before]
+        assert sorted(relays) == ["0", "1"]
+        watching = near if relays[0] == "1" else far
+        await watching.until("s.streams.overview.rendered > 60", 60)
+        shown = await watching.strip("overview")  # noqa: B005  # not of a string
+        statistics = await watching.stats()
+        await stage.janus[1].kill()
+        await watching.until("s.relay === '0' && s.streams.overview?.rendered > 3", 30)
+        after = await watching.stats()
+        await watching.page.get_by_role("button", name="Stop").first.click()
+        await watching.until("s.stop.stopped", 10)
+    assert shown is not None
+    assert shown[0] == shown[1]
+    for each in (statistics, after):
+        assert [name for name, stream in each["streams"].items() if stream["violations"]] == []
+        assert each["bad_messages"] == 0
+    assert after["peer"] == statistics["peer"]  # the connection to the console lives on
