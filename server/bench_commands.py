@@ -1,4 +1,4 @@
-"""Commands that measure. They live in `bench/`, which nothing here imports: it is loaded when one is asked for."""
+"""Commands that measure or draw. They live in `bench/`, which nothing here imports: loaded when one is asked for."""
 
 from importlib import import_module
 from typing import Any
@@ -20,6 +20,7 @@ COMMANDS = {
         "Put a bad network between a console and whoever uses it.",
     ),
     "hostile": ("bench.hostile.cli", "hostile_command", "Drive among peers that misbehave in every way."),
+    "report": ("bench.session_report.cli", "report_command", "Draw the thesis' figures from a recorded session."),
     "soak": ("bench.soak.cli", "soak_command", "Drive for a long time while everything fails now and then."),
 }
 

@@ -1,4 +1,4 @@
-"""The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`, `report`."""
+"""The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`."""
 
 import asyncio
 import secrets
@@ -133,18 +133,6 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         written = _or_usage(lambda: exporter.export(path, out, task))
         for each in written:
             sys.stdout.write(f"{each}\n")
-
-    @app.command()
-    def report(
-        file: File,
-        out: Annotated[Path | None, typer.Option(help="HTML file to write; unset: beside the recording.")] = None,
-        directory: DirectoryOption = None,
-        state_dir: StateDirOption = None,
-    ) -> None:
-        """Draw the thesis' figures from a recorded session."""
-        path = _found(file, make_settings(state_dir=state_dir), directory)
-        reporting: Any = import_module("server.recording.report")  # needs matplotlib, the extra "report"
-        sys.stdout.write(f"{_or_usage(lambda: reporting.write_report(path, out))}\n")
 
 
 async def _replay(path: Path, host: str, port: int, as_json: bool) -> None:

@@ -11,7 +11,21 @@ from matplotlib.figure import Figure
 from bench.experiment.growth import Growth
 from bench.experiment.record import Arrival, ClientRecord, Rendered, Run
 
-__all__ = ["client_against_medium", "gap_figure", "growth_figure", "medium_figure", "robot_figure"]
+__all__ = [
+    "BAD",
+    "BAND",
+    "FAINT",
+    "MEDIUM",
+    "ROBOT",
+    "STYLE",
+    "client_against_medium",
+    "gap_figure",
+    "growth_figure",
+    "medium_figure",
+    "new_figure",
+    "robot_figure",
+    "svg_text",
+]
 
 INK, FAINT, GRID = "#16202b", "#5b6875", "#dfe5ea"
 ROBOT, MEDIUM, BAD, BAND = "#1769aa", "#d1731c", "#c1272d", "#2e8b57"
@@ -41,7 +55,8 @@ STYLE: Any = {
 }
 
 
-def _figure(rows: int, columns: int) -> tuple[Figure, list[list[Axes]]]:
+def new_figure(rows: int, columns: int) -> tuple[Figure, list[list[Axes]]]:
+    """A grid of axes. Call it, and `svg_text`, within STYLE."""
     height = ROW * rows
     figure = Figure(figsize=(WIDTH, height))
     # A layout engine would draw every figure twice.
@@ -51,7 +66,7 @@ def _figure(rows: int, columns: int) -> tuple[Figure, list[list[Axes]]]:
     return figure, figure.subplots(rows, columns, squeeze=False).tolist()
 
 
-def _svg(figure: Figure) -> str:
+def svg_text(figure: Figure) -> str:
     target = io.StringIO()
     figure.savefig(target, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     text = target.getvalue()
@@ -85,13 +100,13 @@ def _label(axes: Axes, title: str, ylabel: str, run: Run) -> None:
 def robot_figure(run: Run) -> str:
     """Event reference against time at the robot's side and at the operator's."""
     with mpl.rc_context(STYLE):
-        figure, ((server, client),) = _figure(1, 2)
+        figure, ((server, client),) = new_figure(1, 2)
         _events(server, run.robot.answered, run.began, ROBOT, "")
         _label(server, "Robot server", "event reference", run)
         _events(client, run.operator.feedbacks, run.began, ROBOT, "")
         _label(client, "Robot client", "event reference", run)
         client.sharey(server)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def medium_figure(run: Run, client: ClientRecord, stream: str, what: str) -> str:
@@ -99,7 +114,7 @@ def medium_figure(run: Run, client: ClientRecord, stream: str, what: str) -> str
     captured = run.robot.captured.get(stream, [])
     rendered = _within(run, client.rendered.get(stream, []))
     with mpl.rc_context(STYLE):
-        figure, rows = _figure(2, 2)
+        figure, rows = new_figure(2, 2)
         (server_event, client_event), (server_index, client_index) = rows
         _events(server_event, captured, run.began, MEDIUM, "")
         _events(client_event, rendered, run.began, MEDIUM, "")
@@ -112,26 +127,26 @@ def medium_figure(run: Run, client: ClientRecord, stream: str, what: str) -> str
             _label(axes, f"{what} {side}", index, run)
         client_event.sharey(server_event)
         client_index.sharey(server_index)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def client_against_medium(runs: Sequence[tuple[str, Run, ClientRecord]], stream_of: dict[str, str], what: str) -> str:
     """Robot client and media client in one picture: without and with synchronisation, side by side."""
     with mpl.rc_context(STYLE):
-        figure, (row,) = _figure(1, len(runs))
+        figure, (row,) = new_figure(1, len(runs))
         for axes, (title, run, client) in zip(row, runs, strict=True):
             _events(axes, client.feedbacks, run.began, ROBOT, "robot client")
             _events(axes, _within(run, client.rendered.get(stream_of[title], [])), run.began, MEDIUM, f"{what} client")
             _label(axes, title, "event reference", run)
             axes.legend(loc="upper left")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def gap_figure(run: Run, stream: str, tolerance: int) -> str:
     """The gap of every rendering against time, for each gate mode that looked on, with the tolerance as a band."""
     clients = [client for client in run.clients if client.rendered.get(stream)]
     with mpl.rc_context(STYLE):
-        figure, (row,) = _figure(1, max(1, len(clients)))
+        figure, (row,) = new_figure(1, max(1, len(clients)))
         top = tolerance + 1.0
         for axes, client in zip(row, clients, strict=True):
             entries = [each for each in _within(run, client.rendered[stream]) if each.gap is not None]
@@ -145,7 +160,7 @@ def gap_figure(run: Run, stream: str, tolerance: int) -> str:
             top = max(top, *(abs(gap) + 1 for gap in gaps)) if gaps else top
         for axes in row:
             axes.set_ylim(-tolerance - 1, top)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def _gate_title(client: ClientRecord) -> str:
@@ -156,7 +171,7 @@ def _gate_title(client: ClientRecord) -> str:
 def growth_figure(growth: Growth) -> str:
     """Largest gap against event rate, a line for each delay that a player adds: without a gate, and with one."""
     with mpl.rc_context(STYLE):
-        figure, (row,) = _figure(1, 3)
+        figure, (row,) = new_figure(1, 3)
         top = max((point.max_gap for point in growth.points), default=1)
         shades = ["#9ec5e8", "#5f9fd4", "#2c78b7", "#0b4a80"]
         for axes, gate in zip(row, ("off", "age", "event"), strict=True):
@@ -177,4 +192,4 @@ def growth_figure(growth: Growth) -> str:
             axes.set_ylabel("largest gap rendered (events)")
         handles, labels = row[0].get_legend_handles_labels()  # the last panel has room: its lines stay low
         row[2].legend(handles, labels, title="delay added by the player", title_fontsize=8.5, loc="upper right")
-        return _svg(figure)
+        return svg_text(figure)
