@@ -45,6 +45,7 @@ from server.command_desk import Absorbed, Answer, CommandDesk, Forward, Outcome,
 from server.errors import ChannelError, Flood, LinkDown
 from server.event_clock import EventClock
 from server.feedback_fanout import FeedbackFanout
+from server.feedback_viewer import FeedbackViewer, NoViewer
 from server.metrics import Metrics
 from server.peer import Peer
 from server.peers import Peers
@@ -72,13 +73,6 @@ class MediaFeed(Protocol):
     def feed(self, media: Media, now: float) -> None: ...
 
 
-class FeedbackViewer(Protocol):
-    """What the console needs of the 3D scene."""
-
-    def configure(self, description: RobotDescription) -> None: ...
-    def feedback(self, feedback: Feedback) -> None: ...
-
-
 class Console:
     """Enter `run` once; it returns when cancelled, with all peers and links closed."""
 
@@ -104,7 +98,7 @@ class Console:
         self.further_news: list[Callable[[], ServerMessage]] = []  # what else newcomers are told
         self._metrics = metrics
         self._media = media
-        self._viewer = viewer
+        self._viewer = viewer or NoViewer()
         self.speed_cap = SpeedCap(settings.speed_cap)
         self._desk = CommandDesk(self.clock, self.seat.rules, self.speed_cap)
         self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.drivers, self.peers.observers)
@@ -269,8 +263,7 @@ class Console:
         self._shown_stop = StopState()
         self.peers.end_all("new epoch")
         self._media.configure(description)
-        if self._viewer is not None:
-            self._viewer.configure(description)
+        self._viewer.configure(description)
 
     def link_up(self) -> None:
         if self.robot.description is None:
@@ -313,8 +306,7 @@ class Console:
         if feedback.stop != self._shown_stop:
             self._shown_stop = feedback.stop
             self.peers.tell("stop", StopStateNotice(stop=feedback.stop, event=feedback.event))
-        if self._viewer is not None:
-            self._viewer.feedback(feedback)
+        self._viewer.feedback(feedback)
 
     def refusal_received(self, refusal: Refusal) -> None:
         self._metrics.refusals.labels(refusal.reason).inc()
@@ -362,6 +354,7 @@ class Console:
             return self.robot.send_stop(message)
         if isinstance(message, Command):
             self._forwarded_at = time.monotonic()
+            self._viewer.command(message)
         return self.robot.send(message)
 
     def _report_speed(self, peer: Peer, report: Report) -> None:

@@ -6,7 +6,18 @@ from typing import NamedTuple
 
 from robot_bridge.protocol.description import Body, BodyJoint, RobotDescription
 
-__all__ = ["Pose", "body_pose", "scene_paths", "world_positions"]
+__all__ = [
+    "Pose",
+    "about",
+    "body_pose",
+    "inverse",
+    "joined",
+    "product",
+    "rotate",
+    "scene_paths",
+    "world_poses",
+    "world_positions",
+]
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # w, x, y, z
@@ -42,13 +53,32 @@ def scene_paths(description: RobotDescription) -> dict[str, str]:
 
 def world_positions(description: RobotDescription, joints: Mapping[str, float]) -> list[Vector]:
     """Where the bodies are in the world, in the order of `scene_paths`."""
+    return [pose.position for pose in world_poses(description, joints).values()]
+
+
+def world_poses(description: RobotDescription, joints: Mapping[str, float]) -> dict[str, Pose]:
+    """The bodies' poses in the world, in the order of `scene_paths`."""
     bodies = {body.name: body for body in description.bodies}
-    poses: dict[str, Pose] = {"": Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))}
+    world = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    poses: dict[str, Pose] = {}
     for name in scene_paths(description):
-        parent, own = poses[bodies[name].parent], body_pose(bodies[name], joints)
-        position = _added(parent.position, rotate(parent.orientation, own.position))
-        poses[name] = Pose(position, product(parent.orientation, own.orientation))
-    return [pose.position for name, pose in poses.items() if name]
+        parent = poses.get(bodies[name].parent, world)
+        poses[name] = joined(parent, body_pose(bodies[name], joints))
+    return poses
+
+
+def joined(outer: Pose, inner: Pose) -> Pose:
+    """A pose given in another one."""
+    position = _added(outer.position, rotate(outer.orientation, inner.position))
+    return Pose(position, product(outer.orientation, inner.orientation))
+
+
+def inverse(pose: Pose) -> Pose:
+    """Of a pose of unit orientation."""
+    w, x, y, z = pose.orientation
+    back = (w, -x, -y, -z)
+    at_x, at_y, at_z = rotate(back, pose.position)
+    return Pose((-at_x, -at_y, -at_z), back)
 
 
 def _moved(pose: Pose, joint: BodyJoint, value: float) -> Pose:

@@ -10,8 +10,10 @@ import structlog
 import viser
 
 from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Feedback
+from robot_bridge.protocol.messages import Command, Feedback
+from server.commanded_path import CommandedPath
 from server.errors import SceneUnavailable
+from server.kinematics import Pose
 from server.metrics import Metrics
 from server.scene_model import SceneModel
 from server.scene_scale import SceneScale
@@ -40,15 +42,24 @@ class SceneView:
         self._scale: SceneScale | None = None
         self._description: RobotDescription | None = None  # not built yet
         self._feedback: Feedback | None = None  # not shown yet
+        self._path: CommandedPath | None = None
         self._viewers = 0
         self._news = asyncio.Event()
 
     def configure(self, description: RobotDescription) -> None:
         self._description = description
+        self._path = CommandedPath(description)
         self._news.set()
+
+    def command(self, command: Command) -> None:
+        """One that was forwarded to the robot."""
+        if self._path is not None:
+            self._path.command(command.event, command.values)
 
     def feedback(self, feedback: Feedback) -> None:
         self._feedback = feedback
+        if self._path is not None:
+            self._path.feedback(feedback)
         if self._viewers:
             self._news.set()
 
@@ -86,23 +97,27 @@ class SceneView:
             if self._description is not None and self._server is not None:
                 description, self._description = self._description, None
                 self._scale = SceneScale(description)
-                self._model = await self._built(self._server, self._scale.description(description))
+                magnified = self._scale.description(description)
+                self._model = await self._built(self._server, magnified, self._scale.factor)
             if self._viewers and self._feedback is not None and self._model is not None and self._scale is not None:
                 feedback, self._feedback = self._feedback, None
-                await self._pose(self._model, self._scale.feedback(feedback))
+                commanded = None if self._path is None else self._scale.poses(self._path.poses())
+                await self._pose(self._model, self._scale.feedback(feedback), commanded)
                 await asyncio.sleep(self._interval)
 
-    async def _built(self, server: viser.ViserServer, description: RobotDescription) -> SceneModel | None:
+    async def _built(
+        self, server: viser.ViserServer, description: RobotDescription, factor: float
+    ) -> SceneModel | None:
         """None: nothing can be made of it. A shape that viser does not take must not end the console."""
         try:
-            return await asyncio.to_thread(_build, server, description)
+            return await asyncio.to_thread(_build, server, description, factor)
         except Exception as error:
             self._failed("built", error)
             return None
 
-    async def _pose(self, model: SceneModel, feedback: Feedback) -> None:
+    async def _pose(self, model: SceneModel, feedback: Feedback, commanded: dict[str, Pose] | None) -> None:
         try:
-            await asyncio.to_thread(model.pose, feedback)
+            await asyncio.to_thread(model.pose, feedback, commanded)
         except Exception as error:
             self._failed("posed", error)
             self._model = None  # rather no picture than one that stands still
@@ -126,7 +141,7 @@ def _start_viser() -> viser.ViserServer:
     return server
 
 
-def _build(server: viser.ViserServer, description: RobotDescription) -> SceneModel:
+def _build(server: viser.ViserServer, description: RobotDescription, factor: float) -> SceneModel:
     with server.atomic():
         server.scene.reset()
-        return SceneModel(server, description)
+        return SceneModel(server, description, factor)

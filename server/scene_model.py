@@ -1,17 +1,20 @@
 """Builds a robot in viser from its description, and poses it from feedback. Runs in the scene's own thread."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
-import trimesh
 import viser
 
-from robot_bridge.protocol.description import Geom, RobotDescription
+from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Feedback
-from server.kinematics import body_pose, scene_paths, world_positions
+from server.kinematics import Pose, body_pose, scene_paths, world_poses, world_positions
 from server.scene_fences import SceneFences
+from server.scene_ghost import SceneGhost
+from server.scene_shapes import add_geom
+from server.scene_trail import SceneTrails
 
-__all__ = ["SceneModel"]
+__all__ = ["SceneModel", "length_words"]
 
 BACKGROUND = (16, 20, 26)
 GRID = (44, 52, 64)
@@ -21,6 +24,9 @@ RANGES = (64, 200, 255)
 LABEL_LIFT = 0.4  # m above the highest joint
 FLOOR_LIFT = 0.004  # m, so that the grid shows on a floor of the robot's own
 STOPPED = " · STOPPED"
+CELL = 0.5  # m, of the grid
+TRAIL_STEP = 0.004  # of the radius of the scene
+RAY = (40, 92, 122)
 ARROW_LENGTH = 0.6  # m at full scale
 MIN_VIEW, MAX_VIEW = 1.6, 6.0  # m, how far the first look stands off
 
@@ -28,14 +34,17 @@ Triple = tuple[float, float, float]
 
 
 class SceneModel:
-    """One robot in one viser server. `pose` sets only what changed."""
+    """One robot in one viser server. `pose` sets only what changed.
 
-    def __init__(self, server: viser.ViserServer, description: RobotDescription) -> None:
+    `factor` is by how much the description was magnified before.
+    """
+
+    def __init__(self, server: viser.ViserServer, description: RobotDescription, factor: float = 1.0) -> None:
         self._server = server
         self._description = description
         self._paths = scene_paths(description)
         self._joint_names = [joint.name for joint in description.joints]
-        self._build_surroundings()
+        self._build_surroundings(factor)
         self.frames = {
             body.name: server.scene.add_frame(self._paths[body.name], show_axes=False)
             for body in sorted(description.bodies, key=lambda body: self._paths.get(body.name, "").count("/"))
@@ -43,15 +52,19 @@ class SceneModel:
         }
         for body in description.bodies:
             for number, geom in enumerate(body.geoms if body.name in self._paths else ()):
-                _add_geom(server, f"{self._paths[body.name]}/geom{number}", geom)
+                add_geom(server, f"{self._paths[body.name]}/geom{number}", geom)
         self._moving = [body for body in description.bodies if body.joints and body.name in self._paths]
         self._place_fixed_bodies()
         self.label = self._add_label()
         self.arrow = self._add_arrow()
         self.points = self._add_points()
+        self.rays = self._add_rays()
+        self.ghost = SceneGhost(server, description, description.hold)
+        self.trails = SceneTrails(server, description, self._radius() * TRAIL_STEP)
         self.fences = SceneFences(server, description)
 
-    def pose(self, feedback: Feedback) -> None:
+    def pose(self, feedback: Feedback, commanded: Mapping[str, Pose] | None = None) -> None:
+        """`commanded`: where the bodies would be by the commands alone; None: nothing is commanded."""
         joints = dict(zip(self._joint_names, feedback.joints, strict=False))
         with self._server.atomic():
             # First: viewers hold back all that follows until they show a picture of this event (web's scene_gate.ts).
@@ -62,15 +75,17 @@ class SceneModel:
             self._pose_arrow(feedback.wrench)
             self._pose_points(feedback.ranges)
             self.fences.show(feedback.limits)
+            self.ghost.show(commanded)
+            self.trails.follow(world_poses(self._description, joints))
 
-    def _build_surroundings(self) -> None:
+    def _build_surroundings(self, factor: float) -> None:
         scene, camera = self._server.scene, self._server.initial_camera
         scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8), format="png")
         scene.add_grid(
             "/floor",
             width=20.0,
             height=20.0,
-            cell_size=0.5,
+            cell_size=CELL,
             section_size=1.0,
             cell_color=GRID,
             section_color=GRID_SECTION,
@@ -78,6 +93,12 @@ class SceneModel:
             position=(0.0, 0.0, FLOOR_LIFT),
         )
         x, y, z = self._center()
+        scene.add_label(
+            "/floor/scale",
+            f"small square: {length_words(CELL / factor)}",
+            position=(x + self._radius() * 0.8, y - self._radius() * 0.8, FLOOR_LIFT),
+            font_screen_scale=0.9,
+        )
         distance = self._radius() * 1.9
         camera.look_at = (x, y, z * 0.6)
         camera.position = (x - distance * 0.62, y - distance * 0.62, z * 0.6 + distance * 0.62)
@@ -149,7 +170,7 @@ class SceneModel:
 
     def _pose_points(self, ranges: list[float]) -> None:
         ring = self._description.ranges
-        if self.points is None or ring is None:
+        if self.points is None or self.rays is None or ring is None:
             return
         seen = [
             (distance * math.cos(angle), distance * math.sin(angle), 0.0)
@@ -157,28 +178,32 @@ class SceneModel:
             if ring.range_min <= distance < ring.range_max
             for angle in (ring.angle_min + number * ring.angle_increment,)
         ]
+        ends = np.array(seen, dtype=np.float32)
         if seen:
-            self.points.points = np.array(seen, dtype=np.float32)
-        if self.points.visible != bool(seen):
-            self.points.visible = bool(seen)
+            self.points.points = ends
+            self.rays.points = np.stack((np.zeros_like(ends), ends), axis=1)
+        for handle in (self.points, self.rays):
+            if handle.visible != bool(seen):
+                handle.visible = bool(seen)
 
-
-def _add_geom(server: viser.ViserServer, path: str, geom: Geom) -> None:
-    scene, (first, second, _) = server.scene, geom.size
-    red, green, blue, alpha = geom.rgba
-    color = (round(red * 255), round(green * 255), round(blue * 255))
-    opacity = None if alpha >= 1 else alpha
-    at, wxyz = geom.position, geom.orientation
-    if geom.shape == "box":
-        dimensions = (2 * geom.size[0], 2 * geom.size[1], 2 * geom.size[2])
-        scene.add_box(path, color=color, dimensions=dimensions, opacity=opacity, position=at, wxyz=wxyz)
-    elif geom.shape == "sphere":
-        scene.add_icosphere(path, radius=first, color=color, opacity=opacity, position=at, wxyz=wxyz)
-    else:
-        make = trimesh.creation.cylinder if geom.shape == "cylinder" else trimesh.creation.capsule
-        mesh = make(radius=first, height=2 * second)
-        # viser's cylinder stands on another axis than ours (z), and it has no capsule: both go as meshes, centred.
-        vertices = np.asarray(mesh.vertices - mesh.bounds.mean(axis=0), dtype=np.float32)
-        scene.add_mesh_simple(
-            path, vertices, np.asarray(mesh.faces), color=color, opacity=opacity, position=at, wxyz=wxyz
+    def _add_rays(self) -> viser.LineSegmentsHandle | None:
+        """From the ring to what each of its sensors sees."""
+        ring = self._description.ranges
+        if ring is None or ring.body not in self._paths:
+            return None
+        return self._server.scene.add_line_segments(
+            f"{self._paths[ring.body]}/rays",
+            np.zeros((1, 2, 3), dtype=np.float32),
+            RAY,
+            thickness=1.0,
+            thickness_units="screen",
+            visible=False,
         )
+
+
+def length_words(metres: float) -> str:
+    """ "500 nm": as people write it."""
+    for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
+        if metres >= 0.1 * size:
+            return f"{metres / size:.3g} {unit}"
+    return f"{metres / 1e-9:.3g} nm"

@@ -10,6 +10,7 @@ import msgspec
 
 from robot_bridge.protocol.description import Body, Geofence, Geom, Joint, RangeRing, RobotDescription
 from robot_bridge.protocol.messages import Feedback
+from server.kinematics import Pose
 
 __all__ = ["SceneScale"]
 
@@ -40,6 +41,9 @@ class SceneScale:
             joints=tuple(_joint(joint, by) for joint in description.joints),
             ranges=None if description.ranges is None else _ring(description.ranges, by),
             geofences=tuple(_fence(fence, by) for fence in description.geofences),
+            body_twists=tuple(
+                msgspec.structs.replace(twist, point=_times(twist.point, by)) for twist in description.body_twists
+            ),
         )
 
     def feedback(self, feedback: Feedback) -> Feedback:
@@ -52,6 +56,16 @@ class SceneScale:
         ]
         ranges = [value * self.factor for value in feedback.ranges]
         return msgspec.structs.replace(feedback, joints=joints, ranges=ranges)
+
+    def poses(self, poses: dict[str, Pose] | None) -> dict[str, Pose] | None:
+        """Where its bodies are, by poses of the robot as it is."""
+        if poses is None or self.factor == 1.0:
+            return poses
+        return {name: _magnified(pose, self.factor) for name, pose in poses.items()}
+
+
+def _magnified(pose: Pose, by: float) -> Pose:
+    return Pose(_times(pose.position, by), pose.orientation)
 
 
 def _factor(reach: float) -> float:

@@ -16,7 +16,8 @@ from robot_bridge.protocol.description import (
     WrenchSensor,
 )
 from robot_bridge.protocol.messages import Feedback, StopState
-from server.scene_model import SceneModel
+from server.kinematics import Pose
+from server.scene_model import SceneModel, length_words
 
 Z = (0.0, 0.0, 1.0)
 ROBOT = RobotDescription(
@@ -96,6 +97,57 @@ def test_what_the_ring_sees_are_points_and_nothing_seen_is_none(server: viser.Vi
     model.pose(_feedback(ranges=[5.0, 5.0, 5.0]))
     shown.append(model.points.visible)
     assert shown == [True, False]
+
+
+def test_every_ray_of_the_ring_ends_at_what_it_sees(server: viser.ViserServer) -> None:
+    model = SceneModel(server, ROBOT)
+    assert model.rays is not None
+    model.pose(_feedback(ranges=[2.0, 5.0, 1.0]))
+    assert model.rays.points.shape == (2, 2, 3)
+    assert tuple(model.rays.points[0, 1]) == pytest.approx((2.0, 0.0, 0.0))
+    model.pose(_feedback(ranges=[5.0, 5.0, 5.0]))
+    assert not model.rays.visible
+
+
+def test_the_ghost_stands_where_the_commands_lead_and_only_then(server: viser.ViserServer) -> None:
+    model = SceneModel(server, ROBOT)
+    turned = Pose((0.0, 0.0, 0.9), (1.0, 0.0, 0.0, 0.0))
+    shown = [model.ghost.visible]
+    model.pose(_feedback(), {"room": turned, "arm": turned})
+    shown.append(model.ghost.visible)
+    assert model.ghost.label.text == "commanded, last 0.3 s"
+    model.pose(_feedback())
+    shown.append(model.ghost.visible)
+    assert shown == [False, True, False]
+
+
+def test_the_trail_follows_what_moves_and_stays_bounded(server: viser.ViserServer) -> None:
+    model = SceneModel(server, ROBOT)
+    model.pose(_feedback())
+    model.pose(_feedback(joints=[0.0, 1e-6]))  # less than a step
+    assert model.trails.lengths() == [1]
+    for step in range(1, 700):
+        model.pose(_feedback(joints=[0.0, step * 0.1]))
+    assert 400 < model.trails.lengths()[0] <= 16 * 32
+
+
+def test_the_event_comes_before_what_belongs_to_it(server: viser.ViserServer) -> None:
+    """Viewers hold back what follows an event, so nothing of a pose may come before its event."""
+    model = SceneModel(server, ROBOT)
+    model.pose(_feedback())
+    buffer = server._websock_server._broadcast_buffer
+    before = buffer.message_counter
+    model.pose(_feedback(event=8, joints=[0.5, 0.5], wrench=[9.0] * 6, ranges=[1.0] * 3))
+    new = [message for number, message in sorted(buffer.message_from_id.items()) if number >= before]
+    assert getattr(new[0], "updates", None) == {"text": "s 8"}
+    assert len(new) < 128  # viser's largest window: a pose stays in one
+
+
+@pytest.mark.parametrize(
+    ("metres", "words"), [(0.5, "0.5 m"), (0.05, "50 mm"), (5e-4, "0.5 mm"), (5e-6, "5 µm"), (5e-8, "50 nm")]
+)
+def test_the_grid_says_how_large_its_squares_are(metres: float, words: str) -> None:
+    assert length_words(metres) == words
 
 
 @pytest.mark.parametrize(
