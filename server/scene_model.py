@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
-from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.description import Body, RobotDescription
 from robot_bridge.protocol.messages import Feedback
 from server.kinematics import Pose, body_pose, scene_paths, world_poses, world_positions
 from server.scene_fences import SceneFences
@@ -27,6 +27,8 @@ STOPPED = " · STOPPED"
 CELL = 0.5  # m, of the grid
 TRAIL_STEP = 0.004  # of the radius of the scene
 RAY = (40, 92, 122)
+GHOST_APART = 0.008  # of the radius of the scene: nearer than this the ghost is not drawn
+ARROW_LEAST = 0.15  # m, so that a light contact shows
 ARROW_LENGTH = 0.6  # m at full scale
 MIN_VIEW, MAX_VIEW = 1.6, 6.0  # m, how far the first look stands off
 
@@ -59,7 +61,7 @@ class SceneModel:
         self.arrow = self._add_arrow()
         self.points = self._add_points()
         self.rays = self._add_rays()
-        self.ghost = SceneGhost(server, description, description.hold)
+        self.ghost = SceneGhost(server, description, description.hold, self._radius() * GHOST_APART)
         self.trails = SceneTrails(server, description, self._radius() * TRAIL_STEP)
         self.fences = SceneFences(server, description)
 
@@ -75,8 +77,9 @@ class SceneModel:
             self._pose_arrow(feedback.wrench)
             self._pose_points(feedback.ranges)
             self.fences.show(feedback.limits)
-            self.ghost.show(commanded)
-            self.trails.follow(world_poses(self._description, joints))
+            measured = world_poses(self._description, joints)
+            self.ghost.show(commanded, measured)
+            self.trails.follow(measured)
 
     def _build_surroundings(self, factor: float) -> None:
         scene, camera = self._server.scene, self._server.initial_camera
@@ -140,6 +143,8 @@ class SceneModel:
         sensor = self._description.wrench
         if sensor is None or sensor.body not in self._paths:
             return None
+        body = next(each for each in self._description.bodies if each.name == sensor.body)
+        self._skin = _skin(body)
         points = np.zeros((1, 2, 3), dtype=np.float32)
         return self._server.scene.add_arrows(f"{self._paths[sensor.body]}/wrench", points, ARROW, visible=False)
 
@@ -148,10 +153,13 @@ class SceneModel:
         if self.arrow is None or sensor is None:
             return
         force = np.array(wrench[:3], dtype=np.float32)
-        felt = force.shape == (3,) and float(np.linalg.norm(force)) >= sensor.threshold_force
+        felt = force.shape == (3,) and float(np.linalg.norm(force)) >= max(sensor.threshold_force, 1e-12)
         if felt:
-            tip = force / max(sensor.full_scale_force, 1e-6) * ARROW_LENGTH
-            self.arrow.points = np.array([[np.zeros(3), tip]], dtype=np.float32)
+            size = float(np.linalg.norm(force))
+            way = force / size
+            length = max(ARROW_LEAST, min(1.0, size / max(sensor.full_scale_force, 1e-12)) * ARROW_LENGTH)
+            tail = np.array((0.0, 0.0, self._skin[1]), dtype=np.float32) + way * self._skin[0]
+            self.arrow.points = np.array([[tail, tail + way * length]], dtype=np.float32)
         if self.arrow.visible != felt:
             self.arrow.visible = felt
 
@@ -199,6 +207,16 @@ class SceneModel:
             thickness_units="screen",
             visible=False,
         )
+
+
+def _skin(body: Body) -> tuple[float, float]:
+    """How far from the body's origin its surface is, and how high its middle: an arrow inside it would not be seen."""
+    around = [
+        (max(geom.size) if geom.shape == "box" else geom.size[0], geom.position[2])
+        for geom in body.geoms
+        if math.hypot(*geom.position) <= math.hypot(*geom.size)
+    ]
+    return max(around, default=(0.0, 0.0))
 
 
 def length_words(metres: float) -> str:

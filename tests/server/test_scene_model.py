@@ -16,7 +16,7 @@ from robot_bridge.protocol.description import (
     WrenchSensor,
 )
 from robot_bridge.protocol.messages import Feedback, StopState
-from server.kinematics import Pose
+from server.kinematics import Pose, world_poses
 from server.scene_model import SceneModel, length_words
 
 Z = (0.0, 0.0, 1.0)
@@ -81,11 +81,13 @@ def test_a_force_is_an_arrow_and_a_small_one_is_none(server: viser.ViserServer) 
     assert model.arrow is not None
     model.pose(_feedback(wrench=[0.0, 10.0, 0.0, 0.0, 0.0, 0.0]))
     shown = [model.arrow.visible]
-    assert tuple(model.arrow.points[0, 1]) == pytest.approx((0, 0.6, 0))
-    for wrench in ([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], []):
+    # From the body's surface: inside it nobody would see it.
+    assert tuple(model.arrow.points[0, 0]) == pytest.approx((0, 0.1, 0))
+    assert tuple(model.arrow.points[0, 1]) == pytest.approx((0, 0.7, 0))
+    for wrench in ([0.5, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0] * 6, []):
         model.pose(_feedback(wrench=wrench))
         shown.append(model.arrow.visible)
-    assert shown == [True, False, False]
+    assert shown == [True, False, False, False]
 
 
 def test_what_the_ring_sees_are_points_and_nothing_seen_is_none(server: viser.ViserServer) -> None:
@@ -118,7 +120,12 @@ def test_the_ghost_stands_where_the_commands_lead_and_only_then(server: viser.Vi
     assert model.ghost.label.text == "commanded, last 0.3 s"
     model.pose(_feedback())
     shown.append(model.ghost.visible)
-    assert shown == [False, True, False]
+    same = world_poses(ROBOT, {"turn": 0.0, "lift": 1e-4})
+    model.pose(_feedback(), same)
+    shown.append(model.ghost.visible)
+    model.pose(_feedback(), world_poses(ROBOT, {"turn": 0.2, "lift": 0.0}))
+    shown.append(model.ghost.visible)
+    assert shown == [False, True, False, False, True]
 
 
 def test_the_trail_follows_what_moves_and_stays_bounded(server: viser.ViserServer) -> None:
