@@ -7,6 +7,7 @@ the link is a `bench.baseline_server`.
 
 import asyncio
 import json
+import signal
 import sys
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
@@ -29,6 +30,9 @@ Counts = dict[str, list[int]]  # per stream: frames, packets lost
 
 async def attend(link: str, count: int, plain: bool) -> None:
     began = time.monotonic()
+    attending = asyncio.current_task()
+    if attending is not None:  # observers take their leave, or the console would go on sending to nobody for a while
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, attending.cancel)
     gate = asyncio.Semaphore(AT_ONCE)
     stacks = [AsyncExitStack() for _ in range(count)]
 
@@ -40,6 +44,8 @@ async def attend(link: str, count: int, plain: bool) -> None:
         readers = await asyncio.gather(*(join(stack) for stack in stacks))
         _say({"observers": count, "seconds": round(time.monotonic() - began, 1)})
         await _answer(readers)
+    except asyncio.CancelledError:
+        pass
     finally:
         await asyncio.gather(*(stack.aclose() for stack in stacks))
 

@@ -8,11 +8,12 @@ Why each is needed:
   the next one begins;
 - aioice never gathers loopback, and takes its STUN and TURN servers before anybody could ask the console for them;
 - its SCTP waits at least one second before it repeats a lost message, three while it connects, and then sends one
-  packet at a time;
+  packet at a time; it acknowledges every single packet;
 - its DTLS takes one record from OpenSSL for each datagram that comes in. A record that waits there, as one that
   overtook the end of the handshake does, is never caught up with: from then on every message is one datagram late.
 """
 
+import asyncio
 import contextlib
 import struct
 from collections.abc import Callable, Sequence
@@ -46,6 +47,7 @@ __all__ = [
 
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
 RETRANSMISSION_CEILING = 1.5  # s; above every round trip that one drives over, satellites' included
+ACKNOWLEDGEMENT_DELAY = 0.15  # s; RFC 9260 6.2 allows 0.5 and recommends 0.2
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
 RECORD = 1500  # bytes, the most that a DTLS record carries here
 WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
@@ -253,3 +255,37 @@ def hasten_sctp(pc: RTCPeerConnection) -> None:
     sctp._update_rto = update
     sctp._t3_expired = expired
     sctp._transmit = transmit_or_not
+    _delay_acknowledgements(sctp)
+
+
+def _delay_acknowledgements(sctp: Any) -> None:
+    """Acknowledge every second packet, or after a while (RFC 9260 6.2), as browsers do; aiortc does each.
+
+    At once when something is missing or came twice: the sender is to find out soon. A console with a hundred
+    observers spends much of its time on what they acknowledge.
+    """
+    acknowledge = sctp._send_sack
+    timer: asyncio.TimerHandle | None = None
+
+    async def acknowledge_late() -> None:
+        with contextlib.suppress(ConnectionError):
+            await acknowledge()
+
+    def late() -> None:
+        nonlocal timer
+        timer = None
+        if sctp.state == "connected":
+            sctp._late_acknowledgement = asyncio.ensure_future(acknowledge_late())
+
+    async def acknowledge_soon() -> None:
+        nonlocal timer
+        if timer is None and not sctp._sack_misordered and not sctp._sack_duplicates:
+            sctp._sack_needed = False
+            timer = asyncio.get_running_loop().call_later(ACKNOWLEDGEMENT_DELAY, late)
+            return
+        if timer is not None:
+            timer.cancel()
+            timer = None
+        await acknowledge()
+
+    sctp._send_sack = acknowledge_soon

@@ -1,5 +1,7 @@
 """Feedback to everyone: operators at once, observers at a bounded rate, the newest only.
 
+The more observers there are, the less often each is served, down to half the rate.
+
 `FeedbackPace` says when; `FeedbackFanout` sends. Sending to a peer costs a fraction of a millisecond in Python, so a
 hundred observers are served in small slices, and the operator's commands are handled between them.
 """
@@ -11,6 +13,8 @@ from typing import Protocol
 __all__ = ["FeedbackFanout", "FeedbackPace", "FeedbackReceiver"]
 
 SLICE = 4  # observers served in one turn of the loop
+FULL_RATE = 50  # observers that are served at the full rate
+LEAST_RATE = 0.5  # of the full rate
 
 
 class FeedbackReceiver(Protocol):
@@ -23,12 +27,17 @@ class FeedbackPace:
     """When the observers get the newest feedback: at most `rate` times a second. No I/O."""
 
     def __init__(self, rate: float) -> None:
-        self._interval = 1 / rate
+        self._shortest = 1 / rate
+        self._interval = self._shortest
         self._next_at = 0.0
         self._newest: str | None = None
 
     def offer(self, text: str) -> None:
         self._newest = text
+
+    def share(self, observers: int) -> None:
+        """So many share the rate."""
+        self._interval = self._shortest / max(LEAST_RATE, min(1.0, FULL_RATE / max(1, observers)))
 
     def wait(self, now: float) -> float | None:
         """Seconds until something is due; None when nothing waits."""
@@ -78,7 +87,9 @@ class FeedbackFanout:
                     await self._serve(text)
 
     async def _serve(self, text: str) -> None:
-        for count, peer in enumerate(self._observers(), start=1):
+        observers = self._observers()
+        self._pace.share(len(observers))
+        for count, peer in enumerate(observers, start=1):
             peer.send_feedback(text)
             if count % SLICE == 0:
                 await asyncio.sleep(0)

@@ -18,6 +18,7 @@ from aiortc import (
     RTCSessionDescription,
 )
 from aiortc.mediastreams import AudioStreamTrack, VideoStreamTrack
+from aiortc.rtcsctptransport import SackChunk
 from aiortc.rtp import RtcpRrPacket, RtpPacket
 
 from client import aiortc_private
@@ -127,7 +128,8 @@ async def test_a_dtls_transport_has(attribute: str) -> None:
 
 @pytest.mark.parametrize(
     "attribute",
-    ["_rto", "_cwnd", "_srtt", "_rttvar", "_update_rto", "_t3_expired", "_transmit", "_handle_data", "transport"],
+    ["_rto", "_cwnd", "_srtt", "_rttvar", "_update_rto", "_t3_expired", "_transmit", "_handle_data", "transport"]
+    + ["_send_sack", "_sack_needed", "_sack_misordered", "_sack_duplicates", "_send_chunk"],
 )
 async def test_sctp_has(attribute: str) -> None:
     pc = new_peer()
@@ -289,3 +291,38 @@ async def test_a_lost_message_is_found_out_sooner_and_does_not_shut_the_window()
         assert sctp._cwnd >= aiortc_private.WINDOW_FLOOR
         sctp._update_rto(10.0)
         assert sctp._rto == aiortc_private.RETRANSMISSION_CEILING
+
+
+async def test_every_second_message_is_acknowledged_at_once_and_a_single_one_after_a_while() -> None:
+    pc = new_peer()
+    async with connected(pc, before_answer=hasten_sctp) as (here, there):
+        got: asyncio.Queue[str] = asyncio.Queue(10)
+        here.on("message", got.put_nowait)
+        sctp: Any = pc.sctp
+        acknowledged: list[int] = []
+        told = asyncio.Event()
+        send = sctp._send_chunk
+
+        async def note(chunk: Any) -> None:
+            if isinstance(chunk, SackChunk):
+                acknowledged.append(chunk.cumulative_tsn)
+                told.set()
+            await send(chunk)
+
+        sctp._send_chunk = note
+        there.send("zero")  # its acknowledgement takes what the opening of the channel left over along
+        await got.get()
+        await told.wait()
+        acknowledged.clear()
+        told.clear()
+        for text in "one", "two":
+            there.send(text)
+            await got.get()
+        await told.wait()
+        assert len(acknowledged) == 1
+        told.clear()
+        there.send("three")
+        await got.get()
+        assert len(acknowledged) == 1
+        await told.wait()
+        assert len(acknowledged) == 2

@@ -37,6 +37,16 @@ def test_in_between_the_newest_waits_its_turn() -> None:
     assert pace.take(5.1001) == "c"
 
 
+@pytest.mark.parametrize(("observers", "wait"), [(0, 0.1), (50, 0.1), (75, 0.15), (100, 0.2), (1000, 0.2)])
+def test_many_observers_share_the_rate_down_to_half_of_it(observers: int, wait: float) -> None:
+    pace = FeedbackPace(10)
+    pace.share(observers)
+    pace.offer("a")
+    pace.take(5.0)
+    pace.offer("b")
+    assert pace.wait(5.0) == pytest.approx(wait)
+
+
 @given(st.lists(st.floats(0, 0.3), min_size=2, max_size=60))
 def test_no_more_than_the_rate_leaves_and_the_newest_never_starves(gaps: list[float]) -> None:
     pace, now, left = FeedbackPace(10), 1.0, []
