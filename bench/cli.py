@@ -23,10 +23,12 @@ __all__ = ["SECTIONS", "Measured", "main", "measure"]
 SECTIONS = (
     "command_to_feedback",
     "lossy",
+    "gates",
     "capture_to_shown",
     "first_picture",
     "start",
     "observers",
+    "relay",
     "robot_cost",
     "memory",
 )

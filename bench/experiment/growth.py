@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from bench.emulator.delay import Delay
-from bench.emulator.network import Network
+from bench.emulator.network_process import NetworkProcess
 from bench.emulator.profile import Profile, TwoWay
 from bench.experiment.choices import Choices, MediaChoice
 from bench.experiment.headless import HeadlessClient, headless_client
@@ -94,26 +94,37 @@ def later(profile: Profile, seconds: float) -> Profile:
     return replace(profile, media=TwoWay(towards, profile.media.to_robot))
 
 
-async def run_growth(choices: Choices, profile: Profile, say: Callable[[str], None]) -> Growth:
-    """`choices.seconds` at each event rate. Raises ProcessFailed, ConsoleError."""
+async def run_growth(
+    choices: Choices,
+    profile: Profile,
+    say: Callable[[str], None],
+    *,
+    rates: Sequence[float] = RATES,
+    viewers: Sequence[tuple[GateMode, float]] = VIEWERS,
+) -> Growth:
+    """`choices.seconds` at each event rate. Raises ProcessFailed, ConsoleError.
+
+    Args:
+        viewers: each one's gate, and the seconds that its player adds
+    """
     points: list[Point] = []
     async with (
         running_stage(choices.robot, profile, MEDIA, choices.seed, robot_link=False) as stage,
         Console(stage.near_link, video=False, audio=False, name="operator") as operator,
-        _viewers(stage, choices, profile) as viewers,
+        _viewers(stage, choices, profile, viewers) as watching,
     ):
         await operator.take_seat()
         async with asyncio.timeout(60):
-            await asyncio.gather(*(viewer.until_picture() for _, viewer in viewers))
-        for rate in RATES:
+            await asyncio.gather(*(viewer.until_picture() for _, viewer in watching))
+        for rate in rates:
             say(f"{profile.name}, growth: {rate:g} events a second for {choices.seconds:g} s")
             await _drive(operator, rate, SETTLE)
             async with AsyncExitStack() as observing:
-                for _, viewer in viewers:
+                for _, viewer in watching:
                     viewer.record = _anew(viewer.record)
                     await observing.enter_async_context(viewer.observed())
                 await _drive(operator, rate, choices.seconds)
-            points += [_point(delay, viewer) for delay, viewer in viewers]
+            points += [_point(delay, viewer) for delay, viewer in watching]
     return Growth(profile.name, choices.tolerance, DELAYS, points)
 
 
@@ -127,13 +138,13 @@ async def _drive(operator: Console, rate: float, seconds: float) -> None:
 
 @asynccontextmanager
 async def _viewers(
-    stage: Stage, choices: Choices, profile: Profile
+    stage: Stage, choices: Choices, profile: Profile, chosen: Sequence[tuple[GateMode, float]]
 ) -> AsyncIterator[list[tuple[float, HeadlessClient]]]:
     async with AsyncExitStack() as stack:
         viewers = []
-        for number, (gate, delay) in enumerate(VIEWERS):
+        for number, (gate, delay) in enumerate(chosen):
             url = stage.near_link.partition("/#")[0]
-            network = Network(later(profile, delay), console_url=url, seed=choices.seed + number)
+            network = NetworkProcess(later(profile, delay), console_url=url, seed=choices.seed + number)
             entered = await stack.enter_async_context(network)
             client = headless_client(
                 entered.link(stage.near_link), choices, f"{gate} +{delay:g} s", gate, "feedback", drives=False

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bench.emulator.network import Network
+from bench.emulator.network_process import NetworkProcess
 from bench.emulator.profile import Profile
 from bench.experiment.choices import MediaChoice
 from bench.processes import Running, running_process
@@ -18,7 +18,7 @@ __all__ = ["Stage", "running_stage"]
 
 @dataclass(frozen=True)
 class Stage:
-    network: Network
+    network: NetworkProcess
     bridge: Running
     console: Running
     event_log: Path
@@ -47,7 +47,7 @@ async def running_stage(
         robot_command = (lockstep, "robot", robot, "--port", "0", "--event-log", str(log), "--json")
         async with running_process(*robot_command) as (bridge, ready):
             host, _, port = ready["robot"].removeprefix("tcp://").rpartition(":")
-            async with Network(profile, robot=(host, int(port)) if robot_link else None, seed=seed) as network:
+            async with NetworkProcess(profile, robot=(host, int(port)) if robot_link else None, seed=seed) as network:
                 address = network.robot_address or ready["robot"]
                 serve = (lockstep, "serve", "--robot", address, "--port", "0", "--json", "--quiet")
                 async with running_process(*serve, environment=environment) as (console, links):

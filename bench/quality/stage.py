@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.driving import round_and_round
-from bench.emulator import Network, Profile
+from bench.emulator import NetworkProcess, Profile
 from bench.processes import running_process
 from bench.stack import Stack, running_bridge
 from client import Console
@@ -84,7 +84,7 @@ async def driving(
 ) -> Drive:
     """Drive round and round, as fast as events come, and note all pictures that arrive."""
     async with (
-        Network(profile, console_url=stack.url, seed=seed) as network,
+        NetworkProcess(profile, console_url=stack.url, seed=seed) as network,
         Console(
             network.link(stack.operator),
             gate="off",  # every picture that arrives is counted; the tolerance is judged here
@@ -121,7 +121,7 @@ async def _watch(console: Console, drive: Drive) -> None:
             drive.arrived(picture.stamp, console.feedback.event, picture.frame.width)
 
 
-async def _look(console: Console, network: Network, drive: Drive) -> None:
+async def _look(console: Console, network: NetworkProcess, drive: Drive) -> None:
     while True:
         await asyncio.sleep(SAMPLE)
         queue = network.statistics().queues.get("to_operator")

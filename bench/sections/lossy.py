@@ -14,7 +14,7 @@ from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection
 
 from bench.context import Context
 from bench.driving import console_trips
-from bench.emulator import Constant, Impairment, Network, even_profile, independent
+from bench.emulator import Constant, Impairment, Network, NetworkProcess, bursty, even_profile
 from bench.loopback_peers import connect_through
 from bench.results import Result
 from bench.samples import quantile
@@ -25,7 +25,8 @@ __all__ = ["run"]
 
 SECTION = "lossy"
 ROUND_TRIP_MS = 100.0
-LOSSY = even_profile("lossy", Impairment(delay=Constant(ROUND_TRIP_MS / 2000), loss=independent(0.05)))
+BURST = 4.0  # packets in a row, on average
+LOSSY = even_profile("lossy", Impairment(delay=Constant(ROUND_TRIP_MS / 2000), loss=bursty(0.05, BURST)))
 EVENTS, QUICK_EVENTS = 500, 60
 SECONDS = 75.0  # at most
 P99_ROUND_TRIPS = 2.5
@@ -44,8 +45,8 @@ async def run(context: Context) -> list[Result]:
     ours, echoes = await asyncio.gather(_lockstep(count), _echoes(count))
     lost = ours.lost / (ours.lost + ours.passed)
     conditions = (
-        f"100 ms round trip, 5 % loss each way ({lost:.1%} of {ours.lost + ours.passed} packets), planar robot; "
-        f"{len(ours.trips)} events, {len(echoes)} echoes"
+        f"100 ms round trip, 5 % loss each way, {BURST:g} packets in a row on average ({lost:.1%} of "
+        f"{ours.lost + ours.passed} packets), planar robot; {len(ours.trips)} events, {len(echoes)} echoes"
     )
 
     def row(name: str, share: float, *, scale: float = 1.0, unit: str = "ms", target: float | None = None) -> Result:
@@ -74,7 +75,7 @@ async def run(context: Context) -> list[Result]:
 async def _lockstep(count: int) -> _Ours:
     async with (
         running_stack("planar") as stack,
-        Network(LOSSY, console_url=stack.url, seed=7) as network,
+        NetworkProcess(LOSSY, console_url=stack.url, seed=7) as network,
         Console(network.link(stack.operator), name="bench", decode=False) as console,
     ):
         await console.take_seat()
