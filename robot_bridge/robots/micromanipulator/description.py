@@ -224,9 +224,9 @@ DESCRIPTION: Final = RobotDescription(
         ),
     ),
     position_limits=(
-        _limit("probe.x", "probe.vx", "Probe forward"),
-        _limit("probe.y", "probe.vy", "Probe sideways"),
-        _limit("probe.z", "probe.vz", "Probe height"),
+        _limit("probe.x", "probe.vx", "Forward"),
+        _limit("probe.y", "probe.vy", "Sideways"),
+        _limit("probe.z", "probe.vz", "Height"),
         _limit("focus.z", "focus.vz", "Focus"),
     ),
 )

@@ -13,8 +13,8 @@ const PREFIXES = [
 const SMALLEST = { prefix: "n", factor: 1e9 } as const;
 /** Units that begin with metre or newton take a prefix: "m", "m/s", "N m". */
 const PREFIXED = /^(m|N)(?=$|[/ ·²])/;
-/** Below this a quantity is written in smaller units: 0.25 m/s stays, 0.015 m/s is 15 mm/s. */
-const TOO_SMALL = 0.02;
+/** Below this a quantity is written in smaller units: 0.25 m/s stays, 0.05 m/s is 50 mm/s. */
+const TOO_SMALL = 0.1;
 
 /** The unit and the digits for quantities of up to `magnitude` (in `unit`). */
 export function scaleFor(unit: string, magnitude: number): Scale {

@@ -2,7 +2,7 @@ import { holdsSeat, isOperator } from "../core/console_state";
 import type { ConsoleApp } from "../console_app";
 import { quantity, scaleFor } from "../core/units";
 import type { Axis, RobotDescription } from "../wire";
-import { button, h, setHidden, setPressed, setText, type Panel } from "./dom";
+import { button, h, setData, setHidden, setPressed, setText, type Panel } from "./dom";
 import { createStaleMark } from "./stale_mark";
 
 interface AxisBar {
@@ -31,6 +31,7 @@ export function createAxisPanel(app: ConsoleApp): Panel {
         layers.replaceChildren(
           ...found.layers.map((layer, index) => button("segment", layer.label, () => app.selectLayer(index))),
         );
+        setData(layers, "crowd", found.layers.length > 3 ? "many" : found.layers.length > 2 ? "some" : "");
       }
       setHidden(layers, (!isOperator(app.state) && !holdsSeat(app.state)) || layers.childElementCount < 2);
       for (const [index, child] of [...layers.children].entries())

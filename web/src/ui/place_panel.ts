@@ -5,8 +5,12 @@ import { h, setHidden, setText, type Panel } from "./dom";
 import { createStaleMark } from "./stale_mark";
 
 const MOST = 6; // rows
+const LOOK_MS = 500; // between two looks at whether it fits
+const ROW_PX = 19;
+const FRAME_PX = 44; // the panel without rows, and its gap
+const GAP_PX = 14;
 
-/** Where the joints are that are moved one by one. */
+/** Where the joints are that are moved one by one; only where there is room beside the gauges. */
 export function createPlacePanel(app: ConsoleApp): Panel {
   const rows = h("dl", "place-rows");
   const stale = createStaleMark(app);
@@ -14,6 +18,8 @@ export function createPlacePanel(app: ConsoleApp): Panel {
   const element = h("div", "places", { "aria-label": "Position" }, name, rows, stale.element);
   let description: RobotDescription | null = null;
   let shown: { place: Place; value: HTMLElement }[] = [];
+  let fits = false;
+  let dueMs = 0;
   return {
     element,
     update(now) {
@@ -25,11 +31,30 @@ export function createPlacePanel(app: ConsoleApp): Panel {
           .slice(0, MOST)
           .map((place) => ({ place, value: h("dd", "place-value") }));
         rows.replaceChildren(
-          ...shown.flatMap(({ place, value }) => [h("dt", "place-label", {}, place.label), value]),
+          ...shown.map(({ place, value }) =>
+            h("div", "place-row", {}, h("dt", "place-label", {}, place.label), value),
+          ),
         );
+        dueMs = 0;
       }
-      setHidden(element, shown.length === 0);
+      if (now >= dueMs) {
+        dueMs = now + LOOK_MS;
+        fits = roomBeside(element) >= FRAME_PX + ROW_PX * shown.length;
+      }
+      setHidden(element, shown.length === 0 || !fits);
       for (const { place, value } of shown) setText(value, placeWords(place, app.state.feedback));
     },
   };
+}
+
+/** What is left of the column under the small views and beside the other gauges: CSS pixels. */
+function roomBeside(element: HTMLElement): number {
+  const column = element.parentElement;
+  const board = column?.parentElement;
+  if (!column || !board || column.clientHeight === 0) return 0;
+  const small = [...board.querySelectorAll<HTMLElement>('.view[data-place="small"]')];
+  const top = Math.max(0, ...small.map((view) => view.offsetTop + view.offsetHeight));
+  const others = [...column.children].filter((each) => each !== element);
+  const taken = others.reduce((sum, each) => sum + each.clientHeight, 0) + GAP_PX * others.length;
+  return column.offsetTop + column.offsetHeight - top - taken;
 }

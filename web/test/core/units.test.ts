@@ -36,7 +36,7 @@ describe("units", () => {
     [80e-6, 50e-6, "50 µm"],
     [45e-6, 20e-6, "20 µm"],
     [1.9, 1, "1 m"],
-    [0.0999, 0.05, "0.05 m"],
+    [0.0999, 0.05, "50 mm"],
     [0.0199, 0.01, "10 mm"],
   ])("the bar for at most %f m is %f m long: %s", (most, length, words) => {
     expect(roundLength(most)).toBeCloseTo(length, 9);
