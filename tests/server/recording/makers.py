@@ -1,10 +1,13 @@
 """Recordings that tests make: a robot of two axes with a camera, a microphone and a force sensor."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import av
 import msgspec
+import numpy as np
 
+from robot_bridge.protocol.console import Report, StreamReport
 from robot_bridge.protocol.description import (
     Axis,
     Camera,
@@ -17,18 +20,28 @@ from robot_bridge.protocol.description import (
 )
 from robot_bridge.protocol.messages import StopState
 from robot_bridge.protocol.serial import event_after
+from server.media.picture_encoder import H264Encoder
+from server.media.sound_encoder import OpusEncoder, Segment
 from server.recording.foxglove import camera_message, feedback_messages, sound_message
 from server.recording.info import RecordingInfo
-from server.recording.records import CommandRecord, FeedbackRecord, OwnRecord, RobotRecord, SeatRecord
+from server.recording.records import (
+    CommandRecord,
+    FeedbackRecord,
+    OwnRecord,
+    ReportRecord,
+    RobotRecord,
+    SeatRecord,
+)
 from server.recording.topics import CAMERA, MICROPHONE, OWN_TOPICS
 from server.recording.writer import Entry, RecordingWriter
 
-__all__ = ["DESCRIPTION", "EPOCH", "INFO", "SECOND", "START", "Story", "own_entry"]
+__all__ = ["CODECS", "DESCRIPTION", "EPOCH", "INFO", "SECOND", "START", "Story", "own_entry", "rewritten"]
 
 EPOCH = "epoch-1"
 SECOND = 1_000_000_000  # ns
 START = 1_800_000_000 * SECOND
 INFO = RecordingInfo(recording="20270115-planar-ab12", epoch=EPOCH, robot="Planar robot", name="first", by="Ada")
+CODECS = {"front": "H264", "ear": "opus"}
 DESCRIPTION = RobotDescription(
     name="planar",
     label="Planar robot",
@@ -47,50 +60,65 @@ DESCRIPTION = RobotDescription(
 )
 KEYFRAME = b"\0\0\0\1\x67sps\0\0\0\1\x68pps\0\0\1\x65"
 PICTURE = b"\0\0\0\1\x41"
+INTERVAL = SECOND // 25
+KEYFRAMES = 50  # events from one to the next
 
 
 def own_entry(record: OwnRecord, at: int, captured: int | None = None) -> Entry:
-    topic = OWN_TOPICS[type(record)]
-    return Entry(
-        topic, record.event, at, at if captured is None else captured, msgspec.json.encode(record), False, record
-    )
+    captured = at if captured is None else captured
+    return Entry(OWN_TOPICS[type(record)], record.event, at, captured, msgspec.json.encode(record), record=record)
 
 
 class Story:
-    """Writes a session: one event every 40 ms, each with its command, feedback, a picture and two packets of sound."""
+    """A session: one event every 40 ms, each with its command, feedback, a picture and two packets of sound.
 
-    def __init__(self, path: Path, *, first_event: int = 1, events: int = 100, force_at: int = 0) -> None:
-        self.path = path
+    Args:
+        force_at: number of the event at which the robot touches something; 0: never
+        stopped: numbers of the events whose feedback says that the robot is stopped
+        real: pictures and sound that can be decoded; the pictures' brightness is 2 x the event
+    """
+
+    def __init__(
+        self,
+        *,
+        first_event: int = 1,
+        events: int = 100,
+        force_at: int = 0,
+        stopped: range = range(0),
+        real: bool = False,
+    ) -> None:
         self.first_event = first_event
         self.events = events
-        self.force_at = force_at  # index of the event with a contact; 0: none
+        self.force_at = force_at
+        self.stopped = stopped
+        self._pictures = _real_pictures() if real else _false_pictures
+        self._sounds = _real_sounds() if real else _false_sounds
 
-    def entries(self) -> Iterator[Entry]:
-        yield own_entry(RobotRecord(epoch=EPOCH, event=self.first_event, link="up", description=DESCRIPTION), START)
-        yield own_entry(SeatRecord(epoch=EPOCH, event=self.first_event, holder="p1", name="Ada", why="request"), START)
+    def entries(self) -> list[Entry]:
+        """In the order of arrival."""
+        return sorted(self._entries(), key=lambda entry: entry.arrived)
+
+    def _entries(self) -> Iterator[Entry]:
         event, at = self.first_event, START
-        yield from self.feedback(event, at, 0)
+        yield own_entry(RobotRecord(epoch=EPOCH, event=event, link="up", description=DESCRIPTION), START)
+        yield own_entry(SeatRecord(epoch=EPOCH, event=event, holder="p1", name="Ada", why="request"), START)
+        yield from self._feedback(event, at, 0)
         for number in range(1, self.events):
-            event, at = event_after(event), at + SECOND // 25
-            yield own_entry(self.command(event, number), at - 10_000_000)
-            yield from self.feedback(event, at, number)
-            key = number % 50 == 1
-            picture = (KEYFRAME if key else PICTURE) + number.to_bytes(4, "big")
-            yield Entry(
-                CAMERA + "front", event, at + 5_000_000, at + 1_000_000, camera_message("front", at, picture), key
-            )
+            event, at = event_after(event), at + INTERVAL
+            yield own_entry(self._command(event, number), at - 10_000_000)
+            yield from self._feedback(event, at, number)
+            key = number % KEYFRAMES == 1
+            captured = at + 1_000_000
+            picture = camera_message("front", captured, self._pictures(number, key))
+            yield Entry(CAMERA + "front", event, at + 5_000_000, captured, picture, key)
             for part in (0, 1):
-                sound = b"opus" + number.to_bytes(4, "big") + bytes([part])
                 moment = at + part * 20_000_000
-                yield Entry(
-                    MICROPHONE + "ear",
-                    event,
-                    moment + 6_000_000,
-                    moment,
-                    sound_message("opus", moment, sound, 48_000, 1),
-                )
+                sound = sound_message("opus", moment, self._sounds(number, part), 48_000, 1)
+                yield Entry(MICROPHONE + "ear", event, moment + 6_000_000, moment, sound)
+            if number % 25 == 0:
+                yield own_entry(self._report(event), at + 7_000_000)
 
-    def command(self, event: int, number: int) -> CommandRecord:
+    def _command(self, event: int, number: int) -> CommandRecord:
         return CommandRecord(
             epoch=EPOCH,
             event=event,
@@ -101,7 +129,7 @@ class Story:
             outcome="forwarded",
         )
 
-    def feedback(self, event: int, at: int, number: int) -> Iterator[Entry]:
+    def _feedback(self, event: int, at: int, number: int) -> Iterator[Entry]:
         force = 5.0 if number and number == self.force_at else 0.1
         record = FeedbackRecord(
             epoch=EPOCH,
@@ -113,16 +141,66 @@ class Story:
             wrench=[force, 0.0, 0.0, 0.0, 0.0, 0.0],
             ranges=[1.0, 2.0, 3.0],
             at_rest=False,
-            stop=StopState(),
+            stop=StopState(stopped=number in self.stopped, by="Bo" if number in self.stopped else ""),
         )
-        yield own_entry(record, at, at - 2_000_000)
-        yield from feedback_messages(DESCRIPTION, record, at, at - 2_000_000)
+        captured = at - 2_000_000
+        yield own_entry(record, at, captured)
+        yield from feedback_messages(DESCRIPTION, record, at, captured)
 
-    def write(self, *, close: bool = True) -> RecordingWriter:
-        writer = RecordingWriter(self.path, INFO, DESCRIPTION, {"front": "H264", "ear": "opus"})
-        for entry in sorted(self.entries(), key=lambda entry: entry.arrived):
-            writer.flush_if_due(entry.arrived)
-            writer.write(entry)
-        if close:
-            writer.close()
-        return writer
+    def _report(self, event: int) -> ReportRecord:
+        stream = StreamReport(
+            stream="front", carrier="native", stamp=event, gap=1, max_gap=2, rendered=event, tolerance=4
+        )
+        return ReportRecord(
+            epoch=EPOCH, event=event, peer="p1", name="Ada", report=Report(event=event, streams=[stream])
+        )
+
+    def write(self, path: Path, *, close: bool = True) -> RecordingWriter:
+        return _write(path, self.entries(), close=close)
+
+
+def rewritten(path: Path, entries: list[Entry], change: Callable[[Entry], list[Entry]]) -> Path:
+    """A file with other records: `change` says what becomes of each. Its checksums and its index fit."""
+    _write(path, [each for entry in entries for each in change(entry)])
+    return path
+
+
+def _write(path: Path, entries: list[Entry], *, close: bool = True) -> RecordingWriter:
+    writer = RecordingWriter(path, INFO, DESCRIPTION, CODECS)
+    for entry in entries:
+        writer.flush_if_due(entry.arrived)
+        writer.write(entry)
+    if close:
+        writer.close()
+    return writer
+
+
+def _false_pictures(number: int, key: bool) -> bytes:
+    return (KEYFRAME if key else PICTURE) + number.to_bytes(4, "big")
+
+
+def _false_sounds(number: int, part: int) -> bytes:
+    return b"opus" + number.to_bytes(4, "big") + bytes([part])
+
+
+def _real_pictures() -> Callable[[int, bool], bytes]:
+    encoder = H264Encoder(2_000_000, 25.0)
+
+    def picture(number: int, key: bool) -> bytes:
+        grey = np.full((240, 320, 3), min(250, 2 * (number + 1)), np.uint8)
+        frame = av.VideoFrame.from_ndarray(grey, "rgb24").reformat(format="yuv420p")
+        return encoder.encode(frame, number * 3600, key).data
+
+    return picture
+
+
+def _real_sounds() -> Callable[[int, int], bytes]:
+    encoder = OpusEncoder(32_000, 0)
+    tone = (8000 * np.sin(np.arange(960) * 2 * np.pi * 440 / 48_000)).astype(np.int16)
+
+    def sound(number: int, part: int) -> bytes:
+        time = number * 0.04 + part * 0.02
+        (packet,) = encoder.encode(Segment(tone, 48_000, 1, number + 1, time, time))
+        return packet.data
+
+    return sound

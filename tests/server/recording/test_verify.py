@@ -1,0 +1,131 @@
+"""What is promised is found kept in a good recording, and not kept in each kind of tampered one."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robot_bridge.protocol.console import Report, StreamReport
+from robot_bridge.protocol.serial import MAX_EVENT
+from server.recording.records import CommandRecord, FeedbackRecord, ReportRecord, StopRecord
+from server.recording.topics import CAMERA
+from server.recording.verify import CheckName
+from server.recording.verify_file import verify_file
+from server.recording.writer import Entry
+from tests.server.recording.makers import EPOCH, Story, own_entry, rewritten
+
+Change = Callable[[Entry], list[Entry]]
+
+
+def failed(path: Path) -> set[CheckName]:
+    verdict = verify_file(path)
+    assert verdict.ok == all(check.ok for check in verdict.checks.values())
+    return {name for name, check in verdict.checks.items() if not check.ok}
+
+
+@pytest.mark.parametrize("first_event", [1, MAX_EVENT - 20])
+def test_a_good_recording_keeps_every_promise(tmp_path: Path, first_event: int) -> None:
+    path = tmp_path / "a.mcap"
+    Story(first_event=first_event, events=80).write(path)
+    verdict = verify_file(path)
+    assert failed(path) == set()
+    assert (verdict.events, verdict.commands) == (79, 79)
+    assert all(verdict.checks[name].looked for name in ("complete", "once", "in_time", "seat", "stamps", "rendered"))
+
+
+def changed(entry: Entry, **values: object) -> Entry:
+    assert entry.record is not None
+    record = msgspec.structs.replace(entry.record, **values)
+    return own_entry(record, entry.arrived, entry.captured)
+
+
+def without_an_event(entry: Entry) -> list[Entry]:
+    return [] if entry.event == 50 else [entry]
+
+
+def with_an_event_that_goes_back(entry: Entry) -> list[Entry]:
+    if entry.event == 50 and isinstance(entry.record, FeedbackRecord):
+        return [entry, changed(entry, event=40, time=entry.record.time + 0.001)]
+    return [entry]
+
+
+def with_an_event_executed_twice(entry: Entry) -> list[Entry]:
+    if entry.event == 50 and isinstance(entry.record, FeedbackRecord):
+        return [entry, changed(entry, time=entry.record.time + 0.001)]
+    return [entry]
+
+
+def with_a_late_command(entry: Entry) -> list[Entry]:
+    """As if the robot had executed events from 50 on three seconds later than it did."""
+    if entry.event >= 50 and isinstance(entry.record, FeedbackRecord):
+        return [changed(entry, time=entry.record.time + 3.0)]
+    return [] if entry.event >= 50 and entry.record is None else [entry]
+
+
+def with_somebody_elses_command(entry: Entry) -> list[Entry]:
+    if entry.event == 50 and isinstance(entry.record, CommandRecord):
+        return [changed(entry, peer="p2")]
+    return [entry]
+
+
+def with_a_command_while_stopped(entry: Entry) -> list[Entry]:
+    if entry.event == 50 and isinstance(entry.record, CommandRecord):
+        stop = StopRecord(epoch=EPOCH, event=49, kind="stop", by="Bo", where="stop")
+        return [own_entry(stop, entry.arrived), entry]
+    return [entry]
+
+
+def with_a_picture_stamped_too_new(entry: Entry) -> list[Entry]:
+    return [entry._replace(event=51)] if entry.topic == CAMERA + "front" and entry.event == 50 else [entry]
+
+
+def with_a_command_that_was_never_forwarded(entry: Entry) -> list[Entry]:
+    return [] if entry.event == 50 and isinstance(entry.record, CommandRecord) else [entry]
+
+
+def with_something_rendered_beyond_the_tolerance(entry: Entry) -> list[Entry]:
+    if isinstance(entry.record, ReportRecord) and entry.event > 60:
+        stream = StreamReport(stream="front", carrier="native", violations=1)
+        return [changed(entry, report=Report(event=entry.event, streams=[stream]))]
+    return [entry]
+
+
+def with_another_epoch(entry: Entry) -> list[Entry]:
+    return [changed(entry, epoch="other")] if entry.event == 50 and entry.record is not None else [entry]
+
+
+@pytest.mark.parametrize(
+    ("tamper", "check"),
+    [
+        (without_an_event, "complete"),
+        (with_an_event_that_goes_back, "monotonic"),
+        (with_an_event_executed_twice, "once"),
+        (with_a_late_command, "in_time"),
+        (with_somebody_elses_command, "seat"),
+        (with_a_command_while_stopped, "stopped"),
+        (with_a_picture_stamped_too_new, "stamps"),
+        (with_a_command_that_was_never_forwarded, "once"),
+        (with_something_rendered_beyond_the_tolerance, "rendered"),
+        (with_another_epoch, "monotonic"),
+    ],
+)
+def test_a_tampered_recording_fails_the_check_that_it_breaks(tmp_path: Path, tamper: Change, check: CheckName) -> None:
+    path = rewritten(tmp_path / "a.mcap", Story(events=80).entries(), tamper)
+    assert check in failed(path)
+
+
+def test_bytes_that_were_changed_without_their_checksum_fail(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=80).write(path)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 3] ^= 1
+    path.write_bytes(data)
+    assert "readable" in failed(path)
+
+
+def test_an_interrupted_recording_is_not_taken_for_a_whole_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=80).write(path)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+    assert failed(path) == {"readable"}
