@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from playwright.async_api import Browser
 
@@ -65,6 +66,14 @@ class Process:
         fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
+    def said(self) -> list[dict[str, Any]]:
+        """Its lines that are JSON, as far as they are kept."""
+        return [json.loads(line) for line in self.lines if line.startswith("{")]
+
+    async def end(self) -> None:
+        self.process.terminate()
+        await self.process.wait()
+
     async def kill(self) -> None:
         """As a machine that is switched off."""
         self.process.kill()
@@ -100,7 +109,14 @@ class RelayStage:
         self.janus.append(started)
         return started
 
-    async def add_console(self, relays: Sequence[tuple[Side, int]], *extra: str, robot: str = "planar") -> None:
+    async def restart_janus(self, side: Side, number: int) -> None:
+        """After it was killed; it remembers nothing."""
+        await self.add_janus(side, number)
+        self.janus[number] = self.janus.pop()
+
+    async def add_console(
+        self, relays: Sequence[tuple[Side, int]], *extra: str, robot: str = "planar", **settings: str
+    ) -> None:
         """`lockstep up` on the robot's side, publishing into these Janus."""
         arguments = [f"--relay=janus:ws://{ADDRESSES[side]}:{FIRST_PORT + number}/{ROOM}" for side, number in relays]
         command = [
@@ -108,7 +124,8 @@ class RelayStage:
             *("--host", ROBOT_ADDRESS, "--port", str(CONSOLE_PORT), "--state-dir", str(self.folder / "state")),
             *("--event-log", str(self.folder / "events.jsonl"), *arguments, *extra),
         ]
-        self.console = await self.start("robot", command)
+        environment = os.environ | {f"LOCKSTEP_{name.upper()}": value for name, value in settings.items()}
+        self.console = await self.start("robot", command, env=environment)
         self.links = json.loads(await self.console.line(r'^\{"console"'))
 
     @asynccontextmanager
@@ -123,9 +140,9 @@ class RelayStage:
         async with running_chromium(executable=script, flags=[secure]) as browser:
             yield browser
 
-    async def add_driver(self) -> Process:
-        """An operator that drives from now on, on the operator's side."""
-        driver = await self.start("operator", [sys.executable, "-m", "bench.relay.driver", self.links["operator"]])
+    async def add_driver(self, side: Side = "operator") -> Process:
+        """An operator that drives from now on."""
+        driver = await self.start(side, [sys.executable, "-m", "bench.relay.driver", self.links["operator"]])
         await driver.line(r'^\{"at"')
         return driver
 

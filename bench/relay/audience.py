@@ -1,0 +1,91 @@
+"""Many observers behind relays: `python -m bench.relay.audience LINK COUNT`.
+
+Each is a whole observer: a data-only connection to the console, and the main camera with the feedback from a relay. RTP
+is counted as it comes out of the socket, neither decrypted nor decoded, so that so many fit on the machine they load.
+Once all are connected it says so in a JSON line, and every second afterwards how many packets each got.
+"""
+
+import asyncio
+import json
+import sys
+import time
+from contextlib import AsyncExitStack
+from typing import Any
+
+import uvloop
+
+from client import Console
+
+__all__ = ["main"]
+
+AT_ONCE = 6  # that connect at the same time
+CONNECT_SECONDS = 60.0
+RTP = range(128, 192)  # first byte (RFC 7983 7)
+RTCP = range(192, 224)  # second byte of those that are not media (RFC 5761 4)
+
+
+class _Counter:
+    """Stands before one observer's ICE connection."""
+
+    def __init__(self, connection: Any) -> None:
+        self.packets = 0
+        self._pass_on = connection.data_received
+        connection.data_received = self.take
+
+    def take(self, data: bytes, component: int) -> None:
+        if data[0] in RTP and data[1] not in RTCP:
+            self.packets += 1
+        else:
+            self._pass_on(data, component)
+
+
+async def watch(link: str, count: int) -> None:
+    began = time.monotonic()
+    async with AsyncExitStack() as stack:
+        gate = asyncio.Semaphore(AT_ONCE)
+        consoles: list[Console] = []
+        counters: list[_Counter] = []
+
+        async def connect(number: int) -> None:
+            console = Console(
+                link,
+                through_relay=True,
+                decode=False,
+                video=1,
+                audio=False,
+                name=f"watcher {number}",
+                connect_seconds=CONNECT_SECONDS,
+                silence_seconds=30.0,
+            )
+            async with gate:
+                await stack.enter_async_context(console)
+            consoles.append(console)
+            relay: Any = console._live()._relay
+            counters.append(_Counter(relay._pc.getTransceivers()[0].receiver.transport.transport._connection))
+
+        async with asyncio.TaskGroup() as tasks:
+            for number in range(count):
+                tasks.create_task(connect(number))
+        relays = sorted({console.relay for console in consoles})
+        by_relay = {relay: sum(console.relay == relay for console in consoles) for relay in relays}
+        print(json.dumps({"connected": time.monotonic() - began, "relays": by_relay}), flush=True)
+        while True:
+            await asyncio.sleep(1.0)
+            counts = sorted(counter.packets for counter in counters)
+            feedback = [len(console.feedback_log()) for console in consoles]
+            said = {
+                "at": time.monotonic(),
+                "packets": sum(counts),
+                "least": counts[0],
+                "most": counts[-1],
+                "feedback": min(feedback),
+            }
+            print(json.dumps(said), flush=True)
+
+
+def main() -> None:
+    uvloop.run(watch(sys.argv[1], int(sys.argv[2])))
+
+
+if __name__ == "__main__":
+    main()
