@@ -56,7 +56,8 @@ class YamlFile:
         try:
             return msgspec.convert(self._data, kind)
         except msgspec.ValidationError as error:
-            detail, keys = str(error), ()
+            detail = str(error)
+            keys: tuple[Key, ...] = ()
             if (found := _PATH.search(detail)) is not None:
                 detail = detail[: found.start()]
                 keys = tuple(name or int(index) for name, index in _STEP.findall(found[1]))

@@ -40,11 +40,15 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         raise SettingsPlace((), "there is nothing to drive: give a base, an arm or both")
     if base is None and settings.geofences:
         raise SettingsPlace(("geofences",), "only a base can be kept in zones")
+    for number, camera in enumerate(settings.cameras):
+        if settings.use_sim_time and camera.captured == "header":
+            keys = ("cameras", number, "captured")
+            raise SettingsPlace(keys, "simulated time does not pass as ours does: set captured: arrival, and a latency")
     base_axes = () if base is None else _base_axes(base, settings.hold)
     arm_axes = () if arm is None else tuple(_arm_axis(arm, number, settings.hold) for number in range(len(arm.joints)))
     layers: tuple[ControlLayer, ...] = ()
     if base is not None:
-        layers += (base_layer("base.vx", base.left and "base.vy", base.turn and "base.wz"),)
+        layers += (base_layer("base.vx", "base.vy" if base.left else None, "base.wz" if base.turn else None),)
     return RobotDescription(
         name=settings.name,
         label=settings.label or settings.name,

@@ -14,9 +14,12 @@ class BadJointState(ValueError):
 class JointStateMessage(Protocol):
     """The fields of sensor_msgs/JointState that matter."""
 
-    name: Sequence[str]
-    position: Sequence[float]
-    velocity: Sequence[float]
+    @property
+    def name(self) -> Sequence[str]: ...
+    @property
+    def position(self) -> Sequence[float]: ...
+    @property
+    def velocity(self) -> Sequence[float]: ...
 
 
 class JointKnown(NamedTuple):

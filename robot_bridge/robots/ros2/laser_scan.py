@@ -19,11 +19,16 @@ class BadScan(ValueError):
 class Scan(Protocol):
     """The fields of sensor_msgs/LaserScan that matter."""
 
-    angle_min: float
-    angle_increment: float
-    range_min: float
-    range_max: float
-    ranges: Sequence[float]
+    @property
+    def angle_min(self) -> float: ...
+    @property
+    def angle_increment(self) -> float: ...
+    @property
+    def range_min(self) -> float: ...
+    @property
+    def range_max(self) -> float: ...
+    @property
+    def ranges(self) -> Sequence[float]: ...
 
 
 class Sectors:

@@ -39,18 +39,25 @@ class BadPicture(ValueError):
 class ImageMessage(Protocol):
     """The fields of sensor_msgs/Image that matter."""
 
-    height: int
-    width: int
-    encoding: str
-    step: int
-    data: "Buffer"
+    @property
+    def height(self) -> int: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def encoding(self) -> str: ...
+    @property
+    def step(self) -> int: ...
+    @property
+    def data(self) -> "Buffer": ...
 
 
 class CompressedMessage(Protocol):
     """The fields of sensor_msgs/CompressedImage that matter."""
 
-    format: str
-    data: "Buffer"
+    @property
+    def format(self) -> str: ...
+    @property
+    def data(self) -> "Buffer": ...
 
 
 class Payload(NamedTuple):

@@ -13,7 +13,15 @@ from typing import Any
 
 from bench.processes import Running, running_process
 
-__all__ = ["EXAMPLES", "RosRobot", "have_ros", "ros_environment", "ros_python", "running_ros_robot"]
+__all__ = [
+    "EXAMPLES",
+    "RosBridge",
+    "RosRobot",
+    "have_ros",
+    "ros_python",
+    "running_ros_bridge",
+    "running_ros_robot",
+]
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "docs" / "examples" / "ros2"
@@ -40,7 +48,7 @@ def ros_python() -> str:
     return str(python)
 
 
-def ros_environment() -> dict[str, str]:
+def _ros_environment() -> dict[str, str]:
     """A domain that nobody else uses now, on this machine only."""
     return {
         "ROS_DOMAIN_ID": str(_free_domain()),
@@ -82,13 +90,42 @@ class RosRobot:
                 yield note
 
     async def tell(self, line: str) -> None:
-        """`hush /odom`, `speak /odom`, `freeze /odom`, `spoil /odom`; see robot_node.py. Returns when it is done."""
+        """`hush /odom`, `speak /odom`, `freeze /odom`, `spoil /odom`; see robot_node.py. Returns after the robot's next tick."""
         await self.process.ask(line, 20)
 
 
 @asynccontextmanager
 async def running_ros_robot(directory: Path) -> AsyncIterator[RosRobot]:
     log = directory / "robot_node.jsonl"
-    environment = ros_environment()
+    environment = _ros_environment()
     async with running_process(ros_python(), str(NODE), str(log), environment=environment) as (process, _):
         yield RosRobot(process, environment, log)
+
+
+@dataclass
+class RosBridge:
+    """A running `lockstep robot --ros2`."""
+
+    process: Running
+    address: tuple[str, int]
+    event_log: Path
+
+    def records(self, kind: str) -> Iterator[dict[str, Any]]:
+        """What it has written down of one kind."""
+        for line in self.event_log.read_text().splitlines():
+            record = json.loads(line)
+            if record["kind"] == kind:
+                yield record
+
+
+@asynccontextmanager
+async def running_ros_bridge(directory: Path, robot: RosRobot, settings: Path) -> AsyncIterator[RosBridge]:
+    """In the environment of the robot's ROS installation, which has nothing of the console's."""
+    event_log = directory / "bridge.jsonl"
+    command = (ros_python(), "-m", "robot_bridge", "--ros2", str(settings), "--port", "0", "--json")
+    async with running_process(*command, "--event-log", str(event_log), environment=robot.environment) as (
+        process,
+        ready,
+    ):
+        host, _, port = ready["robot"].removeprefix("tcp://").rpartition(":")
+        yield RosBridge(process, (host, int(port)), event_log)

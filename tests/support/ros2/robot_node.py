@@ -2,7 +2,8 @@
 
 It does what it is told until it is told otherwise, with no timeout of its own, so that whoever forgets a zero is found
 out. Each command and each picture is a JSON line in the log. Lines on standard input: `hush TOPIC`, `speak TOPIC`,
-`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense).
+`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense), `tick` (nothing). Each
+is answered after the robot's next tick.
 """
 
 import array
@@ -46,6 +47,7 @@ class RobotNode(Node):  # type: ignore[misc]
         self._setpoints = list(self._positions)
         self._velocities = [0.0] * len(JOINTS)
         self._ticks = 0
+        self.ticked = threading.Event()
         self._pictures = 0
         self._captured = 0.0  # s, when the message that is made now shows the robot
         self._hushed: set[str] = set()
@@ -127,6 +129,7 @@ class RobotNode(Node):  # type: ignore[misc]
             self._pictures += 1
             self._send("/image", self._image)
             self._send("/jpeg", self._jpeg)
+        self.ticked.set()
 
     def _send(self, topic: str, make: Any) -> None:
         if topic in self._hushed:
@@ -208,6 +211,8 @@ class RobotNode(Node):  # type: ignore[misc]
 def listen(node: RobotNode) -> None:
     for line in sys.stdin:
         node.tell(line.strip())
+        node.ticked.clear()
+        node.ticked.wait()
         print(json.dumps({"done": line.strip()}), flush=True)
 
 

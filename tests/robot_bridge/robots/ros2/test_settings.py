@@ -102,6 +102,13 @@ def test_zones_without_a_base_make_no_sense(tmp_path: Path) -> None:
         read_settings(written(tmp_path, ARM + zone))
 
 
+def test_in_simulated_time_header_stamps_cannot_tell_when_a_picture_was_taken(tmp_path: Path) -> None:
+    camera = "use_sim_time: true\ncameras:\n  - {name: a, topic: /i, width: 64, height: 64}\n"
+    with pytest.raises(SettingsError, match=r"line 6: cameras\[0\].captured: simulated time"):
+        read_settings(written(tmp_path, BASE + camera))
+    read_settings(written(tmp_path, BASE + camera.replace("64}", "64, captured: arrival}")))
+
+
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="none.yaml: No such file"):
         read_settings(tmp_path / "none.yaml")

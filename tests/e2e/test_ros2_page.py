@@ -1,0 +1,61 @@
+"""From browser to topic and back: Chromium drives a real ROS 2 node, which says what reached it."""
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser, expect
+
+from bench.browsers.console_page import LEFT_Y, RB, open_console
+from tests.support.ros2 import EXAMPLES, RosRobot, have_ros, ros_python, running_ros_robot
+from tests.support.stack import Stack, running_stack
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.timeout(180),
+    pytest.mark.skipif(not have_ros(), reason="there are no wheels of ROS 2 for this machine"),
+]
+
+
+@pytest.fixture
+async def node(tmp_path: Path) -> AsyncIterator[RosRobot]:
+    async with running_ros_robot(tmp_path) as robot:
+        yield robot
+
+
+@pytest.fixture
+async def base(tmp_path: Path, node: RosRobot) -> AsyncIterator[Stack]:
+    extra = ("--ros2", str(EXAMPLES / "base.yaml"), "--robot-python", ros_python())
+    async with running_stack(tmp_path, extra=extra, settings=node.environment) as stack:
+        yield stack
+
+
+async def test_the_page_drives_the_node_and_shows_what_it_says(base: Stack, node: RosRobot, chromium: Browser) -> None:
+    async with open_console(chromium, base.operator) as console:
+        await console.until_live()
+        await console.arm()
+        await console.drive_forward()
+        await console.until("s.axes['base.vx'] > 0.45", 30)  # by its odometry
+        await expect(console.page.locator(".radar")).to_be_visible()  # by its laser scan
+        read = await console.strip("front")  # the number that the camera drew into its picture
+        assert read is not None
+        assert read[1] in {note["number"] for note in node.notes("picture")}
+        await console.press(RB, False)
+        await console.until("!s.driving && s.at_rest === true")
+        twists = [note["values"] for note in node.notes("twist")]
+        assert max(forward for forward, _ in twists) == pytest.approx(0.5)
+        assert [twist for twist in twists if not any(twist)] == [twists[-1]], "not exactly one zero, at the end"
+
+        await console.press(RB)
+        await console.until("s.driving && s.at_rest === false")
+        await node.tell("hush /odom")
+        await console.until("s.axes['base.vx'] === null && s.faults.some((fault) => fault.startsWith('/odom: nothing'))")
+        await expect(console.page.get_by_text("/odom: nothing for").first).to_be_visible()
+        await console.press(RB, False)
+        await console.tilt(LEFT_Y, 0)
+        await node.tell("speak /odom")
+        await console.until("s.axes['base.vx'] === 0 && s.faults.length === 0")
+    zeros = [note for note in node.notes("twist") if not any(note["values"])]
+    assert len(zeros) == 2
+    executed = [record["event"] for record in base.events("executed")]
+    assert executed == sorted(set(executed))

@@ -1,0 +1,311 @@
+"""A bridge and a real ROS 2 node, each a process of its own, over DDS on loopback. What the node got is the truth."""
+
+import asyncio
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.processes import running_process
+from robot_bridge.link_client import RobotLink
+from robot_bridge.protocol.messages import Command, Feedback, Media, Reset, Rest, Stop
+from robot_bridge.robots.event_strip import read_event_strip
+from tests.robot_bridge.bridge_helpers import Operator
+from tests.support.ros2 import (
+    EXAMPLES,
+    RosBridge,
+    RosRobot,
+    have_ros,
+    ros_python,
+    running_ros_bridge,
+    running_ros_robot,
+)
+
+pytestmark = [
+    pytest.mark.skipif(not have_ros(), reason="there are no wheels of ROS 2 for this machine"),
+    pytest.mark.timeout(120),
+]
+
+PATIENCE = 20.0  # s; DDS takes a while to find everybody on a busy machine
+GO = [0.4, 0.3]
+STAY = [0.0, 0.0]
+
+
+@pytest.fixture
+async def node(tmp_path: Path) -> AsyncIterator[RosRobot]:
+    async with running_ros_robot(tmp_path) as robot:
+        yield robot
+
+
+@pytest.fixture
+async def bridge(tmp_path: Path, node: RosRobot) -> AsyncIterator[RosBridge]:
+    async with running_ros_bridge(tmp_path, node, EXAMPLES / "base.yaml") as running:
+        yield running
+
+
+class Driver(Operator):
+    """An operator link that waits as long as DDS may take."""
+
+    def __init__(self, link: RobotLink) -> None:
+        super().__init__(link)
+        self.link = link
+
+    async def until(self, condition: Callable[[Feedback], bool]) -> Feedback:
+        async with asyncio.timeout(PATIENCE):
+            await self.heard(condition)
+        return self.feedback
+
+    async def ready(self) -> None:
+        await self.next(Feedback)
+        await self.until(lambda feedback: feedback.faults == [] and feedback.unknown == [])
+
+    async def driven(self, values: list[float], condition: Callable[[Feedback], bool]) -> None:
+        """Send these values, event by event, until the feedback meets the condition."""
+        async with asyncio.timeout(PATIENCE):
+            while not condition(self.feedback):
+                await self.drive(values)
+
+
+@pytest.fixture
+async def driver(bridge: RosBridge) -> AsyncIterator[Driver]:
+    async with RobotLink(*bridge.address, "operator", name="test") as link:
+        operator = Driver(link)
+        await operator.ready()
+        yield operator
+
+
+async def noted(node: RosRobot, kind: str, condition: Callable[[list[Any]], bool]) -> list[Any]:
+    """The node's notes of a kind, once they meet the condition."""
+    async with asyncio.timeout(PATIENCE):
+        while not condition(notes := list(node.notes(kind))):
+            await node.tell("tick")
+    return notes
+
+
+def zeros(notes: list[Any]) -> int:
+    return sum(note["values"] == STAY for note in notes)
+
+
+async def ended_in_one_zero(node: RosRobot, motions: int = 1) -> None:
+    """The topic fell silent after a zero, and every motion had one."""
+    await noted(node, "twist", lambda twists: zeros(twists) >= motions and twists[-1]["values"] == STAY)
+    for _ in range(5):  # a further word of the bridge would come within two of its repeats, 40 ms
+        await node.tell("tick")
+    notes = list(node.notes("twist"))
+    assert zeros(notes) == motions
+    assert notes[-1]["values"] == STAY
+
+
+async def test_every_motion_ends_in_exactly_one_zero(bridge: RosBridge, node: RosRobot) -> None:
+    """However it ends: hold ended, let go, stopped, link lost, bridge ended."""
+    async with RobotLink(*bridge.address, "operator", name="test") as link:
+        driver = Driver(link)
+        await driver.ready()
+
+        await driver.drive(GO)
+        await driver.until(lambda feedback: feedback.at_rest and feedback.issue > 1)
+        await ended_in_one_zero(node, motions=1)
+        assert len(list(node.notes("twist"))) > 5, "the command was not repeated"
+
+        await driver.driven(GO, lambda feedback: feedback.axes == GO)
+        for _ in range(5):  # repeats of a rest say nothing new
+            driver.link.send(Rest(event=driver.feedback.event))
+        await driver.until(lambda feedback: feedback.at_rest)
+        await ended_in_one_zero(node, motions=2)
+        x, _, yaw = driver.feedback.joints
+        assert x > 0
+        assert yaw > 0
+        assert min(driver.feedback.ranges) < 3.0
+        assert max(driver.feedback.ranges) == 8.0
+
+        await driver.driven(GO, lambda feedback: feedback.axes == GO)
+        driver.link.send(Stop(by="test"))
+        await driver.until(lambda feedback: feedback.stop.stopped and feedback.at_rest)
+        driver.link.send(Reset(by="test"))
+        await driver.until(lambda feedback: not feedback.stop.stopped)
+        await ended_in_one_zero(node, motions=3)
+
+        await driver.driven(GO, lambda feedback: feedback.axes == GO)
+    await ended_in_one_zero(node, motions=4)
+
+    async with RobotLink(*bridge.address, "operator", name="test") as link:
+        driver = Driver(link)
+        await driver.ready()
+        await driver.driven(GO, lambda feedback: feedback.axes == GO)
+        await bridge.process.end()
+        await ended_in_one_zero(node, motions=5)
+    assert all(forward <= GO[0] and turn <= GO[1] for forward, turn in (note["values"] for note in node.notes("twist")))
+
+
+async def test_late_and_repeated_commands_do_not_reach_the_topic(
+    driver: Driver, node: RosRobot, bridge: RosBridge
+) -> None:
+    """Each kind of command has a direction of its own, so that the node can tell which one it got."""
+    frozen = driver.feedback
+    age = bridge_age(driver)
+    await driver.until(lambda feedback: feedback.time - frozen.time > age)
+    late = Command(event=2, issue=frozen.issue, values=[-0.2, -1.0])
+    assert (await driver.refused(late)).reason == "late"
+    assert (await driver.refused(late)).reason == "late"
+    await driver.next(Feedback)
+    command = driver.command([0.3, 0.0])
+    for _ in range(5):
+        driver.link.send(command)
+    await driver.until(lambda feedback: feedback.event == 2)
+    driver.link.send(Command(event=2, issue=command.issue, values=[0.0, 1.2]))  # the same event with another intention
+    await driver.next(Feedback)
+    assert (await driver.refused(Command(event=9, issue=1, values=[0.0, 1.2]))).reason == "out_of_order"
+    await driver.until(lambda feedback: feedback.at_rest)
+    await ended_in_one_zero(node)
+    twists = [note["values"] for note in node.notes("twist")]
+    assert all(forward >= 0 and turn == 0 for forward, turn in twists), "a late or repeated command reached the topic"
+    assert Counter(record["event"] for record in bridge.records("executed")) == {2: 1}
+
+
+def bridge_age(driver: Driver) -> float:
+    description = driver.link.hello.description
+    assert description is not None
+    return description.max_event_age
+
+
+async def test_old_odometry_is_a_fault_is_not_shown_as_fresh_and_stops(driver: Driver, node: RosRobot) -> None:
+    """A driver that hangs may be silent, or go on sending what it sent last."""
+    for motion, how in enumerate(("hush", "freeze")):
+        await driver.driven(GO, lambda feedback: feedback.axes == GO)
+        await node.tell(f"{how} /odom")
+        await driver.driven(GO, lambda feedback: bool(feedback.unknown))
+        assert driver.feedback.unknown == ["base.vx", "base.wz", "base.x", "base.y", "base.yaw"]
+        assert any(fault.startswith("/odom: nothing for") for fault in driver.feedback.faults)
+        assert not driver.feedback.at_rest
+        await ended_in_one_zero(node, motion + 1)
+        await node.tell("speak /odom")
+        # Back again, but the stick was never let go: the robot must not start off by itself.
+        await driver.driven(GO, lambda feedback: not feedback.unknown)
+        await driver.drive(GO)
+        assert any("let go once" in fault for fault in driver.feedback.faults)
+        await ended_in_one_zero(node, motion + 1)
+        await driver.driven(STAY, lambda feedback: feedback.faults == [])
+
+
+async def test_bad_messages_are_counted_and_named_and_a_dead_robot_is_a_fault(driver: Driver, node: RosRobot) -> None:
+    for topic, complaint in (
+        ("/odom", "/odom: 1 × odometry with a value that is not a number"),
+        ("/scan", "/scan: 1 × scan whose angles make no sense"),
+        ("/image", "/camera/image_raw: 1 × picture in encoding '16UC1', which is not supported"),
+    ):
+        await node.tell(f"spoil {topic}")
+        await driver.until(lambda feedback, expected=complaint: expected in feedback.faults)  # type: ignore[misc]
+        assert driver.feedback.unknown == []
+    await driver.driven(GO, lambda feedback: feedback.axes == GO)
+    await node.process.kill()
+    await driver.driven(GO, lambda feedback: bool(feedback.unknown))
+    lost = {"/odom: nothing for", "/scan: nothing for", "/camera/image_raw: nothing for"}
+    await driver.driven(STAY, lambda feedback: lost <= {fault.rpartition(" for")[0] + " for" for fault in feedback.faults})
+
+
+async def test_no_picture_is_stamped_newer_than_the_event_that_it_shows(
+    driver: Driver, node: RosRobot, bridge: RosBridge
+) -> None:
+    """The camera's own record says when each picture was taken, the bridge's when each event began."""
+    taken: dict[int, int] = {}  # picture's number -> stamp
+
+    async def watch() -> None:
+        async with RobotLink(*bridge.address, "media", name="test") as watcher:
+            async for media in watcher:
+                if isinstance(media, Media):
+                    taken[picture_number(media)] = media.stamp
+
+    watching = asyncio.create_task(watch())
+    try:
+        await driver.driven(GO, lambda _: len(taken) >= 25)
+    finally:
+        watching.cancel()
+        await asyncio.wait([watching])
+    began: dict[int, float] = {}
+    for record in bridge.records("feedback"):
+        began.setdefault(record["event"], record["time"])
+    captured = {note["number"]: note["captured"] for note in node.notes("picture")}
+    newer = [number for number, stamp in taken.items() if began[stamp] > captured[number]]
+    assert newer == []
+    assert len(set(taken.values())) > 10, "the stamps did not move"
+
+
+def picture_number(media: Media) -> int:
+    planes = np.frombuffer(media.payload, np.uint8).reshape(media.height * 3 // 2, media.width)
+    number = read_event_strip(planes[: media.height])
+    assert number is not None
+    return number
+
+
+async def test_an_arm_is_driven_a_short_way_ahead_and_told_to_stay_once(tmp_path: Path, node: RosRobot) -> None:
+    async with (
+        running_ros_bridge(tmp_path, node, EXAMPLES / "arm.yaml") as bridge,
+        RobotLink(*bridge.address, "operator", name="test") as link,
+    ):
+        operator = Driver(link)
+        await operator.ready()
+        await operator.driven([0.5, 0.0, 0.0, 0.0, 0.0, -0.5], lambda feedback: feedback.joints[0] > 0.2)
+        assert operator.feedback.axes[0] > 0.1
+        assert operator.feedback.wrench[2] < -1.0
+        await operator.until(lambda feedback: feedback.at_rest)
+    notes = await noted(node, "trajectory", lambda notes: len(notes) > 5)
+    assert all(note["span"] == pytest.approx(0.1) for note in notes)
+    ahead = [note["positions"][0] - note["measured"][0] for note in notes]
+    assert max(ahead) < 0.8 * 0.5 + 0.8 * 0.1, "the arm was told to go farther than it may"
+    last, before = notes[-1], notes[-2]
+    assert last["positions"][0] <= before["positions"][0], "the last word was not to stay"
+    assert all(note["positions"] != last["positions"] for note in notes[:-1])
+
+
+async def test_plain_twists_and_joint_states_are_spoken_too(tmp_path: Path, node: RosRobot) -> None:
+    settings = tmp_path / "both.yaml"
+    settings.write_text(
+        "name: both\n"
+        "base:\n  forward: {maximum: 0.5}\n  turn: {maximum: 1}\n"
+        "  command: {topic: /cmd_vel_plain, message: Twist}\n"
+        "arm:\n  command: {topic: /joint_command, message: JointState}\n  joints:\n"
+        + "".join(
+            f"    - {{name: {name}, maximum: 1.0}}\n"
+            for name in ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint")
+            + tuple(f"wrist_{number}_joint" for number in (1, 2, 3))
+        )
+    )
+    async with (
+        running_ros_bridge(tmp_path, node, settings) as bridge,
+        RobotLink(*bridge.address, "operator", name="test") as link,
+    ):
+        operator = Driver(link)
+        await operator.ready()
+        await operator.driven([0.3, 0.0, 0.5] + [0.0] * 5, lambda feedback: feedback.joints[3] > 0.1)
+        await operator.until(lambda feedback: feedback.at_rest)
+        await ended_in_one_zero(node)
+    joints = list(node.notes("joints"))
+    assert max(note["velocities"][0] for note in joints) <= 0.5
+    assert [any(note["velocities"]) for note in joints].count(False) == 1
+    assert joints[-1]["velocities"] == [0.0] * 6
+
+
+async def test_nobody_who_listens_is_a_fault_that_names_the_message(tmp_path: Path, node: RosRobot) -> None:
+    settings = tmp_path / "deaf.yaml"
+    settings.write_text("name: deaf\nbase:\n  forward: {maximum: 0.5}\n  command: {topic: /nobody}\n")
+    async with (
+        running_ros_bridge(tmp_path, node, settings) as bridge,
+        RobotLink(*bridge.address, "operator", name="test") as link,
+    ):
+        operator = Driver(link)
+        await operator.next(Feedback)
+        await operator.until(lambda feedback: feedback.unknown == [])
+        assert operator.feedback.faults == ["/nobody: nobody listens for TwistStamped"]
+        await operator.drive([0.4])
+        assert operator.feedback.axes == [0.0]
+
+
+async def test_the_bridge_needs_nothing_of_the_console() -> None:
+    """What runs beside the robot's ROS installation is light."""
+    heavy = ["aiortc", "av", "fastapi", "httpx", "mujoco", "uvicorn", "viser", "websockets"]
+    look = "import importlib.util, json; print(json.dumps({m: importlib.util.find_spec(m) is None for m in %r}))"
+    async with running_process(ros_python(), "-c", look % heavy) as (_, missing):
+        assert missing == dict.fromkeys(heavy, True)
