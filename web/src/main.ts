@@ -9,6 +9,7 @@ import "./style/overlay.css";
 import "./style/controls.css";
 import "./style/seat.css";
 import "./style/talk.css";
+import "./style/crowded_views.css";
 import "./style/tabs.css";
 import "./style/people.css";
 import "./style/notes.css";
