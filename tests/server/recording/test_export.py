@@ -1,0 +1,105 @@
+"""Exports, read by what others wrote: PyAV, pyarrow, csv, and a checker of LeRobot datasets."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import av
+import pyarrow.parquet as pq
+import pytest
+
+from server.recording import export_csv, export_lerobot, export_mp4, export_parquet
+from server.recording.errors import RecordingDamaged
+from server.recording.topics import CAMERA
+from tests.server.recording.makers import Story, rewritten
+
+EVENTS = 60
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recordings") / "a.mcap"
+    Story(events=EVENTS, force_at=20, real=True).write(path)
+    return path
+
+
+def brightness(frame: av.VideoFrame) -> float:
+    return float(frame.to_ndarray(format="gray")[100:140, 100:220].mean())
+
+
+def test_mp4_has_the_same_pictures_and_sound_and_not_encoded_again(file: Path, tmp_path: Path) -> None:
+    (target,) = export_mp4.export(file, tmp_path / "a.mp4", "")
+    with av.open(str(target)) as video:
+        picture, sound = video.streams.video[0], video.streams.audio[0]
+        assert (picture.codec_context.name, sound.codec_context.name) == ("h264", "opus")
+        pictures = [packet for packet in video.demux(picture) if packet.size]
+        assert len(pictures) == EVENTS - 1
+        assert [packet.is_keyframe for packet in pictures].count(True) == 2
+        times = [float((packet.pts or 0) * picture.time_base) for packet in pictures]
+        assert times == pytest.approx([0.04 * number + times[0] for number in range(EVENTS - 1)], abs=0.001)
+    with av.open(str(target)) as video:
+        frames = [brightness(frame) for frame in video.decode(video=0)]
+        assert len(frames) == EVENTS - 1
+        assert frames[0] == pytest.approx(4, abs=4)
+        assert frames[-1] == pytest.approx(2 * EVENTS, abs=6)
+    with av.open(str(target)) as video:
+        samples = sum(frame.samples for frame in video.decode(audio=0))
+        assert samples >= (2 * (EVENTS - 1) - 2) * 960
+
+
+def test_mp4_of_a_recording_without_pictures_is_refused_by_name(tmp_path: Path) -> None:
+    entries = Story(events=5).entries()
+    path = rewritten(tmp_path / "a.mcap", entries, lambda entry: [] if entry.topic.startswith(CAMERA) else [entry])
+    with pytest.raises(RecordingDamaged, match="no pictures"):
+        export_mp4.export(path, None, "")
+
+
+def test_csv_has_a_row_for_each_event_with_its_command(file: Path, tmp_path: Path) -> None:
+    (target,) = export_csv.export(file, tmp_path / "a.csv", "")
+    with target.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [int(row["event"]) for row in rows] == list(range(1, EVENTS + 1))
+    assert rows[0]["command.base.vx"] == ""
+    assert float(rows[30]["command.base.vx"]) == pytest.approx(30 / EVENTS)
+    assert (rows[30]["driver"], rows[30]["stamp.front"], rows[30]["gap.front"]) == ("Ada", "30", "1")
+
+
+def test_parquet_has_the_same_table_with_types(file: Path, tmp_path: Path) -> None:
+    (target,) = export_parquet.export(file, tmp_path / "a.parquet", "")
+    table = pq.read_table(target)
+    assert table.num_rows == EVENTS
+    assert table.column("event").to_pylist() == list(range(1, EVENTS + 1))
+    assert table.column("command.base.vx")[0].as_py() is None
+    assert table.column("wrench.fx")[20].as_py() == 5.0
+    assert table.schema.metadata[b"lockstep.epoch"] == b"epoch-1"
+
+
+def test_a_lerobot_dataset_pairs_each_event_with_the_command_that_answered_it_and_its_picture(
+    file: Path, tmp_path: Path
+) -> None:
+    (root,) = export_lerobot.export(file, tmp_path / "dataset", "push the box")
+    info = json.loads((root / "meta" / "info.json").read_text())
+    table = pq.read_table(root / "data" / "chunk-000" / "file-000.parquet")
+    events = table.column("lockstep.event").to_pylist()
+    assert info["total_frames"] == table.num_rows == len(events)
+    assert events == list(range(2, EVENTS))  # the first has no picture, the last no answer
+    states, actions = table.column("observation.state").to_pylist(), table.column("action").to_pylist()
+    names = info["features"]["observation.state"]["names"]
+    assert [state[names.index("joint.x")] for state in states] == [event - 1 for event in events]
+    assert [action[0] for action in actions] == pytest.approx([event / EVENTS for event in events])
+    with av.open(str(root / "videos" / "observation.images.front" / "chunk-000" / "file-000.mp4")) as video:
+        shown = [brightness(frame) for frame in video.decode(video=0)]
+    assert shown == pytest.approx([2 * event for event in events], abs=6)
+    tasks = pq.read_table(root / "meta" / "tasks.parquet")
+    assert tasks.column("task").to_pylist() == ["push the box"]
+
+
+def test_a_checker_that_others_wrote_takes_the_lerobot_dataset(file: Path, tmp_path: Path) -> None:
+    (root,) = export_lerobot.export(file, tmp_path / "dataset", "push the box")
+    command = [str(Path(sys.executable).with_name("lerobot-doctor")), "check", str(root), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    summary = json.loads(done.stdout)["summary"]
+    assert summary["FAIL"] == 0, done.stdout
+    assert summary["PASS"] >= 5, done.stdout
