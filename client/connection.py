@@ -39,6 +39,7 @@ from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Stop, 
 __all__ = ["Connection", "ConnectionOptions"]
 
 HEARTBEAT = 0.5  # s between two reports, and between two pings
+OBSERVER_HEARTBEAT = 1.0  # s, of somebody who cannot drive; there may be hundreds
 RELAYED_HEARTBEAT = 5.0  # s, of an observer that nobody waits for
 EARLY_PINGS = 5  # to know the path before the first command
 EARLY_PING = 0.05  # s between them
@@ -220,7 +221,13 @@ class Connection:
                 continue
             self._peer.send("control", self._report())
             self.media.reported()
-            await asyncio.sleep(HEARTBEAT if self._relay is None else RELAYED_HEARTBEAT)
+            await asyncio.sleep(self._beat())
+
+    def _beat(self) -> float:
+        if self._relay is not None:
+            return RELAYED_HEARTBEAT
+        welcome = self.session.welcome
+        return OBSERVER_HEARTBEAT if welcome is not None and welcome.role == "observer" else HEARTBEAT
 
     # What the console says
 

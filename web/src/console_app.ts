@@ -301,6 +301,7 @@ export class ConsoleApp {
 
   private welcomed(welcome: Welcome): void {
     this.link = { kind: "connected" };
+    this.pulse.observes = welcome.role === "observer";
     if (this.peer !== null) {
       this.peer.id = welcome.peer;
       this.pulse.isSlow = this.peer.isRelayed;

@@ -2,6 +2,7 @@ import { createPingLedger, lostPings, pingAnswered, sendPing } from "./core/ping
 import type { ClientMessage, Report } from "./wire";
 
 const BEAT_MS = 500; // reports and pings
+const OBSERVER_BEAT_MS = 1000; // of somebody who cannot drive; there may be hundreds
 const SLOW_BEAT_MS = 5000; // of an observer whose media come from a relay: nobody waits for its reports
 const EARLY_PINGS = 5; // to know the path before the first command
 const EARLY_PING_MS = 50; // between them
@@ -12,9 +13,10 @@ export interface PulseEvents {
   lost(now: number): void; // pings were not answered in time
 }
 
-/** What one connection says on its own: reports and pings, twice a second, and a few pings at its beginning. */
+/** What one connection says on its own: reports and pings, once or twice a second, and a few pings at its beginning. */
 export class Pulse {
   isSlow = false;
+  observes = false;
   private readonly pings = createPingLedger();
   private early = 0; // pings still to send
   private earlyMs = 0;
@@ -33,7 +35,7 @@ export class Pulse {
 
   step(now: number): void {
     if (now >= this.beatMs) {
-      this.beatMs = now + (this.isSlow ? SLOW_BEAT_MS : BEAT_MS);
+      this.beatMs = now + (this.isSlow ? SLOW_BEAT_MS : this.observes ? OBSERVER_BEAT_MS : BEAT_MS);
       this.ping(now);
       this.events.tell(this.events.report());
     } else if (this.early > 0 && now >= this.earlyMs) {

@@ -18,7 +18,7 @@ export interface Resume {
   alarmedUntilMs: number; // the network changed: silence counts sooner
 }
 
-const SILENT_MS = 1500; // pongs come twice a second
+const SILENT_MS = 1500; // pongs come once or twice a second, feedback twice a second at least
 const ALARMED_MS = 700; // after a change of the network
 const ALARM_MS = 5000;
 const STEP_LIMIT_MS = 100; // a longer step is a page that was held up
