@@ -90,7 +90,7 @@ class RosRobot:
                 yield note
 
     async def tell(self, line: str) -> None:
-        """`hush /odom`, `speak /odom`, `freeze /odom`, `spoil /odom`; see robot_node.py. Returns after the robot's next tick."""
+        """`hush /odom`, `speak /odom` …, see robot_node.py. Returns after the robot's next tick."""
         await self.process.ask(line, 20)
 
 

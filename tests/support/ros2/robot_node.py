@@ -2,8 +2,8 @@
 
 It does what it is told until it is told otherwise, with no timeout of its own, so that whoever forgets a zero is found
 out. Each command and each picture is a JSON line in the log. Lines on standard input: `hush TOPIC`, `speak TOPIC`,
-`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense), `tick` (nothing). Each
-is answered after the robot's next tick.
+`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense), `tick`
+(nothing). Each is answered after the robot's next tick.
 """
 
 import array
