@@ -8,6 +8,7 @@
 | VP8, or H.264 of a smaller profile | ours |
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable
 
 from robot_bridge.protocol.console import Tier
@@ -18,6 +19,7 @@ from server.media.peer_stream import PeerStream
 
 __all__ = ["PASSED", "Passing"]
 
+MEASURED_SECONDS, MOST_MEASURED = 2.0, 240
 PASSED = "H264-passed"  # the codec that counts what goes on as it came
 
 
@@ -31,9 +33,24 @@ class Passing:
         self._encoded = encoded
         self._tiers: dict[PeerStream, Tier] = {}  # in which each gets ours
         self._held_back: set[PeerStream] = set()
+        self._recent: deque[tuple[float, int]] = deque()  # time of capture and bytes
 
     def holds(self, target: PeerStream) -> bool:
         return target in self.output.targets
+
+    def came(self, media: Media) -> None:
+        """A picture of the camera, to be measured."""
+        self._recent.append((media.time, len(media.payload)))
+        while len(self._recent) > MOST_MEASURED or media.time - self._recent[0][0] > MEASURED_SECONDS:
+            self._recent.popleft()
+
+    @property
+    def measured(self) -> tuple[float, float]:
+        """Pictures and bits a second that come, over the last two seconds; 0 while that is not known."""
+        span = self._recent[-1][0] - self._recent[0][0] if self._recent else 0.0
+        if span <= 0:
+            return 0.0, 0.0
+        return (len(self._recent) - 1) / span, 8 * sum(size for _, size in self._recent) / span
 
     def place(self, target: PeerStream, tier: Tier) -> None:
         """Where `target` gets ours."""

@@ -136,6 +136,9 @@ class VideoStream(Stream[PictureJob]):
         if media.keyframe:
             self._passing.begin(media, self._ours("H264"))
         self._group.add(media)
+        self._passing.came(media)
+        if media.width > 0 and media.height > 0:
+            self.size = media.width, media.height
         output = self._passing.output
         if not output.targets:
             return
@@ -177,6 +180,10 @@ class VideoStream(Stream[PictureJob]):
     def hold_back(self, target: PeerStream, wanted: bool) -> None:
         """Whether `target` must not get a camera's own H.264, because its path has no room."""
         self._passing.hold_back(target, wanted)
+
+    def passed(self, target: PeerStream) -> tuple[float, float] | None:
+        """Pictures and bits a second of the camera's own H.264, if `target` gets that."""
+        return self._passing.measured if self._passing.holds(target) else None
 
     def leave(self, target: PeerStream) -> None:
         self._passing.leave(target)

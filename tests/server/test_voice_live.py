@@ -26,7 +26,7 @@ class Tone(AudioStreamTrack):
     """20 ms at a time, in real time; silent packets are still packets."""
 
     async def recv(self) -> Any:
-        frame = await super().recv()
+        frame: Any = await super().recv()
         start = frame.pts * RATE // frame.sample_rate if frame.pts is not None else 0
         phase = (start + np.arange(RATE // 50)) * TONE * 2 * np.pi / RATE
         sound = av.AudioFrame.from_ndarray((np.sin(phase) * 9000).astype(np.int16).reshape(1, -1), "s16", "mono")

@@ -175,14 +175,17 @@ class QualityDesk:
         for camera in peer.cameras:
             plan = self._plan_of(camera.stream, peer.encoded_as)
             width, height = plan.size(*camera.stream.size)
+            rate, bps = plan.frame_rate, float(plan.bitrate_bps)
+            if (passed := camera.stream.passed(camera.target)) is not None:  # as the camera made it
+                (width, height), (rate, bps) = camera.stream.size, passed
             streams.append(
                 StreamQuality(
                     stream=camera.stream.name,
                     tier=peer.tier,
                     width=width,
                     height=height,
-                    frames_per_second=round(plan.frame_rate, 2),
-                    bits_per_second=plan.bitrate_bps,
+                    frames_per_second=round(rate, 2),
+                    bits_per_second=bps,
                 )
             )
         peer.tell(streams)

@@ -46,7 +46,7 @@ def test_bad_sources_are_refused_at_the_start_without_a_word_of_their_password()
 
     for given in ({"cameras": ("rtsp:geheim",)}, {"microphones": "x=v4l2:/dev/video0"}):
         with pytest.raises(ValidationError) as caught:
-            Settings(**given)  # type: ignore[arg-type]
+            Settings(**given)
         assert "geheim" not in caught.value.errors()[0]["msg"]
     settings = Settings(cameras="a=rtsp://u:geheim@h/ b=file:x", microphones="pulse:")  # type: ignore[arg-type]
     assert [spec.name for spec in settings.sources] == ["a", "b", "microphone1"]
