@@ -69,11 +69,12 @@ class ForceSense(WrenchSense):
 
     def _now(self, data: Any) -> Array:
         turn = data.site_xmat[self._site].reshape(3, 3)
-        force = turn @ data.sensordata[self._force : self._force + 3] - self._weight
+        # What holds the hand is measured; what acts on it from outside is the opposite, less the weight.
+        force = -turn @ data.sensordata[self._force : self._force + 3] - self._weight
         if self._torque is None:
             return np.concatenate((self._in_body(data, force), np.zeros(3)))
         lever = data.subtree_com[self._body] - data.site_xpos[self._site]
-        torque = turn @ data.sensordata[self._torque : self._torque + 3] - np.cross(lever, self._weight)
+        torque = -turn @ data.sensordata[self._torque : self._torque + 3] - np.cross(lever, self._weight)
         return np.concatenate((self._in_body(data, force), self._in_body(data, torque)))
 
 
