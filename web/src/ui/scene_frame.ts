@@ -8,12 +8,19 @@ declare global {
   }
 }
 
+/** The scene is one view of many: viser's own notices, and on a small screen its panel, would cover it. */
+const STYLE = `.mantine-Notifications-root, .mantine-Notification-root { display: none !important; }
+@media (max-width: 767px) { .mantine-Paper-root { display: none !important; } }`;
+
 /**
  * Puts the gate between the scene's worker, which receives and decodes its stream, and its drawing. Both are viser's
  * own and know nothing of events.
  */
 export function gateScene(gate: SceneGate, due: () => number | "all" | null): void {
   window.lockstepScene = (frame) => {
+    const style = frame.document.createElement("style");
+    style.textContent = STYLE;
+    frame.document.head.append(style);
     frame.Worker = new Proxy(frame.Worker, {
       construct(target, args: ConstructorParameters<typeof Worker>) {
         const worker = new target(...args);
