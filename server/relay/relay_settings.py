@@ -19,7 +19,6 @@ class RelaySettings(BaseSettings):
     relay_public: NameList = ()  # the same relays as browsers reach them, "wss://relay.example.org"; empty: as above
     relay_admin_key: SecretStr = SecretStr("")  # that Janus' video room asks of who creates a room
     relay_codec: Literal["", "H264", "VP8"] = ""  # of cameras; "": what is being encoded already
-    relay_secret: SecretStr = SecretStr("")  # LiveKit: API key and secret, "KEY:SECRET"
     observers_direct: Annotated[int, Field(ge=0)] = 10  # observers that the console serves itself, when it has relays
 
     @field_validator("relay", "relay_public", mode="before")
@@ -30,9 +29,8 @@ class RelaySettings(BaseSettings):
     @field_validator("relay")
     @classmethod
     def _check_relays(cls, value: tuple[str, ...]) -> tuple[str, ...]:
-        engines = {parse_relay_url(each).engine for each in value}
-        if "livekit" in engines and len(value) > 1:
-            raise ValueError("one LiveKit is all there can be: it grows by itself")
+        for each in value:
+            parse_relay_url(each)
         return value
 
     @field_validator("relay_public")
@@ -56,6 +54,6 @@ class RelaySettings(BaseSettings):
     @property
     def relay_origins(self) -> tuple[str, ...]:
         """What a page may connect to besides its own server."""
-        addresses = self.relay_public or tuple(each.address for each in self.relay_urls if each.engine == "janus")
+        addresses = self.relay_public or tuple(each.address for each in self.relay_urls)
         parts = [urlsplit(each) for each in addresses]
         return tuple(dict.fromkeys(f"{part.scheme}://{part.netloc}" for part in parts))

@@ -26,4 +26,4 @@ class Station:
 
     @property
     def room(self) -> int:
-        return int(self.url.room)
+        return self.url.room

@@ -8,8 +8,8 @@ from server.settings import Settings
 
 
 def test_a_janus_is_named_by_its_websocket_and_a_room() -> None:
-    assert parse_relay_url("janus:ws://10.0.0.2:8188/4711") == RelayUrl("janus", "ws://10.0.0.2:8188", "4711")
-    assert parse_relay_url("janus:wss://sfu.example.org/ws/12") == RelayUrl("janus", "wss://sfu.example.org/ws", "12")
+    assert parse_relay_url("janus:ws://10.0.0.2:8188/4711") == RelayUrl("ws://10.0.0.2:8188", 4711)
+    assert parse_relay_url("janus:wss://sfu.example.org/ws/12") == RelayUrl("wss://sfu.example.org/ws", 12)
 
 
 @pytest.mark.parametrize(
@@ -17,6 +17,7 @@ def test_a_janus_is_named_by_its_websocket_and_a_room() -> None:
     [
         "ws://host/1",
         "sfu:ws://host/1",
+        "livekit:wss://host?room=demo",
         "janus:http://host/1",
         "janus:ws:///1",
         "janus:ws://host",
@@ -27,7 +28,7 @@ def test_a_janus_is_named_by_its_websocket_and_a_room() -> None:
     ],
 )
 def test_anything_else_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match=r"janus|begins"):
+    with pytest.raises(ValueError, match="janus"):
         parse_relay_url(text)
 
 
