@@ -9,17 +9,19 @@ import asyncio
 import json
 import sys
 import time
-from contextlib import AsyncExitStack
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
 
 import uvloop
 
-from client import Console
+from client import Console, ConsoleError
 
 __all__ = ["main"]
 
-AT_ONCE = 6  # that connect at the same time
+AT_ONCE = 4  # that connect at the same time
 CONNECT_SECONDS = 60.0
+TRIES = 5
 RTP = range(128, 192)  # first byte (RFC 7983 7)
 RTCP = range(192, 224)  # second byte of those that are not media (RFC 5761 4)
 
@@ -39,6 +41,30 @@ class _Counter:
             self._pass_on(data, component)
 
 
+@asynccontextmanager
+async def _connected(link: str, name: str) -> AsyncIterator[Console]:
+    """Tried again while the machine is too busy to answer."""
+    async with AsyncExitStack() as stack:
+        for left in reversed(range(TRIES)):
+            console = Console(
+                link,
+                through_relay=True,
+                decode=False,
+                video=1,
+                audio=False,
+                name=name,
+                connect_seconds=CONNECT_SECONDS,
+                silence_seconds=60.0,
+            )
+            try:
+                await stack.enter_async_context(console)
+                break
+            except ConsoleError:
+                if not left:
+                    raise
+        yield console
+
+
 async def watch(link: str, count: int) -> None:
     began = time.monotonic()
     async with AsyncExitStack() as stack:
@@ -47,18 +73,8 @@ async def watch(link: str, count: int) -> None:
         counters: list[_Counter] = []
 
         async def connect(number: int) -> None:
-            console = Console(
-                link,
-                through_relay=True,
-                decode=False,
-                video=1,
-                audio=False,
-                name=f"watcher {number}",
-                connect_seconds=CONNECT_SECONDS,
-                silence_seconds=30.0,
-            )
             async with gate:
-                await stack.enter_async_context(console)
+                console = await stack.enter_async_context(_connected(link, f"watcher {number}"))
             consoles.append(console)
             relay: Any = console._live()._relay
             counters.append(_Counter(relay._pc.getTransceivers()[0].receiver.transport.transport._connection))

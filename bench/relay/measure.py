@@ -15,7 +15,7 @@ __all__ = ["Crowd", "Killing", "crowd", "hop_delays", "killings"]
 ROOMY = {"max_peers": "500", "max_unconnected": "500", "max_offer_burst": "2000", "max_address_connections": "2000"}
 SETTLE = 3.0  # s
 BACK_SECONDS = 30.0  # that a page may take at most to be measured at all
-CROWD_SECONDS = 240.0
+CROWD_SECONDS = 400.0
 
 
 async def hop_delays(folder: Path, seconds: float) -> dict[str, list[float]]:
