@@ -27,6 +27,10 @@ def registered(name: str) -> Starting:
     return lambda directory: running_stack(directory, robot=name)
 
 
+def own_model(directory: Path) -> AbstractAsyncContextManager[Stack]:
+    return running_stack(directory, extra=("--mjcf", str(EXAMPLES.parent / "mjcf" / "desk_arm.xml")))
+
+
 def ros(example: str) -> Starting:
     @asynccontextmanager
     async def start(directory: Path) -> AsyncIterator[Stack]:
@@ -52,6 +56,7 @@ ROBOTS = [
     pytest.param(registered("planar"), id="planar"),
     pytest.param(registered("mobile-manipulator"), id="mobile-manipulator"),
     pytest.param(registered("micromanipulator"), id="micromanipulator"),
+    pytest.param(own_model, id="mjcf"),
     pytest.param(ros("base.yaml"), id="ros2-base", marks=needs_ros),
     pytest.param(ros("arm.yaml"), id="ros2-arm", marks=needs_ros),
     pytest.param(in_c, id="c"),
