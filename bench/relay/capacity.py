@@ -1,7 +1,7 @@
 """What so many observers take, from measured figures: `python -m bench.relay.capacity [COUNT …] [--gigabits 1]`.
 
-The figures are those that `python -m bench relay` and `python -m bench observers` measure; docs/scale.md says where they
-come from. Pure arithmetic: nothing is run.
+The figures are those that `python -m bench relay` and `python -m bench observers` measure; docs/scale.md has
+their conditions. Pure arithmetic: nothing is run.
 """
 
 import math

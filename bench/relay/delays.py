@@ -13,9 +13,8 @@ __all__ = ["main"]
 
 
 async def watch(link: str, through_relay: bool) -> None:
-    carrier = "trailer"
     async with Console(
-        link, through_relay=through_relay, carrier=carrier, video=1, audio=False, name="delays", tolerance=1000
+        link, through_relay=through_relay, carrier="trailer", video=1, audio=False, name="delays", tolerance=1000
     ) as console:
         camera = console.description.cameras[0].name
         told = 0.0
