@@ -16,9 +16,9 @@ ADVICE = (
 def choose_graphics() -> None:
     """Render off screen through EGL unless the environment says otherwise; no effect after mujoco was imported."""
     os.environ.setdefault("MUJOCO_GL", "egl")
-    # Without a GPU Mesa rasterises on the CPU. More threads than one make a picture no sooner at this size and
-    # cost a third more processor time.
-    os.environ.setdefault("LP_NUM_THREADS", "1")
+    # Without a GPU Mesa rasterises on the CPU. Done in the thread that draws, a picture of this size costs a
+    # quarter less processor time than with one thread besides.
+    os.environ.setdefault("LP_NUM_THREADS", "0")
     # PyOpenGL tells every start that its optional accelerator is absent; nothing here would use it.
     logging.getLogger("OpenGL").setLevel(logging.WARNING)
 
