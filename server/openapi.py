@@ -9,10 +9,14 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from robot_bridge.protocol.console import RecordingState
+from robot_bridge.protocol.serial import MAX_EVENT
 from server.api import Delivered, Health, ScenePath, SessionInfo, StopRequest
 from server.api_access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
+from server.api_recordings import FileTicket, RecordingDetails, RecordingList, RecordingRequest
 from server.errors import (
     HTTP_ERRORS,
+    AlreadyRecording,
     BadJson,
     BadParameter,
     BadSdp,
@@ -31,6 +35,7 @@ from server.errors import (
     OriginRefused,
     PreconditionFailed,
     PreconditionRequired,
+    RecordingFailed,
     RobotUnreachable,
     SceneUnavailable,
     ShuttingDown,
@@ -50,6 +55,8 @@ __all__ = ["OPERATIONS", "Operation", "openapi_document"]
 SDP = "application/sdp"
 FRAGMENT = "application/trickle-ice-sdpfrag"
 JSON = "application/json"
+OCTETS = "application/octet-stream"
+MCAP = "application/x-mcap"
 
 Errors = tuple[type[ConsoleError], ...]
 
@@ -97,6 +104,14 @@ PEER = Parameter("peer", "query", {"type": "string", "maxLength": 16})
 LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
 AFTER = Parameter("after", "query", {"type": "integer", "default": 0})
 LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS, "default": 100})
+RECORDING = Parameter("recording_id", "path", {"type": "string"}, required=True)
+CHUNK = Parameter("number", "path", {"type": "integer"}, required=True)
+AFTER_CHUNK = Parameter("after", "query", {"type": "integer", "minimum": 0, "default": 0})
+FROM = Parameter("from", "query", {"type": "integer", "minimum": 1, "maximum": MAX_EVENT}, required=True)
+TO = Parameter("to", "query", {"type": "integer", "minimum": 1, "maximum": MAX_EVENT}, required=True)
+TOPIC = Parameter("topic", "query", {"type": "array", "items": {"type": "string"}, "maxItems": 50})
+DECODABLE = Parameter("decodable", "query", {"type": "boolean", "default": False})
+TICKET = Parameter("ticket", "query", {"type": "string"})
 INVITATION = Parameter("invitation_id", "path", {"type": "string"}, required=True)
 
 OPERATIONS: tuple[Operation, ...] = (
@@ -148,6 +163,44 @@ OPERATIONS: tuple[Operation, ...] = (
         *("get", "/api/audit", "Who did what.", 200, AuditPage),
         errors=(NotAllowed, BadParameter),
         parameters=(AFTER, LIMIT),
+    ),
+    Operation("get", "/api/recordings", "Whether the session is recorded, and what was.", 200, RecordingList),
+    Operation(
+        *("post", "/api/recordings", "Record from now on.", 201, RecordingState),
+        errors=(NotAllowed, AlreadyRecording, RecordingFailed, *WITH_JSON),
+        body=RecordingRequest,
+    ),
+    Operation("post", "/api/recordings/stop", "End the recording.", 200, RecordingState, (NotAllowed,)),
+    Operation(
+        *("get", "/api/recordings/{recording_id}", "One recording with its index.", 200, RecordingDetails),
+        errors=(NotFound, BadParameter, RecordingFailed),
+        parameters=(RECORDING, AFTER_CHUNK),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/chunks/{number}", "The records of a chunk.", 200, OCTETS),
+        errors=(NotFound, BadParameter, RecordingFailed),
+        parameters=(RECORDING, CHUNK),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/records", "The records of a range of events.", 200, OCTETS),
+        errors=(NotFound, BadParameter, RecordingFailed),
+        parameters=(RECORDING, FROM, TO, TOPIC, DECODABLE),
+    ),
+    Operation(
+        *("post", "/api/recordings/{recording_id}/ticket", "A path to download it from.", 200, FileTicket),
+        errors=(NotFound, RecordingFailed),
+        parameters=(RECORDING,),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/file", "The file; with Range.", 200, MCAP),
+        errors=(NotFound, RecordingFailed),
+        parameters=(RECORDING, TICKET),
+        also=(206, 416),
+    ),
+    Operation(
+        *("delete", "/api/recordings/{recording_id}", "Delete the file.", 200, RecordingList),
+        errors=(NotAllowed, NotFound, AlreadyRecording, RecordingFailed),
+        parameters=(RECORDING,),
     ),
     Operation("get", "/healthz", "Whether the console runs, and reaches its robot.", 200, Health, token=False),
     Operation("get", "/metrics", "Prometheus.", 200, "text/plain", token=False),

@@ -1,0 +1,148 @@
+"""A session over the emulated Hong Kong network is recorded; every record is what the bridge's own log says."""
+
+import asyncio
+import json
+import random
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import av
+import pytest
+
+from bench.emulator import Network, load_profile
+from client import Console
+from robot_bridge.robots.event_strip import read_event_strip
+from server.recording.payload import own_record_of
+from server.recording.reader import Record, RecordingReader
+from server.recording.records import CommandRecord, FeedbackRecord
+from server.recording.verify_file import verify_file
+from tests.client.truth import until_logged
+from tests.support.stack import Stack, running_stack
+
+EVENTS = 60
+LOOK_AHEAD = 0.0065  # s, of Opus: a packet's stamp is that of what its decoder gives out
+SEGMENT = 0.02  # s, of the microphone
+SAME = 2e-6  # s; times in the file are rounded
+
+
+class Session(NamedTuple):
+    recording: Path
+    log: list[dict[str, Any]]
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """Two cameras and sound, driven to and fro, recorded from the console's start to its end."""
+    return asyncio.run(_recorded(tmp_path_factory.mktemp("session")))
+
+
+async def _recorded(directory: Path) -> Session:
+    recordings = directory / "recordings"
+    async with running_stack(directory, extra=("--record", str(recordings))) as stack:
+        await _drive(stack)
+        newest = max(record["event"] for record in stack.events("executed"))
+        await until_logged(stack, "feedback", lambda record: record["event"] >= newest)
+        log = list(stack.records())
+    (path,) = recordings.iterdir()
+    return Session(path, log)
+
+
+async def _drive(stack: Stack) -> None:
+    async with (
+        Network(load_profile("hong-kong"), console_url=stack.console, seed=4) as network,
+        Console(network.link(stack.operator), codec="H264", name="Ada") as console,
+    ):
+        await console.take_seat()
+        for number in range(EVENTS):
+            await console.drive([0.3 if number // 15 % 2 == 0 else -0.3, 0.0, 0.2])
+
+
+def test_the_recording_keeps_every_promise(session: Session) -> None:
+    verdict = verify_file(session.recording)
+    assert verdict.ok, json.dumps({name: str(check.violations) for name, check in verdict.checks.items()}, indent=1)
+    assert verdict.events >= EVENTS
+    assert verdict.checks["stamps"].looked > EVENTS
+
+
+def test_at_ten_random_events_command_feedback_pictures_and_sound_are_those_with_that_reference(
+    session: Session,
+) -> None:
+    with RecordingReader(session.recording) as reader:
+        records = list(reader.records())
+    executed = {each["event"]: each for each in session.log if each["kind"] == "executed"}
+    answered = {(each["event"], each["issue"]) for each in session.log if each["kind"] == "feedback"}
+    times = _bridge_times(records)
+    drawn = _drawn_events(records)
+    events = random.Random(1).sample(sorted(executed), 10)
+    pictures = 0
+    for event in events:
+        found = [(index, record) for index, record in enumerate(records) if record.event == event]
+        own = [own_record_of(record.schema, record.data) for _, record in found]
+        command = next(each for each in own if isinstance(each, CommandRecord) and each.outcome == "forwarded")
+        feedback = next(each for each in own if isinstance(each, FeedbackRecord))
+        assert (command.values, command.issue) == (executed[event]["values"], executed[event]["issue"])
+        assert (feedback.event, feedback.issue) in answered
+        for index, record in found:
+            if record.topic.startswith("/camera/"):
+                pictures += 1
+                assert drawn[index] == event
+                assert _is_logged(session, record.topic.removeprefix("/camera/"), event, times[index])
+            elif record.topic.startswith("/microphone/"):
+                assert _is_heard(session, record.topic.removeprefix("/microphone/"), event, times[index])
+    assert pictures >= 10
+
+
+def test_every_picture_shows_the_event_that_it_is_stamped_with(session: Session) -> None:
+    with RecordingReader(session.recording) as reader:
+        assert set(reader.index.keyframes) == {"/camera/overview", "/camera/front"}
+        records = list(reader.records())
+    drawn = _drawn_events(records)
+    assert len(drawn) > EVENTS
+    assert {index: records[index].event for index in drawn} == drawn
+
+
+def _drawn_events(records: list[Record]) -> dict[int, int | None]:
+    """Read from the pixels, by index of the record."""
+    decoders: dict[str, av.VideoCodecContext] = {}
+    found: dict[int, int | None] = {}
+    for index, record in enumerate(records):
+        if record.topic.startswith("/camera/"):
+            if record.topic not in decoders:
+                decoders[record.topic] = av.CodecContext.create("h264", "r")
+            for frame in decoders[record.topic].decode(av.Packet(record.payload)):
+                found[index] = read_event_strip(frame.to_ndarray(format="gray"))
+    return found
+
+
+def _bridge_times(records: list[Record]) -> dict[int, float]:
+    """When each was captured, in s on the bridge's own clock: by the feedback before it."""
+    found: dict[int, float] = {}
+    offset: float | None = None
+    for index, record in enumerate(records):
+        own = own_record_of(record.schema, record.data)
+        if isinstance(own, FeedbackRecord):
+            offset = record.captured - own.time * 1e9
+        elif offset is not None:
+            found[index] = (record.captured - offset) / 1e9
+    return found
+
+
+def _is_logged(session: Session, stream: str, event: int, captured: float) -> bool:
+    return any(
+        each["kind"] == "media"
+        and each["stream"] == stream
+        and each["event"] == event
+        and abs(each["captured"] - captured) < SAME
+        for each in session.log
+    )
+
+
+def _is_heard(session: Session, stream: str, event: int, captured: float) -> bool:
+    """Whether the sound at `captured` lies in a segment that the bridge stamped so."""
+    return any(
+        each["kind"] == "media"
+        and each["stream"] == stream
+        and each["event"] == event
+        and -SAME <= captured - each["captured"] <= SEGMENT + LOOK_AHEAD
+        for each in session.log
+    )
