@@ -31,6 +31,8 @@ class PeersLimits(Protocol):
     @property
     def max_peers(self) -> int: ...
     @property
+    def max_relayed(self) -> int: ...
+    @property
     def reserved_places(self) -> int: ...
     @property
     def max_unconnected(self) -> int: ...
@@ -82,8 +84,10 @@ class Peers:
         return changed
 
     @contextmanager
-    def place(self, identity: Identity) -> Iterator[None]:
+    def place(self, identity: Identity, *, relayed: bool = False) -> Iterator[None]:
         """Keeps a place while a peer is being negotiated. The last ones are not for observers.
+
+        `relayed`: it has its media from a relay; such peers cost little, and are counted by themselves.
 
         Raises:
             TooManyPeers: all places are taken.
@@ -93,10 +97,11 @@ class Peers:
         if self._closing:
             raise ShuttingDown("the console is shutting down")
         limits, token_id = self._limits, identity.token_id
-        bound = limits.max_peers
+        bound = limits.max_relayed if relayed else limits.max_peers
         if identity.role == "observer":
             bound = max(1, bound - limits.reserved_places)
-        if len(self._sessions) + self._reserved.total() >= bound:
+        here = sum(bool(peer.relay) == relayed for peer in self._sessions)
+        if here + self._reserved.total() >= bound:
             raise TooManyPeers(f"all {bound} places are taken")
         waiting = sum(peer.identity.token_id == token_id and not peer.connected for peer in self._sessions)
         if waiting + self._reserved[token_id] >= limits.max_unconnected:

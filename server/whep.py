@@ -58,10 +58,10 @@ async def create(
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(identity.token_id)
     ice = servers_for(here.settings, identity.token_id)
-    with here.console.peers.place(identity):
+    relayed = bool(relay) and identity.role == "observer" and here.relays.arrived(relay)
+    with here.console.peers.place(identity, relayed=relayed):
         peer, answer = await _negotiate(here, identity, offer, ice, trailer=stamp == "trailer")
-        if relay and identity.role == "observer" and here.relays.arrived(relay):
-            peer.relay = relay
+        peer.relay = relay if relayed else ""
         here.console.peers.admit(peer)
     headers = {
         "Location": f"/whep/{peer.resource}",

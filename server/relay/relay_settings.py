@@ -21,6 +21,8 @@ class RelaySettings(BaseSettings):
     relay_codec: Literal["", "H264", "VP8"] = ""  # of cameras; "": what is being encoded already
     observers_direct: Annotated[int, Field(ge=0)] = 10  # observers that the console serves itself, when it has relays
 
+    max_relayed: Annotated[int, Field(ge=1)] = 1000  # observers behind relays that are connected for notes and STOP
+
     @field_validator("relay", "relay_public", mode="before")
     @classmethod
     def _split_relays(cls, value: object) -> object:
