@@ -21,15 +21,22 @@ NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Locks
 
 
 def page_router(directory: Path = WEB_DIST) -> APIRouter:
-    """Routes for `/`, the hashed assets (cached for good) and the few files beside them."""
+    """Routes for `/`, `/recordings`, the hashed assets (cached for good) and the few files beside them."""
     router = APIRouter()
     root = directory.resolve()
 
+    def page(name: str) -> Response:
+        if not (root / name).is_file():
+            return HTMLResponse(NOT_BUILT, headers={"Cache-Control": "no-store"})
+        return FileResponse(root / name, headers={"Cache-Control": "no-store"})
+
     @router.get("/")
     async def index() -> Response:
-        if not (root / "index.html").is_file():
-            return HTMLResponse(NOT_BUILT, headers={"Cache-Control": "no-store"})
-        return FileResponse(root / "index.html", headers={"Cache-Control": "no-store"})
+        return page("index.html")
+
+    @router.get("/recordings")
+    async def recordings() -> Response:
+        return page("recordings.html")
 
     @router.get("/{path:path}")
     async def asset(request: Request, path: str) -> Response:

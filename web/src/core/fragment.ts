@@ -19,7 +19,7 @@ export function readFragment(hash: string): PageLink {
 }
 
 /** What the token says; the console alone decides (RFC 7519 3: the middle part is Base64url of JSON). */
-function roleOf(token: string): unknown {
+export function roleOf(token: string): unknown {
   const payload = token.split(".")[1]?.replaceAll("-", "+").replaceAll("_", "/") ?? "";
   try {
     const claims: unknown = JSON.parse(atob(payload));

@@ -1,4 +1,4 @@
-import type { ServerMessage } from "../wire";
+import type { RobotDescription, ServerMessage } from "../wire";
 import schema from "../wire_schema.json";
 import { isRecord, misfit, type SchemaDefinitions } from "./schema_check";
 
@@ -38,4 +38,11 @@ function parseTyped(value: Record<string, unknown>, type: string): Parsed {
   if (detail !== null) return { kind: "malformed", detail };
   // The schema is generated together with the type, so what fits the one is the other.
   return { kind: "message", message: value as unknown as ServerMessage };
+}
+
+/** null: it is no robot description. */
+export function parseDescription(value: unknown): RobotDescription | null {
+  const node = definitions["RobotDescription"];
+  if (node === undefined || misfit(definitions, node, value) !== null) return null;
+  return value as RobotDescription; // as above
 }

@@ -109,6 +109,16 @@ export class ConsoleApi {
     return path;
   }
 
+  /** What is not JSON, as it is. */
+  async bytes(path: string, signal: AbortSignal): Promise<ArrayBuffer> {
+    const response = await this.fetch("GET", path, {}, undefined, signal);
+    try {
+      return await response.arrayBuffer();
+    } catch (error) {
+      throw new ConsoleError(0, "console_unreachable", error instanceof Error ? error.message : "", null);
+    }
+  }
+
   /** One request that is answered in JSON. */
   async json(method: string, path: string, body: object | undefined, signal: AbortSignal): Promise<unknown> {
     const headers: Record<string, string> = body === undefined ? {} : { "Content-Type": "application/json" };

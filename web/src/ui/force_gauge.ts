@@ -1,8 +1,7 @@
 import { contactStrength, feelingOf, forceOf } from "../core/contact";
-import { TRACE_EVENTS, tracePath } from "../core/force_trace";
+import { TRACE_EVENTS, tracePath, type ForceTrace } from "../core/force_trace";
 import { quantity, scaleFor } from "../core/units";
-import type { ConsoleApp } from "../console_app";
-import type { ForceFeeling } from "../wire";
+import type { ForceFeeling, RobotDescription } from "../wire";
 import { h, setData, setHidden, setText, svg, type Panel } from "./dom";
 import { createStaleMark } from "./stale_mark";
 
@@ -10,11 +9,21 @@ const TRACE_WIDTH = 120;
 const TRACE_HEIGHT = 28;
 const REACH = 44; // of the arrow, in the drawing's units
 
+/** Where forces come from: a running console, or a recording. */
+export interface ForceSource {
+  readonly measuredMs: number | null; // when it was measured; null: it cannot be old
+  readonly state: {
+    readonly robot: { readonly description: RobotDescription } | null;
+    readonly feedback: { readonly wrench: readonly number[] } | null;
+  };
+  readonly touch: { readonly trace: ForceTrace };
+}
+
 /**
  * The contact force: an arrow seen from above (forward is up), and a meter.
  * `onContact`: it shows only while there is contact, over the picture.
  */
-export function createForceGauge(app: ConsoleApp, onContact: boolean): Panel {
+export function createForceGauge(app: ForceSource, onContact: boolean): Panel {
   const drawing = svg("svg", { viewBox: "-56 -56 112 112", class: "gauge-drawing", "aria-hidden": "true" });
   const arrow = svg("path", { class: "force-arrow" });
   drawing.append(

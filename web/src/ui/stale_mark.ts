@@ -1,9 +1,8 @@
 import { staleAge } from "../core/freshness";
-import type { ConsoleApp } from "../console_app";
 import { h, setHidden, setText, type Panel } from "./dom";
 
 /** Stands beside measured values, and says how old they are when they are not the present ones. */
-export function createStaleMark(app: ConsoleApp): Panel {
+export function createStaleMark(app: { readonly measuredMs: number | null }): Panel {
   const element = h("span", "stale-mark");
   return {
     element,

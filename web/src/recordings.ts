@@ -1,0 +1,125 @@
+import "./style/fonts.css";
+import "./style/base.css";
+import "./style/layout.css";
+import "./style/panels.css";
+import "./style/views.css";
+import "./style/gauges.css";
+import "./style/controls.css";
+import "./style/library.css";
+import "./style/replay.css";
+import { readReplayLink, replayHash, tokenIn } from "./core/replay_link";
+import { ListView } from "./replay/list_view";
+import { PlayerView } from "./replay/player_view";
+import { RecordingsApi } from "./replay/recordings_api";
+import { installReplayHook } from "./replay/replay_hook";
+import { ConsoleApi } from "./rtc/console_api";
+import { troubleWords } from "./rtc/session_api";
+import { button, h, setText } from "./ui/dom";
+
+interface View {
+  readonly element: HTMLElement;
+  close(): void;
+}
+
+let view: View | null = null;
+
+function put(next: View): void {
+  view?.close();
+  view = next;
+  const home = h(
+    "a",
+    "bar-brand",
+    { href: `./${replayHash({ ...here(), recording: null, event: null })}` },
+    "Lockstep",
+  );
+  document.body.replaceChildren(
+    h("div", "recordings", {}, h("div", "bar recordings-bar", {}, home), next.element),
+  );
+}
+
+function here(): ReturnType<typeof readReplayLink> {
+  return readReplayLink(location.hash);
+}
+
+function go(recording: string | null): void {
+  history.pushState(null, "", replayHash({ ...here(), recording, event: null }));
+  void route();
+}
+
+async function route(): Promise<void> {
+  const link = here();
+  const api = new RecordingsApi(new ConsoleApi(link.token));
+  if (link.token === "") {
+    put(askForToken());
+    return;
+  }
+  if (link.recording === null) {
+    installReplayHook(null);
+    put(new ListView(api, link.token, { open: (entry) => go(entry.id) }));
+    return;
+  }
+  put(message("Opening the recording …", ""));
+  const waiting = view;
+  try {
+    const details = await api.details(link.recording, 0);
+    if (view !== waiting) return; // somebody went elsewhere meanwhile
+    const player = new PlayerView(api, details, link.token, () => go(null));
+    put(player);
+    installReplayHook(player);
+    player.start(link.event);
+  } catch (error) {
+    if (view === waiting) put(message("The recording cannot be opened", troubleWords(error), true));
+  }
+}
+
+function message(title: string, words: string, leadsBack = false): View {
+  const element = h(
+    "main",
+    "recordings-message",
+    {},
+    h("h1", "", {}, title),
+    h("p", "", { role: "status" }, words),
+  );
+  if (leadsBack) element.append(button("field-button", "All recordings", () => go(null)));
+  return { element, close: () => undefined };
+}
+
+/** A link that somebody shared says which event, but not who opens it. */
+function askForToken(): View {
+  const field = h("input", "field", { type: "password", "aria-label": "Your own link", autocomplete: "off" });
+  const trouble = h("p", "library-trouble", { role: "alert" });
+  trouble.hidden = true;
+  const form = h(
+    "form",
+    "recordings-form",
+    {},
+    field,
+    h("button", "field-button", { type: "submit" }, "Open"),
+  );
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const token = tokenIn(field.value);
+    trouble.hidden = token !== "";
+    setText(trouble, "This is no link of a console: it has no token behind the #.");
+    if (token === "") return;
+    history.replaceState(null, "", replayHash({ ...here(), token }));
+    void route();
+  });
+  const words = h(
+    "p",
+    "muted",
+    {},
+    "This link does not say who you are. Paste the link that you open the console with.",
+  );
+  const element = h("main", "recordings-message", {}, h("h1", "", {}, "Recordings"), words, form, trouble);
+  return { element, close: () => undefined };
+}
+
+addEventListener("popstate", () => void route());
+addEventListener("keydown", (event) => {
+  if (view instanceof PlayerView && view.key(event)) event.preventDefault();
+});
+addEventListener("resize", () => {
+  if (view instanceof PlayerView) view.player.changed();
+});
+void route();

@@ -1,0 +1,61 @@
+import type { ReplayChunkContent } from "../core/replay_chunk";
+
+const MOST_BYTES = 96 * 1024 * 1024;
+const AT_ONCE = 6;
+
+/** Chunks as they were asked for; the one that was used longest ago goes first. */
+export class ChunkStore {
+  private readonly kept = new Map<number, ReplayChunkContent>();
+  private readonly coming = new Map<number, Promise<ReplayChunkContent>>();
+  private readonly closing = new AbortController();
+  private bytes = 0;
+
+  constructor(private readonly load: (number: number, signal: AbortSignal) => Promise<ReplayChunkContent>) {}
+
+  /** Raises what the request raises. */
+  async get(number: number): Promise<ReplayChunkContent> {
+    const kept = this.kept.get(number);
+    if (kept !== undefined) {
+      this.kept.delete(number);
+      this.kept.set(number, kept);
+      return kept;
+    }
+    const coming = this.coming.get(number);
+    if (coming !== undefined) return coming;
+    const asked = this.fetch(number);
+    this.coming.set(number, asked);
+    return asked;
+  }
+
+  /** In the order of their numbers. */
+  all(numbers: Iterable<number>): Promise<ReplayChunkContent[]> {
+    const sorted = [...new Set(numbers)].sort((one, other) => one - other);
+    return Promise.all(sorted.map((number) => this.get(number)));
+  }
+
+  /** Asks for them without waiting. */
+  prefetch(numbers: Iterable<number>): void {
+    for (const number of numbers) if (this.coming.size < AT_ONCE) this.get(number).catch(() => undefined); // asked for again when it is needed
+  }
+
+  close(): void {
+    this.closing.abort();
+    this.kept.clear();
+  }
+
+  private async fetch(number: number): Promise<ReplayChunkContent> {
+    try {
+      const content = await this.load(number, this.closing.signal);
+      this.kept.set(number, content);
+      this.bytes += content.bytes;
+      for (const [oldest, { bytes }] of this.kept) {
+        if (this.bytes <= MOST_BYTES || oldest === number) break;
+        this.kept.delete(oldest);
+        this.bytes -= bytes;
+      }
+      return content;
+    } finally {
+      this.coming.delete(number);
+    }
+  }
+}

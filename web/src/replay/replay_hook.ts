@@ -1,0 +1,42 @@
+import { CAMERA, MICROPHONE } from "../core/replay_chunk";
+import type { PlayerView } from "./player_view";
+
+/** What the page says of itself to tests: `window.lockstep`, as on the console's page. */
+export function installReplayHook(view: PlayerView | null): void {
+  Object.assign(window, {
+    lockstep: {
+      rendered: (name: string) => view?.rendered.get(name) ?? [],
+      stats: () => (view === null ? null : statsOf(view)),
+    },
+  });
+}
+
+function statsOf({ player, sounds }: PlayerView): object {
+  const { shown, place, isLoading, isPlaying, index } = player;
+  const moment = shown?.moment;
+  return {
+    wanted: place.event,
+    event: moment?.place.event ?? null,
+    ready: !isLoading && moment?.place === place,
+    playing: isPlaying,
+    running: player.isRunning,
+    first_event: index.firstEvent,
+    last_event: index.lastEvent,
+    command: moment?.command ?? null,
+    feedback: moment?.feedback ?? null,
+    troubles: Object.fromEntries(shown?.troubles ?? []),
+    pictures: Object.fromEntries(
+      [...(moment?.pictures ?? [])].map(([topic, { record }]) => [topic.slice(CAMERA.length), record.event]),
+    ),
+    sounds: Object.fromEntries(
+      [...(moment?.sounds ?? [])].map(([topic, { packets }]) => [
+        topic.slice(MICROPHONE.length),
+        {
+          stamps: packets.map((each) => each.event),
+          sizes: packets.map((each) => each.payload.length),
+          level: sounds.levels.get(topic) ?? null,
+        },
+      ]),
+    ),
+  };
+}
