@@ -1,7 +1,7 @@
 """Makes a recording of any length without a session: `python -m bench.recordings.hour FILE [SECONDS]`.
 
-Records as of a driven robot: 25 events a second with command, feedback and joints, two cameras with 15 pictures a second
-of 4 kB, 50 packets of sound. What is in the pictures does not matter for how fast a file opens and seeks.
+Records as of a driven robot: 25 events a second with command, feedback and joints, two cameras with 15 pictures a
+second of 4 kB, 50 packets of sound. What is in the pictures does not matter for how fast a file opens and seeks.
 """
 
 import os

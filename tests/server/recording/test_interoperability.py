@@ -1,0 +1,67 @@
+"""A recording is taken by viewers' own libraries. Where rerun-sdk is not installed that part says nothing."""
+
+from pathlib import Path
+
+import av
+import pytest
+from foxglove.messages import CompressedVideo
+from foxglove.messages import JointStates as SdkJointStates
+from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo as Message
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from mcap.reader import make_reader
+
+from tests.server.recording.makers import Story
+
+EVENTS = 60
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recordings") / "a.mcap"
+    Story(events=EVENTS, real=True).write(path)
+    return path
+
+
+def test_pictures_decode_with_pyav_one_for_each_message(file: Path) -> None:
+    decoder = av.CodecContext.create("h264", "r")
+    with file.open("rb") as stream:
+        for _, _, message in make_reader(stream).iter_messages(topics=["/camera/front"]):
+            (frame,) = decoder.decode(av.Packet(Message.FromString(message.data).data))
+            assert (frame.width, frame.height) == (320, 240)
+
+
+def test_sound_decodes_with_pyav(file: Path) -> None:
+    decoder = av.CodecContext.create("libopus", "r")
+    decoder.sample_rate, decoder.layout = 48_000, "mono"
+    with file.open("rb") as stream:
+        packets = [
+            CompressedAudio.FromString(message.data)
+            for _, _, message in make_reader(stream).iter_messages(topics=["/microphone/ear"])
+        ]
+    assert {packet.format for packet in packets} == {"opus"}
+    assert sum(frame.samples for packet in packets for frame in decoder.decode(av.Packet(packet.data))) > 50_000
+
+
+def test_schemas_are_those_of_the_foxglove_sdk(file: Path) -> None:
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    schemas = {schema.name: schema for schema in summary.schemas.values()}
+    for kind in (CompressedVideo, SdkJointStates):
+        theirs = kind.get_schema()
+        assert (schemas[theirs.name].name, schemas[theirs.name].encoding) == (theirs.name, theirs.encoding)
+    with file.open("rb") as stream:
+        _, _, message = next(make_reader(stream).iter_messages(topics=["/joint_states"]))
+    assert [joint.name for joint in JointStates.FromString(message.data).joints] == ["x", "y", "yaw"]
+
+
+def test_rerun_loads_it(file: Path, tmp_path: Path) -> None:
+    rerun = pytest.importorskip("rerun")
+    target = tmp_path / "a.rrd"
+    recording = rerun.RecordingStream("lockstep-test")
+    recording.save(str(target))
+    recording.log_file_from_path(str(file))
+    recording.flush()
+    recording.disconnect()
+    assert b"/camera/front" in target.read_bytes()
