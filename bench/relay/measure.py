@@ -3,12 +3,13 @@
 import asyncio
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from bench.browsers.console_page import ConsolePage, open_console
 from bench.relay.stage import Process, RelayStage, relay_stage
+from bench.samples import median
 
 __all__ = ["Crowd", "Killing", "crowd", "hop_delays", "killings"]
 
@@ -55,8 +56,17 @@ class Crowd:
     least: float  # a second, that the observer with the fewest got
     connect_seconds: float
 
+    @property
+    def summary(self) -> str:
+        janus = " + ".join(f"{share:.1f}" for share in self.janus)
+        trip = f"{median(self.trips_ms):.1f} ms" if self.trips_ms else "none"
+        return (
+            f"{self.observers} observers: console {self.console:.1f} %, Janus {janus} %, {self.packets:.0f} packets/s, "
+            f"at least {self.least:.0f} each, connected in {self.connect_seconds:.0f} s; command → feedback {trip}"
+        )
 
-async def crowd(folder: Path, counts: Sequence[int], seconds: float) -> list[Crowd]:
+
+async def crowd(folder: Path, counts: Sequence[int], seconds: float, say: Callable[[str], None]) -> list[Crowd]:
     """The same session with more and more observers on two Janus; all of it in one network."""
     async with relay_stage(folder) as stage:
         await stage.add_janus("robot", 0)
@@ -65,6 +75,7 @@ async def crowd(folder: Path, counts: Sequence[int], seconds: float) -> list[Cro
         driver = await stage.add_driver("robot")
         await asyncio.sleep(SETTLE)
         found = [await _look(stage, driver, None, 0, seconds)]
+        say(f"relay: {found[-1].summary}")
         audience: Process | None = None
         for count in counts:
             if audience is not None:
@@ -74,6 +85,7 @@ async def crowd(folder: Path, counts: Sequence[int], seconds: float) -> list[Cro
             await audience.line(r'"connected"', CROWD_SECONDS)
             await asyncio.sleep(SETTLE)
             found.append(await _look(stage, driver, audience, count, seconds))
+            say(f"relay: {found[-1].summary}")
         return found
 
 

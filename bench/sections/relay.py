@@ -32,7 +32,7 @@ async def run(context: Context) -> list[Result]:
         results += _delays(ages)
         context.say("relay: delays measured")
         counts = QUICK_CROWDS if context.quick else CROWDS
-        crowds = await crowd(place / "crowd", counts, context.scale(CROWD_SECONDS, QUICK_CROWD_SECONDS))
+        crowds = await crowd(place / "crowd", counts, context.scale(CROWD_SECONDS, QUICK_CROWD_SECONDS), context.say)
         results += [each for found in crowds[1:] for each in _crowd(found, crowds)]
         context.say("relay: crowds measured")
         found = await killings(place / "kill", context.scale(KILLINGS, QUICK_KILLINGS), KILL_SECONDS)
