@@ -16,6 +16,7 @@ from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
 from robot_bridge.robots.mujoco_view.camera import CameraSource
 from robot_bridge.robots.mujoco_view.renderer import Renderer
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
+from tests.robot_bridge.robots.stamping import Stamping
 
 
 class Clock:
@@ -42,7 +43,7 @@ async def collect(source: MediaSource, stamp: Callable[[], Stamp], count: int) -
             enough.set()
 
     async with asyncio.timeout(20), asyncio.TaskGroup() as group:
-        running = group.create_task(source.run(stamp, emit))
+        running = group.create_task(source.run(Stamping(stamp), emit))
         await enough.wait()
         running.cancel()
     return media[:count]

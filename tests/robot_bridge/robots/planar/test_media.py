@@ -13,6 +13,7 @@ from robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHON
 from robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
 from robot_bridge.robots.planar.microphone import SEGMENT_SAMPLES, TONE_HZ, PlanarMicrophone, Synthesiser
 from robot_bridge.robots.planar.robot import PlanarState
+from tests.robot_bridge.robots.stamping import Stamping
 
 EVENT = 123_456_789
 
@@ -33,7 +34,7 @@ async def capture(source: MediaSource, count: int) -> list[Media]:
         if len(media) >= count:
             enough.set()
 
-    running = asyncio.ensure_future(source.run(lambda: Stamp(next(counter), loop.time()), emit))
+    running = asyncio.ensure_future(source.run(Stamping(lambda: Stamp(next(counter), loop.time())), emit))
     try:
         async with asyncio.timeout(5):
             await enough.wait()
