@@ -5,7 +5,8 @@ import math
 from robot_bridge.last_known import LastKnown
 from robot_bridge.robots.base import Measurement
 from robot_bridge.robots.planar.description import DESCRIPTION
-from tests.robot_bridge.bridge_helpers import PlanarRobot, operator, running_bridge
+from robot_bridge.robots.planar.robot import PlanarRobot
+from tests.robot_bridge.bridge_helpers import operator, running_bridge
 
 NAN = math.nan
 

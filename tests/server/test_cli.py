@@ -89,6 +89,8 @@ async def test_a_port_in_use_is_said_clearly() -> None:
         (("serve", "--robot", "nonsense"), 2, "is not tcp://host:port"),
         (("serve", "--ice-host", "example"), 2, "ice_hosts"),
         (("up", "--robot", "teapot", "--port", "0", "--robot-port", "0"), 4, "teapot"),
+        (("up", "--ros2", "none.yaml", "--port", "0", "--robot-port", "0"), 4, "none.yaml: No such file"),
+        (("up", "--robot-python", "/none/python", "--port", "0", "--robot-port", "0"), 4, "/none/python"),
         (("serve", "--port", "70000"), 2, "65535"),
     ],
 )
