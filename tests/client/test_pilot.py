@@ -3,35 +3,13 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from client.command_gate import CommandGate
-from client.pilot import ECHO, IDLE, LOSSY_SPELL, SALVO, SALVO_SPACING, Pilot
-from client.repeat_timer import FLOOR, INITIAL
+from client.pilot import IDLE, Pilot
+from client.repeat_timer import INITIAL
 from client.rest_call import SETTLE
 from robot_bridge.protocol.messages import Command, Rest
 from robot_bridge.protocol.serial import MAX_EVENT, event_after
 from tests.client.helpers import feedback, refusal
-
-FAST = [1.0]
-NEUTRAL = [0.0]
-
-
-def new_pilot(event: int = 1, min_interval: float = 0.0) -> Pilot:
-    pilot = Pilot(CommandGate("feedback", 4, min_interval), NEUTRAL)
-    pilot.feedback(feedback(event), 0.0)
-    return pilot
-
-
-def commands(messages: list[Command | Rest]) -> list[Command]:
-    return [message for message in messages if isinstance(message, Command)]
-
-
-def rests(messages: list[Command | Rest]) -> list[Rest]:
-    return [message for message in messages if isinstance(message, Rest)]
-
-
-def flying(pilot: Pilot, now: float = 0.0) -> Command:
-    pilot.intend(FAST, now)
-    [command] = commands(pilot.due(now))
-    return command
+from tests.client.pilots import FAST, NEUTRAL, commands, flying, new_pilot, rests
 
 
 def test_an_intention_leaves_at_once_and_its_feedback_is_its_outcome() -> None:
@@ -104,94 +82,6 @@ def test_not_armed_there_is_silence() -> None:
     pilot = new_pilot()
     assert pilot.due(10.0) == []
     assert pilot.wake_at(10.0) == float("inf")
-
-
-def test_a_repeat_gives_no_sample_of_the_round_trip() -> None:
-    pilot = new_pilot()
-    flying(pilot)
-    pilot.due(INITIAL)
-    pilot.feedback(feedback(2), INITIAL + 0.09)
-    assert pilot.timer.round_trip is None
-    assert list(pilot.samples) == [INITIAL + 0.09]
-
-
-def test_a_needless_repeat_does_not_keep_the_timer_from_learning() -> None:
-    pilot = new_pilot()
-    flying(pilot)
-    pilot.due(INITIAL)
-    pilot.feedback(feedback(2), INITIAL + 0.005)
-    assert pilot.timer.round_trip == INITIAL + 0.005
-    pilot.intend(FAST, 1.0)
-    pilot.due(1.0)
-    assert pilot.due(1.0 + ECHO) == []
-
-
-def test_a_feedback_that_was_issued_again_by_itself_is_no_sample() -> None:
-    pilot = new_pilot()
-    flying(pilot)
-    pilot.feedback(feedback(2, 2), 0.09)
-    assert pilot.timer.round_trip is None
-
-
-def test_pings_stand_in_until_commands_are_known() -> None:
-    pilot = new_pilot()
-    pilot.ping_answered(0.3)
-    assert pilot.timer.round_trip == 0.3
-    for event in range(2, 12):
-        flying(pilot, event)
-        pilot.feedback(feedback(event), event + 0.3)
-    known = pilot.timer.round_trip
-    pilot.ping_answered(9.0)
-    assert pilot.timer.round_trip == known
-
-
-def test_after_a_loss_commands_are_doubled_for_a_while() -> None:
-    pilot = new_pilot()
-    pilot.loss(0.0)
-    command = flying(pilot)
-    assert pilot.wake_at(0.0) == ECHO
-    assert pilot.due(ECHO) == [command]
-    assert pilot.due(2 * ECHO) == []
-    assert (pilot.echoes, pilot.repeats) == (1, 0)
-    pilot.feedback(feedback(2), 0.05)
-    assert pilot.timer.round_trip == 0.05
-    flying(pilot, LOSSY_SPELL)
-    assert pilot.due(LOSSY_SPELL + ECHO) == []
-
-
-def test_on_a_lossy_path_the_first_repeat_is_a_salvo_that_ends_with_the_answer() -> None:
-    pilot = new_pilot()
-    pilot.loss(0.0)
-    command = flying(pilot)
-    pilot.due(ECHO)
-    assert pilot.due(INITIAL) == [command]
-    assert pilot.wake_at(INITIAL) == INITIAL + SALVO_SPACING
-    assert pilot.due(INITIAL + 2.5 * SALVO_SPACING) == [command] * 2
-    assert pilot.due(INITIAL + 0.05) == [command] * (SALVO - 3)
-    assert pilot.due(INITIAL + 0.09) == []
-    pilot.feedback(feedback(2), INITIAL + 0.09)
-    assert command not in pilot.due(5.0)
-
-
-def test_with_a_short_interval_there_is_no_salvo() -> None:
-    pilot = new_pilot()
-    for event in range(2, 20):
-        flying(pilot, event)
-        pilot.feedback(feedback(event), event + 0.005)
-    assert pilot.timer.interval == FLOOR
-    pilot.loss(20.0)
-    command = flying(pilot, 20.0)
-    assert pilot.due(20.0 + FLOOR) == [command]
-    assert pilot.due(20.0 + FLOOR + 3 * SALVO_SPACING) == []
-
-
-def test_a_repeat_that_was_needed_is_a_loss() -> None:
-    pilot = new_pilot()
-    flying(pilot)
-    pilot.due(INITIAL)
-    pilot.feedback(feedback(2), 2 * INITIAL)
-    flying(pilot, 1.0)
-    assert len(commands(pilot.due(1.0 + ECHO))) == 1
 
 
 def test_a_late_command_is_tried_again_on_fresh_feedback_only() -> None:
