@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from aiortc import AudioStreamTrack
 
-from bench.browsers.sound_card import running_sound_card, tone_level
+from bench.browsers.sound_card import SoundCard, running_sound_card, tone_level
 from robot_bridge.protocol.console import SeatRelease, SeatRequest, Voice, Welcome
 from tests.server.rig import Rig, TestPeer, eventually, running_rig
 
@@ -59,6 +59,17 @@ def heard(path: Path) -> np.ndarray[Any, np.dtype[np.int16]]:
         return np.frombuffer(data[: len(data) // 2 * 2], np.int16)
 
 
+async def loudest(card: SoundCard) -> float:
+    """Level of the tone in the best twentieth of a second of some; a machine that is busy leaves much of it out."""
+    best = 0.0
+    for _ in range(8):
+        sound = await card.record(1.0)
+        best = max(best, *(tone_level(part, TONE) for part in np.split(sound, 20)))
+        if best > 0.05:
+            break
+    return best
+
+
 async def test_who_holds_the_seat_is_heard_and_nobody_else(tmp_path: Path) -> None:
     path = tmp_path / "heard.wav"
     async with running_rig(speaker=f"file:{path}") as rig, speaking(rig, "operator") as peer:
@@ -86,7 +97,7 @@ async def test_the_voice_is_played_by_pulseaudio(tmp_path: Path, monkeypatch: py
         async with running_rig(speaker="pulse:ears") as rig, speaking(rig, "operator") as peer:
             await seated(peer)
             await eventually(lambda: rig.count("lockstep_voice_speaking") == 1)
-            assert await card.hears(TONE, 0.03, within=15)  # a machine that is busy leaves some of it out
+            assert await loudest(card) > 0.05
 
 
 async def test_a_speaker_that_does_not_work_is_told_to_everyone(monkeypatch: pytest.MonkeyPatch) -> None:
