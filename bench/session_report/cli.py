@@ -62,7 +62,7 @@ def _page(recording: Path, session: Session, verdict: Verdict, figures: list[Fig
 
 def _promises(verdict: Verdict) -> str:
     rows = "".join(
-        f"<tr><td>{name.replace('_', ' ')}</td><td>{check.looked or ''}</td>"
+        f"<tr><th>{name.replace('_', ' ')}</th><td>{check.looked or ''}</td>"
         f"<td><span class='{'good' if check.ok else 'bad'}'>{'kept' if check.ok else f'{check.count} times not'}</span>"
         f"</td></tr>"
         for name, check in verdict.checks.items()

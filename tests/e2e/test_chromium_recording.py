@@ -1,0 +1,41 @@
+"""The page starts and ends a recording, and shows to everyone that there is one."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser, expect
+
+from bench.browsers.console_page import open_console
+from server.recording.verify_file import verify_file
+from tests.support.stack import Stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+
+async def test_the_operator_records_and_the_observer_sees_it_and_cannot(
+    stack: Stack, chromium: Browser, tmp_path: Path
+) -> None:
+    async with (
+        open_console(chromium, stack.operator) as operator,
+        open_console(chromium, stack.observer, pad=False) as observer,
+    ):
+        await operator.until_live()
+        await observer.until_live()
+        button, shown = operator.page.locator(".record"), observer.page.locator(".record")
+        await expect(button).to_have_text("Record")
+        await expect(shown).to_be_hidden()
+        await button.click()
+        await expect(button).to_contain_text("Rec 0:", timeout=15_000)
+        await expect(shown).to_contain_text("Rec 0:", timeout=15_000)
+        await expect(shown).to_be_disabled()
+        await operator.arm()
+        await operator.drive_forward()
+        await operator.until("s.event > 20", 60)
+        await button.click()
+        await expect(button).to_have_text("Record", timeout=15_000)
+        await expect(shown).to_be_hidden()
+    (path,) = (tmp_path / "state" / "recordings").iterdir()
+    verdict = await asyncio.to_thread(verify_file, path)
+    assert [name for name, check in verdict.checks.items() if not check.ok] == []
+    assert verdict.events >= 15
