@@ -1,7 +1,7 @@
 """What so many observers take, from measured figures: `python -m bench.relay.capacity [COUNT …] [--gigabits 1]`.
 
-The figures are those that `python -m bench relay` and `python -m bench observers` measure; docs/scale.md has
-their conditions. Pure arithmetic: nothing is run.
+Most figures are those that `python -m bench relay` and `python -m bench observers` measure; what is assumed says so.
+docs/scale.md has the conditions. Pure arithmetic: nothing is run.
 """
 
 import math
@@ -36,9 +36,9 @@ MEASURED = Figures(
     bits_per_second=1_750_000,
     packets_per_second=260,
     direct_share=0.42,
-    member_share=0.05,
-    relay_microseconds=10.0,
-    hop_milliseconds=1.0,
+    member_share=0.01,  # 0.2 % for 59, rounded up
+    relay_microseconds=20.0,  # python -m bench.relay.packets: 19.8
+    hop_milliseconds=1.0,  # assumed: below what could be measured
     network_bits=1e9,
 )
 
