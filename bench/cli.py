@@ -31,6 +31,7 @@ SECTIONS = (
     "relay",
     "robot_cost",
     "memory",
+    "recording",
 )
 BUSY_PERCENT = 8.0  # of the machine, by others, above which the figures say more about them
 LOOK_SECONDS = 1.5  # at the neighbours before each section
