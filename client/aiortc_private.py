@@ -268,7 +268,7 @@ def _delay_acknowledgements(sctp: Any) -> None:
     timer: asyncio.TimerHandle | None = None
 
     async def acknowledge_late() -> None:
-        with contextlib.suppress(ConnectionError):
+        with contextlib.suppress(ConnectionError, SSL.Error):  # the connection ends meanwhile
             await acknowledge()
 
     def late() -> None:
