@@ -160,6 +160,7 @@ async def records(
 @router.post("/api/recordings/{recording_id}/ticket")
 async def ticket(request: Request, caller: Caller, recording_id: str) -> Response:
     """For a link that the browser downloads by itself: it sends no token."""
+    require_role(caller, "operator", "supervisor")
     await _with_reader(request, recording_id, lambda reader, entry: None)
     permission = _service(request).access.issue_file_ticket(recording_id, caller.token_id)
     return _json(FileTicket(f"/api/recordings/{recording_id}/file?ticket={permission}"))
@@ -172,7 +173,7 @@ async def download(request: Request, recording_id: str, ticket: str = "") -> Res
     if ticket:
         access.verify_file_ticket(ticket, recording_id)
     else:
-        _caller(request)
+        require_role(_caller(request), "operator", "supervisor")
     path = await _with_reader(request, recording_id, lambda reader, entry: reader.path)
     return FileResponse(
         path, media_type="application/x-mcap", filename=path.name, headers={"Cache-Control": "no-store"}

@@ -58,7 +58,9 @@ async def test_a_session_is_recorded_read_by_event_downloaded_and_deleted_by_rol
             head["topic"] == "/lockstep/feedback" and head["event"] == event for head, _ in frames(found.content)
         )
 
-        ticket = (await rig.http.post(f"{path}/ticket", headers=observer)).json()["path"]
+        assert (await rig.http.post(f"{path}/ticket", headers=observer)).status_code == 403
+        assert (await rig.http.get(f"{path}/file", headers=observer)).status_code == 403
+        ticket = (await rig.http.post(f"{path}/ticket", headers=operator)).json()["path"]
         part = await rig.http.get(ticket, headers={"Range": "bytes=0-7"})
         assert (part.status_code, part.content) == (206, b"\x89MCAP0\r\n")
         assert (await rig.http.get(f"{path}/file")).status_code == 401

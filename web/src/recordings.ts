@@ -115,7 +115,12 @@ function askForToken(): View {
   return { element, close: () => undefined };
 }
 
-addEventListener("popstate", () => void route());
+/** Another event of the same recording is only sought: by the browser's history, or by a link in the same tab. */
+addEventListener("popstate", () => {
+  const link = here();
+  if (view instanceof PlayerView && view.isOf(link) && link.event !== null) view.start(link.event);
+  else void route();
+});
 addEventListener("keydown", (event) => {
   if (view instanceof PlayerView && view.key(event)) event.preventDefault();
 });

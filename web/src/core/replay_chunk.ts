@@ -15,6 +15,7 @@ export interface ReplayFeedback {
   readonly event: number;
   readonly issue: number;
   readonly arrived: number;
+  readonly time: number; // s, the robot bridge's own clock
   readonly axes: readonly number[];
   readonly joints: readonly number[];
   readonly wrench: readonly number[];
@@ -115,6 +116,7 @@ function parseFeedback(value: unknown, arrived: number): ReplayFeedback[] {
       event: numeric(value["event"]),
       issue: numeric(value["issue"]),
       arrived,
+      time: numeric(value["time"]),
       axes: numbers(value["axes"]),
       joints: numbers(value["joints"]),
       wrench: numbers(value["wrench"]),

@@ -103,6 +103,10 @@ export class Player {
     this.events.changed();
   }
 
+  private isOpen(): boolean {
+    return !this.closed;
+  }
+
   /** A setting was changed from outside. */
   changed(): void {
     this.events.changed();
@@ -181,7 +185,7 @@ export class Player {
   }
 
   private async work(): Promise<void> {
-    while (this.wanted !== null && !this.closed) {
+    while (this.wanted !== null && this.isOpen()) {
       const place = this.wanted;
       this.wanted = null;
       this.isLoading = true;
@@ -191,7 +195,7 @@ export class Player {
         this.shown = shown;
         this.events.shown(shown);
       } catch (error) {
-        if (!this.closed) this.trouble = error;
+        if (this.isOpen()) this.trouble = error;
         this.isPlaying = false;
       }
     }

@@ -4,7 +4,7 @@ import { elapsed } from "../core/recording_words";
 import { dayWords } from "../core/recording_list";
 import { CAMERA, ChunkBroken, MICROPHONE, type ReplayFeedback } from "../core/replay_chunk";
 import { clampedEvent, timeOf } from "../core/replay_index";
-import { replayHash } from "../core/replay_link";
+import { replayHash, type ReplayLink } from "../core/replay_link";
 import { roleOf } from "../core/fragment";
 import { eventGap } from "../core/serial";
 import { troubleWords } from "../rtc/session_api";
@@ -61,7 +61,7 @@ export class PlayerView {
       touch: { trace: createForceTrace() },
     };
     this.axes = description === null ? null : new AxisRows(description);
-    this.gauge = description?.wrench == null ? null : createForceGauge(this.force, false);
+    this.gauge = (description?.wrench ?? null) === null ? null : createForceGauge(this.force, false);
     const labels = new Map(
       [...(description?.cameras ?? []), ...(description?.microphones ?? [])].map((each) => [
         each.name,
@@ -97,7 +97,6 @@ export class PlayerView {
     rail.append(this.sounds.element, this.marks.element);
     const deck = h("footer", "replay-deck", {}, this.timeline.element, this.transport.element);
     this.element.append(this.createHead(back), this.trouble, pictures, rail, deck);
-    this.element.addEventListener("keydown", () => undefined);
   }
 
   /** Where it begins: at the event of a link, or at its first; of what is being recorded at the newest. */
@@ -107,6 +106,10 @@ export class PlayerView {
     else if (event !== null) void this.player.seek(clampedEvent(index, event));
     else if (isRunning) this.player.toNewest();
     else void this.player.seek(index.firstEvent);
+  }
+
+  isOf(link: ReplayLink): boolean {
+    return link.token === this.token && link.recording === this.details.entry.id;
   }
 
   close(): void {

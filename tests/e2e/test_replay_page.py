@@ -1,0 +1,96 @@
+"""The replay page in real Chromium: what it shows at an event is what the bridge's own log says of it."""
+
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from playwright.async_api import Browser, Page
+
+from bench.browsers.chromium import open_page
+from bench.browsers.console_page import READ_STRIP, ConsolePage, open_console
+from server.recording.reader import Record, RecordingReader
+from tests.support.stack import Stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+EVENTS = 40  # to drive for
+SEEKS = 10
+
+
+def _token(link: str) -> str:
+    return link.partition("#token=")[2].partition("&")[0]
+
+
+def _replay_link(stack: Stack, link: str, recording: str, event: int) -> str:
+    return f"{stack.console}/recordings#token={_token(link)}&recording={recording}&event={event}"
+
+
+async def _ask(stack: Stack, method: str, path: str) -> dict[str, Any]:
+    async with httpx.AsyncClient(trust_env=False, timeout=30) as http:
+        headers = {"Authorization": f"Bearer {_token(stack.operator)}"}
+        answer = await http.request(method, f"{stack.console}{path}", headers=headers)
+        answer.raise_for_status()
+        found: dict[str, Any] = answer.json()
+        return found
+
+
+async def _record_a_drive(stack: Stack, chromium: Browser) -> tuple[str, int, int]:
+    """Its id, its first and its last event of driving."""
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.until("s.streams.microphone.rendered > 5")
+        await _ask(stack, "POST", "/api/recordings")
+        await console.arm()
+        first = (await console.stats())["event"]
+        await console.drive_forward()
+        await console.until(f"s.event > {first + EVENTS}")
+        last = (await console.stats())["event"]
+        await _ask(stack, "POST", "/api/recordings/stop")
+    (recording,) = (await _ask(stack, "GET", "/api/recordings"))["recordings"]
+    return recording["id"], first + 4, last - 4
+
+
+async def _seek(page: Page, replay: ConsolePage, event: int) -> dict[str, Any]:
+    """As a link to the event that is opened in the same tab."""
+    await page.evaluate("(event) => { location.hash = location.hash.replace(/event=\\d+/, `event=${event}`); }", event)
+    await replay.until(f"s.ready && s.event === {event}")
+    return await replay.stats()
+
+
+def _newest(records: list[Record], topic: str, event: int) -> list[Record]:
+    """Those of the newest stamp that is not newer than `event`, in the order of the file."""
+    stamped = [record for record in records if record.topic == topic and record.event <= event]
+    return [record for record in stamped if record.event == stamped[-1].event]
+
+
+async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_feedback(
+    stack: Stack, chromium: Browser, tmp_path: Path
+) -> None:
+    recording, first, last = await _record_a_drive(stack, chromium)
+    executed = {each["event"]: each for each in stack.events("executed")}
+    measured = {(each["event"], each["issue"]): each for each in stack.events("feedback")}
+    captured = {(each["stream"], each["event"]) for each in stack.events("media")}
+    with RecordingReader(tmp_path / "state" / "recordings" / f"{recording}.mcap") as reader:
+        records = list(reader.records())
+    async with open_page(chromium, _replay_link(stack, stack.observer, recording, first)) as page:
+        replay = ConsolePage(page)
+        await replay.until("s.ready")
+        for event in random.Random(1).sample(range(first, last), SEEKS):
+            shown = await _seek(page, replay, event)
+            assert shown["command"]["values"] == executed[event]["values"]
+            feedback = shown["feedback"]
+            assert feedback["event"] == event
+            assert feedback["time"] == measured[event, feedback["issue"]]["time"]
+            own = [json.loads(each.data) for each in records if each.topic == "/lockstep/feedback"]
+            assert feedback["axes"] == [each["axes"] for each in own if each["event"] == event][-1]
+            for camera in ("overview", "front"):
+                strip = await page.evaluate(READ_STRIP, camera)
+                assert strip["event"] == strip["stamp"] == _newest(records, f"/camera/{camera}", event)[-1].event
+                assert (camera, strip["event"]) in captured
+            packets = _newest(records, "/microphone/microphone", event)
+            sound = shown["sounds"]["microphone"]
+            assert sound["stamps"] == [each.event for each in packets]
+            assert sound["sizes"] == [len(each.payload) for each in packets]
