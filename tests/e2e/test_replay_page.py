@@ -83,7 +83,9 @@ async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_
             assert shown["command"]["values"] == executed[event]["values"]
             feedback = shown["feedback"]
             assert feedback["event"] == event
-            assert feedback["time"] == measured[event, feedback["issue"]]["time"]
+            # The log notes a feedback right after it was measured, all by the bridge's clock.
+            noted = measured[event, feedback["issue"]]["time"]
+            assert executed[event]["time"] < feedback["time"] <= noted < executed[event + 1]["time"]
             own = [json.loads(each.data) for each in records if each.topic == "/lockstep/feedback"]
             assert feedback["axes"] == [each["axes"] for each in own if each["event"] == event][-1]
             for camera in ("overview", "front"):
