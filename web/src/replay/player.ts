@@ -7,6 +7,7 @@ import { ChunkStore } from "./chunk_store";
 import { MomentLoader } from "./moment_loader";
 import { CannotDecode, PictureDecoder } from "./picture_decoder";
 import type { RecordingDetails, RecordingsApi } from "./recordings_api";
+import { microphonesOf, SoundPlayer } from "./sound_player";
 
 const FOLLOW_MS = 2000;
 const US = 1e6;
@@ -39,6 +40,7 @@ export class Player {
   trouble: unknown = null; // of the last request
   private readonly store: ChunkStore;
   private readonly loader: MomentLoader;
+  private readonly sound: SoundPlayer;
   private readonly decoders = new Map<string, PictureDecoder>();
   private working: Promise<void> | null = null;
   private wanted: ReplayPlace | null = null;
@@ -57,6 +59,11 @@ export class Player {
     this.place = { event: this.index.firstEvent, until: null };
     this.store = new ChunkStore((number, signal) => api.chunk(details.entry.id, number, signal));
     this.loader = new MomentLoader(this.store);
+    this.sound = new SoundPlayer(
+      this.store,
+      microphonesOf(this.index),
+      (topic) => this.index.encodings.get(topic) === "foxglove.CompressedAudio",
+    );
     if (this.isRunning) this.followLater();
   }
 
@@ -123,6 +130,7 @@ export class Player {
     this.closed = true;
     this.isPlaying = false;
     clearTimeout(this.followTimer);
+    this.sound.stop();
     this.store.close();
     for (const decoder of this.decoders.values()) decoder.close();
   }
@@ -150,10 +158,14 @@ export class Player {
         }
         time = timeOf(this.index, this.loop.from);
       }
+      if (this.speed === 1)
+        this.sound.follow(this.index, time).catch(() => undefined); // pictures go on without
+      else this.sound.stop();
       const asked = performance.now();
       await this.showTime(time);
       if (performance.now() - asked > 250) before = performance.now(); // what loads does not run away
     }
+    this.sound.stop();
     this.events.changed();
   }
 

@@ -1,0 +1,43 @@
+import { expect, it } from "vitest";
+import { avcCodec } from "../../src/core/h264";
+import { parseList, searched } from "../../src/core/recording_list";
+import { readReplayLink, replayHash, tokenIn } from "../../src/core/replay_link";
+import { decodeMuLaw, opusChannels } from "../../src/core/sound_packets";
+
+it("a link names a recording and an event", () => {
+  const link = { token: "a.b.c", recording: "20270115-planar", event: 12 };
+  expect(readReplayLink(replayHash(link))).toEqual(link);
+  expect(readReplayLink("#token=a&event=-3")).toEqual({ token: "a", recording: null, event: null });
+});
+
+it("a token is found in a pasted link, and nothing else is taken for one", () => {
+  expect(tokenIn(" https://robot.example/#token=a.b.c&name=x ")).toBe("a.b.c");
+  expect(tokenIn("a.b.c")).toBe("a.b.c");
+  expect(tokenIn("good morning")).toBe("");
+});
+
+it("a search finds recordings that have all of its words", () => {
+  const { recordings } = parseList({
+    recordings: [
+      { id: "one", name: "Knot", robot: "Arm", marks: { stop: 1 } },
+      { id: "two", name: "Knot", robot: "Planar robot" },
+      { robot: "no id" },
+    ],
+  });
+  expect(searched(recordings, "knot  planar").map((each) => each.id)).toEqual(["two"]);
+  expect(searched(recordings, "stop").map((each) => each.id)).toEqual(["one"]);
+  expect(searched(recordings, "")).toHaveLength(2);
+});
+
+it("the codec is read from the sequence parameter set", () => {
+  expect(avcCodec(Uint8Array.of(0, 0, 0, 1, 0x67, 0x42, 0xc0, 0x1f, 0x8c))).toBe("avc1.42C01F");
+  expect(avcCodec(Uint8Array.of(0, 0, 0, 1, 0x41, 1, 2, 3, 4))).toBeNull();
+});
+
+it("µ-law is decoded as in G.711", () => {
+  const [silence, most, least] = decodeMuLaw(Uint8Array.of(0xff, 0x80, 0x00));
+  expect(silence).toBeCloseTo(0);
+  expect(most).toBeCloseTo(32124 / 32768);
+  expect(least).toBeCloseTo(-32124 / 32768);
+  expect([opusChannels(Uint8Array.of(0x78)), opusChannels(Uint8Array.of(0x7c))]).toEqual([1, 2]);
+});

@@ -1,0 +1,159 @@
+import { describe, expect, it } from "vitest";
+import { ChunkBroken, parseChunkBody } from "../../src/core/replay_chunk";
+import {
+  chunksOf,
+  grownIndex,
+  keyframeBefore,
+  parseIndex,
+  type ReplayIndex,
+} from "../../src/core/replay_index";
+import { eventAtTime, momentOf } from "../../src/core/replay_moment";
+
+interface Part {
+  readonly topic: string;
+  readonly event: number;
+  readonly arrived: number;
+  readonly keyframe?: boolean;
+  readonly payload: string;
+}
+
+/** The body of a chunk as the console sends it. */
+function bodyOf(parts: readonly Part[]): ArrayBuffer {
+  const encoder = new TextEncoder();
+  const pieces = parts.flatMap(({ payload, ...head }) => {
+    const data = encoder.encode(payload);
+    const header = encoder.encode(
+      JSON.stringify({ keyframe: true, captured: 0, ...head, size: data.length }),
+    );
+    const length = new Uint8Array(4);
+    new DataView(length.buffer).setUint32(0, header.length);
+    return [length, header, data];
+  });
+  const whole = new Uint8Array(pieces.reduce((sum, piece) => sum + piece.length, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    whole.set(piece, at);
+    at += piece.length;
+  }
+  return whole.buffer;
+}
+
+const picture = (event: number, arrived: number, keyframe: boolean): Part => ({
+  topic: "/camera/front",
+  event,
+  arrived,
+  keyframe,
+  payload: `${arrived}`,
+});
+const feedback = (event: number, issue: number, arrived: number): Part => ({
+  topic: "/lockstep/feedback",
+  event,
+  arrived,
+  payload: JSON.stringify({ event, issue, axes: [arrived] }),
+});
+const command = (event: number, arrived: number, outcome: string, value: number): Part => ({
+  topic: "/lockstep/command",
+  event,
+  arrived,
+  payload: JSON.stringify({ event, issue: 1, values: [value], outcome, name: "Ada" }),
+});
+
+const chunks = [
+  parseChunkBody(
+    0,
+    bodyOf([picture(4, 10, true), feedback(5, 1, 20), picture(5, 25, false), feedback(5, 2, 30)]),
+  ),
+  parseChunkBody(
+    1,
+    bodyOf([
+      command(6, 38, "refused", 0.9),
+      command(6, 39, "forwarded", 0.1),
+      command(6, 40, "forwarded", 0.2),
+      feedback(6, 1, 50),
+      picture(5, 52, false),
+      picture(7, 60, false),
+    ]),
+  ),
+];
+
+describe("a moment", () => {
+  it("has the newest picture that is not newer than its event, and what comes before that back to a keyframe", () => {
+    const found = momentOf(chunks, { event: 6, until: null }).pictures.get("/camera/front");
+    expect(found?.record.arrived).toBe(52);
+    expect(found?.sequence.map((each) => each.arrived)).toEqual([10, 25, 52]);
+  });
+
+  it("has the newest issue of its feedback and the command that became the event", () => {
+    expect(momentOf(chunks, { event: 5, until: null }).feedback?.issue).toBe(2);
+    expect(momentOf(chunks, { event: 6, until: null }).command?.values).toEqual([0.2]);
+    expect(momentOf(chunks, { event: 5, until: null }).command).toBeNull();
+  });
+
+  it("within an event has only what had arrived by then", () => {
+    const moment = momentOf(chunks, { event: 5, until: 22 });
+    expect(moment.feedback?.issue).toBe(1);
+    expect(moment.pictures.get("/camera/front")?.record.event).toBe(4);
+    expect(eventAtTime(chunks, 49)).toBe(5);
+    expect(eventAtTime(chunks, 19)).toBeNull();
+  });
+
+  it("shows no picture without a keyframe", () => {
+    expect(momentOf(chunks.slice(1), { event: 6, until: null }).pictures.size).toBe(0);
+  });
+});
+
+it("a chunk that is cut off is refused", () => {
+  const whole = bodyOf([feedback(5, 1, 20)]);
+  for (const length of [2, 10, whole.byteLength - 1])
+    expect(() => parseChunkBody(0, whole.slice(0, length))).toThrow(ChunkBroken);
+});
+
+function index(from: number): ReplayIndex {
+  const found = parseIndex({
+    version: 1,
+    epoch: "e",
+    first_event: 1,
+    last_event: 30,
+    chunks: [
+      [0, 1, 10, 0, 9],
+      [1, 10, 10, 10, 19],
+      [2, 9, 30, 20, 29],
+    ].slice(from),
+    events: [
+      [1, 0, 0],
+      [11, 20, 2],
+    ].slice(from === 0 ? 0 : 1),
+    keyframes: {
+      "/camera/front": [
+        [1, 0, 0],
+        [10, 12, 1],
+        [20, 25, 2],
+      ].filter((each) => (each[2] ?? 0) >= from),
+    },
+    marks: [],
+  });
+  if (found === null) throw new Error("the index cannot be read");
+  return found;
+}
+
+describe("an index", () => {
+  it("knows the chunks that can hold an event, also where the robot was idle for long", () => {
+    expect(chunksOf(index(0), 10)).toEqual({ first: 0, last: 2 });
+    expect(chunksOf(index(0), 5)).toEqual({ first: 0, last: 0 });
+    expect(chunksOf(index(0), 30)).toEqual({ first: 2, last: 2 });
+  });
+
+  it("finds the keyframe before an event and a time", () => {
+    expect(keyframeBefore(index(0), "/camera/front", 19, Infinity)?.[2]).toBe(1);
+    expect(keyframeBefore(index(0), "/camera/front", 19, 11)?.[2]).toBe(0);
+    expect(keyframeBefore(index(0), "/camera/back", 19, Infinity)).toBeNull();
+  });
+
+  it("that grew is the same as the whole", () => {
+    expect(grownIndex(index(0), index(2), 2)).toEqual(index(0));
+  });
+
+  it("of another version is none", () => {
+    expect(parseIndex({ version: 2 })).toBeNull();
+  });
+});
