@@ -19,6 +19,7 @@ async def _get(directory: Path, path: str) -> httpx.Response:
 def built(tmp_path: Path) -> Path:
     (tmp_path / "dist" / "assets").mkdir(parents=True)
     (tmp_path / "dist" / "index.html").write_text("<p>console")
+    (tmp_path / "dist" / "recordings.html").write_text("<p>recordings")
     (tmp_path / "dist" / "icon.svg").write_text("<svg/>")
     (tmp_path / "dist" / "assets" / "main-1a2b.js").write_text("1")
     (tmp_path / "secret").write_text("secret")
@@ -28,6 +29,8 @@ def built(tmp_path: Path) -> Path:
 async def test_the_page_is_never_cached_and_its_hashed_assets_always(built: Path) -> None:
     page = await _get(built, "/")
     assert (page.text, page.headers["cache-control"]) == ("<p>console", "no-store")
+    recordings = await _get(built, "/recordings")
+    assert (recordings.text, recordings.headers["cache-control"]) == ("<p>recordings", "no-store")
     asset = await _get(built, "/assets/main-1a2b.js")
     assert "immutable" in asset.headers["cache-control"]
     assert "javascript" in asset.headers["content-type"]

@@ -3,6 +3,8 @@ import { ConsoleApp } from "./console_app";
 import { holdsSeat, isOperator } from "./core/console_state";
 import type { PageAction } from "./core/page_keys";
 import { staleAge } from "./core/freshness";
+import { readFragment } from "./core/fragment";
+import { replayHash } from "./core/replay_link";
 import { sceneDue } from "./core/scene_gate";
 import { countUnread, createUnread, markRead } from "./core/unread";
 import { FIELDS } from "./input/keyboard";
@@ -194,6 +196,7 @@ export class Page {
     const people = createPeoplePanel(app, {
       invite: () => sheets.open(inviting),
       audit: () => sheets.open(auditing),
+      recordings: openRecordings,
     });
     const news = (): number => this.countNews();
     const notes = createNotesPanel(app);
@@ -247,6 +250,12 @@ export class Page {
     this.board.update(app, now);
     for (const panel of this.panels) panel.update(now);
   }
+}
+
+/** In a tab of its own: this one goes on. */
+function openRecordings(): void {
+  const { token } = readFragment(location.hash);
+  window.open(`./recordings${replayHash({ token: token ?? "", recording: null, event: null })}`, "_blank");
 }
 
 /** On-screen sticks appear where fingers are. */

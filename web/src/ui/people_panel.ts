@@ -13,13 +13,15 @@ const FEW = 6;
 export interface PeopleTools {
   invite(): void;
   audit(): void;
+  recordings(): void;
 }
 
 /** Who is here, and how each of them does. */
 export function createPeoplePanel(app: ConsoleApp, tools: PeopleTools): Panel {
   const invite = button("field-button", "Invite…", () => tools.invite());
   const audit = button("field-button quiet", "Audit trail…", () => tools.audit());
-  const toolRow = h("div", "people-tools", {}, invite, audit);
+  const recordings = button("field-button quiet", "Recordings", () => tools.recordings());
+  const toolRow = h("div", "people-tools", {}, invite, recordings, audit);
   const empty = h("p", "muted", {}, "Nobody is connected");
   const leading = h("ul", "people");
   const rename = createRenameForm(app);
@@ -43,7 +45,8 @@ export function createPeoplePanel(app: ConsoleApp, tools: PeopleTools): Panel {
       shown = made;
       const people = sortPeople(participants, seat, welcome?.peer ?? null);
       const crowded = people.watching.length > FEW;
-      setHidden(toolRow, !mayDrive(app.state));
+      setHidden(toolRow, welcome === null);
+      setHidden(invite, !mayDrive(app.state));
       setHidden(audit, welcome?.role !== "supervisor");
       setHidden(empty, participants.length > 0);
       setHidden(rename, welcome === null);
