@@ -6,6 +6,7 @@ from typing import Protocol
 from robot_bridge.protocol.console import RecordingState
 from server.errors import AlreadyRecording, NotAllowed, NotFound
 from server.recording.event_index import EventIndex
+from server.recording.known_indexes import KnownIndexes
 from server.recording.reader import RecordingReader
 from server.recording.recorder import Recorder
 from server.recording.shelf import RecordingEntry, entry_of
@@ -37,6 +38,7 @@ class ConsoleLibrary:
 
     def __init__(self, recorder: Recorder) -> None:
         self._recorder = recorder
+        self._indexes = KnownIndexes()
 
     def state(self) -> RecordingState:
         return self._recorder.state()
@@ -63,7 +65,7 @@ class ConsoleLibrary:
         path = self._recorder.shelf.path(recording_id)
         if path is None:
             raise NotFound("no such recording")
-        return _open(path)
+        return _open(path, self._indexes)
 
     def delete(self, recording_id: str) -> None:
         running = self._running()
@@ -85,6 +87,7 @@ class FileLibrary:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._indexes = KnownIndexes()
 
     def state(self) -> RecordingState:
         return RecordingState(state="off")
@@ -96,21 +99,21 @@ class FileLibrary:
         return self.state()
 
     def entries(self) -> list[RecordingEntry]:
-        reader, entry = _open(self._path)
+        reader, entry = _open(self._path, self._indexes)
         reader.close()
         return [entry]
 
     def open(self, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
         if recording_id != self._path.stem:
             raise NotFound("no such recording")
-        return _open(self._path)
+        return _open(self._path, self._indexes)
 
     def delete(self, recording_id: str) -> None:
         raise NotAllowed("a replayed file is not deleted here")
 
 
-def _open(path: Path) -> tuple[RecordingReader, RecordingEntry]:
-    reader = RecordingReader(path)
+def _open(path: Path, indexes: KnownIndexes) -> tuple[RecordingReader, RecordingEntry]:
+    reader = indexes.open(path)
     try:
         return reader, entry_of(path, reader.info, reader.index, interrupted=reader.interrupted)
     except OSError:
