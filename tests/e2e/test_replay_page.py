@@ -96,3 +96,28 @@ async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_
             sound = shown["sounds"]["microphone"]
             assert sound["stamps"] == [each.event for each in packets]
             assert sound["sizes"] == [len(each.payload) for each in packets]
+
+
+async def test_a_recording_is_watched_while_it_is_made_then_listed_and_deleted_by_role(
+    stack: Stack, chromium: Browser
+) -> None:
+    await _ask(stack, "POST", "/api/recordings")
+    lists = f"{stack.console}/recordings#token="
+    async with open_page(chromium, lists + _token(stack.observer)) as page:
+        row = page.get_by_role("listitem")
+        await row.get_by_text("Recording now").wait_for()
+        assert await row.get_by_role("button").count() == 1  # only to open it
+        await row.get_by_role("button").click()
+        replay = ConsolePage(page)
+        await replay.until("s.ready && s.running && s.pictures.front !== undefined")
+        known = (await replay.stats())["ended"]
+        await replay.until(f"s.ended > {known} && s.ready")
+        await _ask(stack, "POST", "/api/recordings/stop")
+        await replay.until("!s.running")
+    async with open_page(chromium, lists + _token(stack.supervisor)) as page:
+        async with page.expect_download() as download:
+            await page.get_by_role("button", name="Download").click()
+        assert (await download.value).suggested_filename.endswith(".mcap")
+        await page.get_by_role("button", name="Delete …").click()
+        await page.get_by_role("button", name="Delete", exact=True).click()
+        await page.get_by_text("Nothing has been recorded yet").wait_for()

@@ -22,6 +22,7 @@ function statsOf({ player, sounds }: PlayerView): object {
     running: player.isRunning,
     first_event: index.firstEvent,
     last_event: index.lastEvent,
+    ended: index.ended,
     command: moment?.command ?? null,
     feedback: moment?.feedback ?? null,
     troubles: Object.fromEntries(shown?.troubles ?? []),
