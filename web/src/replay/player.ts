@@ -150,19 +150,21 @@ export class Player {
       const now = await nextFrame();
       time += (now - before) * 1000 * this.speed;
       before = now;
-      if (this.isPastEnd(time)) {
-        if (this.loop === null) {
-          this.isPlaying = false;
-          await this.show({ event: this.index.lastEvent, until: null });
-          break;
-        }
-        time = timeOf(this.index, this.loop.from);
+      const event = await this.eventAt(time);
+      if (event === null || !this.playsOn()) continue;
+      if (time > this.index.ended || (this.loop !== null && isNewer(event, this.loop.to))) {
+        if (this.loop === null) this.isPlaying = false;
+        this.sound.stop();
+        await this.show({ event: this.loop?.from ?? this.index.lastEvent, until: null });
+        time = this.timeHere();
+        before = performance.now();
+        continue;
       }
       if (this.speed === 1)
         this.sound.follow(this.index, time).catch(() => undefined); // pictures go on without
       else this.sound.stop();
       const asked = performance.now();
-      await this.showTime(time);
+      await this.show({ event, until: time });
       if (performance.now() - asked > 250) before = performance.now(); // what loads does not run away
     }
     this.sound.stop();
@@ -173,18 +175,13 @@ export class Player {
     return this.isPlaying && !this.closed;
   }
 
-  private isPastEnd(time: number): boolean {
-    if (time > this.index.ended) return true;
-    return this.loop !== null && isNewer(this.place.event, this.loop.to);
-  }
-
-  private async showTime(time: number): Promise<void> {
+  private async eventAt(time: number): Promise<number | null> {
     try {
-      const event = await this.loader.eventAt(this.index, time);
-      if (event !== null && this.playsOn()) await this.show({ event, until: time });
+      return await this.loader.eventAt(this.index, time);
     } catch (error) {
       this.trouble = error;
       this.isPlaying = false;
+      return null;
     }
   }
 
