@@ -63,7 +63,7 @@ EXIT_BRIDGE = 4
 PATIENCE = 2.0  # s until somebody who waits for a robot is told so
 # A worker thread of ours (encoders, the 3D scene) may hold the interpreter this long while a command waits.
 SWITCH_INTERVAL = 0.0005  # s; Python's own is ten times that
-GC_THRESHOLDS = (5_000, 20, 50)  # allocations, young collections, middle collections
+GC_THRESHOLDS = (5_000, 20, 10)  # allocations, young collections, middle collections
 
 
 class Switch(StrEnum):

@@ -4,18 +4,21 @@ What is used and why:
 
 - `RTCDtlsTransport._recv_next`: an exception there would end the connection
 - `aioice.Connection._queue`: the receive queue, which has no bound
+- `RTCRtpReceiver.__remote_bitrate_estimator`: a third of a megabyte of small objects for each picture stream, on which
+  nothing of ours depends: the console receives no pictures. A peer that left waits with it for the garbage collector
 """
 
 import asyncio
 from collections.abc import Callable
 from typing import Any, cast
 
-from aiortc import RTCPeerConnection
+from aiortc import RTCPeerConnection, RTCRtpReceiver
 from aiortc.rtcdtlstransport import RTCDtlsTransport
 
 __all__ = ["guard_transports"]
 
 RECEIVE_QUEUE_DATAGRAMS = 1024
+ESTIMATOR = "_RTCRtpReceiver__remote_bitrate_estimator"
 DATAGRAM_MAX = 1500  # bytes, what pylibsrtp takes
 
 
@@ -40,11 +43,19 @@ def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None]) -> 
 
     Call after setRemoteDescription, when the transports exist. Calling it again changes nothing.
     """
+    for transceiver in pc.getTransceivers():
+        _estimate_nothing(transceiver.receiver)
     transports = {transceiver.receiver.transport for transceiver in pc.getTransceivers()}
     if pc.sctp is not None:
         transports.add(pc.sctp.transport)
     for transport in transports:
         _guard_transport(transport, on_error)
+
+
+def _estimate_nothing(receiver: RTCRtpReceiver) -> None:
+    if not hasattr(receiver, ESTIMATOR):
+        raise RuntimeError("aiortc moved the bitrate estimator; see server/media/receive_guard_private.py")
+    setattr(receiver, ESTIMATOR, None)
 
 
 def _guard_transport(dtls: RTCDtlsTransport, on_error: Callable[[str], None]) -> None:

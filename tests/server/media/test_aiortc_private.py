@@ -139,3 +139,18 @@ async def test_an_offer_is_read() -> None:
     finally:
         await server.close()
         await client.close()
+
+
+async def test_what_estimates_a_path_that_no_picture_comes_from_is_left_out() -> None:
+    offering, answering = RTCPeerConnection(), create_peer_connection()
+    try:
+        offering.addTransceiver("video", direction="recvonly")
+        await answering.setRemoteDescription(RTCSessionDescription((await offering.createOffer()).sdp, "offer"))
+        [transceiver] = answering.getTransceivers()
+        receiver: Any = transceiver.receiver
+        assert receiver._RTCRtpReceiver__remote_bitrate_estimator is not None, MOVED
+        guard_transports(answering, lambda name: None)
+        assert receiver._RTCRtpReceiver__remote_bitrate_estimator is None
+    finally:
+        await offering.close()
+        await answering.close()
