@@ -1,9 +1,13 @@
-"""No test touches the state that a console keeps for its user."""
+"""No test touches the state that a console keeps for its user; all draw off screen."""
 
 import os
 from collections.abc import Iterator
 
 import pytest
+
+from robot_bridge.robots.mujoco_view.graphics import choose_graphics
+
+choose_graphics()  # before a test file imports mujoco
 
 
 @pytest.fixture(autouse=True, scope="session")
