@@ -39,6 +39,7 @@ from server.security import SAFE_METHODS, SecurityHeaders, check_origin
 from server.services import Services, services
 from server.settings import Settings
 from server.state import ConsoleState, open_state
+from server.sweeper import sweep_forever
 from server.voice import VoiceService
 
 __all__ = ["create_app"]
@@ -101,6 +102,9 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
                     tasks.create_task(voice.run(), name="voice"),
                     tasks.create_task(recorder.run(), name="recorder"),
                     tasks.create_task(relays.run(), name="relays"),
+                    tasks.create_task(
+                        sweep_forever(lambda: console.peers.ended, lambda: console.clock.moving), name="sweeper"
+                    ),
                 ]
                 if scene is not None:
                     running.append(tasks.create_task(scene.run(), name="scene"))

@@ -34,6 +34,11 @@ class EventClock:
     def stop(self) -> StopState:
         return StopState() if self.feedback is None else self.feedback.stop
 
+    @property
+    def moving(self) -> bool:
+        """Whether the robot was not at rest when it was last measured."""
+        return self.feedback is not None and not self.feedback.at_rest
+
     def begin(self, epoch: str) -> bool:
         """The bridge said which epoch it lives in. True when it is another one: everything starts anew."""
         if epoch == self.epoch:

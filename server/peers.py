@@ -56,6 +56,7 @@ class Peers:
         self._sessions: dict[Peer, asyncio.Task[None]] = {}
         self._reserved: Counter[str] = Counter()  # places of peers that are being negotiated, by token
         self._closing = False
+        self.ended = 0  # connections, ever
         self.relays: list[FeedbackReceiver] = []
 
     def __iter__(self) -> Iterator[Peer]:
@@ -179,6 +180,7 @@ class Peers:
             log.exception("peer failed", peer=peer.id)
         finally:
             del self._sessions[peer]
+            self.ended += 1
             self._metrics.peers.labels(peer.role).dec()
             self._metrics.peers_ended.labels(peer.ended).inc()
             self._metrics.dropped.labels("channel").inc(peer.dropped())
