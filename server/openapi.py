@@ -188,12 +188,12 @@ OPERATIONS: tuple[Operation, ...] = (
     ),
     Operation(
         *("post", "/api/recordings/{recording_id}/ticket", "A path to download it from.", 200, FileTicket),
-        errors=(NotFound, RecordingFailed),
+        errors=(NotAllowed, NotFound, RecordingFailed),
         parameters=(RECORDING,),
     ),
     Operation(
         *("get", "/api/recordings/{recording_id}/file", "The file; with Range.", 200, MCAP),
-        errors=(NotFound, RecordingFailed),
+        errors=(NotAllowed, NotFound, RecordingFailed),
         parameters=(RECORDING, TICKET),
         also=(206, 416),
     ),

@@ -13,7 +13,7 @@ __all__ = ["SweepPlan", "sweep_forever"]
 
 ENOUGH = 5  # connections that have ended
 INTERVAL = 10.0  # s between two sweeps
-PATIENCE = 120.0  # s that a sweep waits for a robot that moves all the time
+PATIENCE = 30.0  # s that a sweep waits for a robot that moves all the time
 LOOK = 2.0  # s
 
 

@@ -131,12 +131,12 @@ async def test_the_path_can_be_changed_again_and_again_without_a_repeat() -> Non
     async with running_rig(ice_hosts="127.0.0.1") as rig, Console(_link(rig), video=False, audio=False) as console:
         await console.take_seat()
         values = [0.1] * len(console.description.axes)
-        first = await console.drive(values)
+        events = [(await console.drive(values)).event]
         for _ in range(3):
             await console.restart_ice()
             for _ in range(5):
-                last = await console.drive(values)
-        assert last.event == first.event + 15
+                events.append((await console.drive(values)).event)
+        assert events == sorted(set(events))  # in between are the neutral ones of a long pause
 
 
 async def test_a_session_that_has_ended_is_not_restarted() -> None:

@@ -257,7 +257,7 @@ async def test_a_disk_that_is_full_stops_nothing_and_everyone_is_told(monkeypatc
 
 
 def _contents(directory: Path) -> bytes:
-    return b"".join(each.read_bytes() for each in directory.iterdir() if each.name != "signing.key")
+    return b"".join(each.read_bytes() for each in directory.rglob("*") if each.is_file() and each.name != "signing.key")
 
 
 async def test_no_token_is_ever_logged_or_kept(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -101,7 +101,7 @@ async def test_no_picture_shows_an_older_state_than_its_stamp_says(slide: MjcfRo
     async with Bridge(slide, BridgeSettings(port=0, event_log=log)) as bridge, asyncio.timeout(40):
         receiving = asyncio.create_task(receive(bridge))
         async with operator(bridge) as driver:
-            while len(media) < 15 or driver.feedback.event < 30:
+            while len(media) < 15 or driver.feedback.event < 30 or driver.feedback.joints[0] < 0.12:
                 feedback = await driver.drive([0.2 if driver.feedback.joints[0] < 0.7 else 0.0])
                 places.setdefault(feedback.event, feedback.joints[0])
         receiving.cancel()
