@@ -154,7 +154,7 @@ export class ConsoleApp {
       this.disarm("operator");
       return;
     }
-    const refusal = arming.arm(this.arming, this.conditions());
+    const refusal = arming.arm(this.arming, this.conditions(), this.controls.deadman);
     if (refusal !== null) note(this.state, "warning", ARM_REFUSAL_WORDS[refusal], Date.now());
     this.page.armedChanged();
   }

@@ -61,10 +61,10 @@ export function armRefusal(arming: Arming, conditions: ArmConditions): ArmRefusa
   return arming.deadman ? "deadman_held" : null;
 }
 
-/** Arms if it may; says why not otherwise. */
-export function arm(arming: Arming, conditions: ArmConditions): ArmRefusal | null {
+/** Arms if it may; says why not otherwise. `held`: the deadman is, by now; the last sample may not know it yet. */
+export function arm(arming: Arming, conditions: ArmConditions, held: boolean): ArmRefusal | null {
   if (arming.state !== "disarmed") return null;
-  const refusal = armRefusal(arming, conditions);
+  const refusal = armRefusal(arming, conditions) ?? (held ? "deadman_held" : null);
   if (refusal === null) arming.state = "armed";
   return refusal;
 }

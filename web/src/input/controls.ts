@@ -1,7 +1,7 @@
 import type { HeldInputs } from "../core/axis_mapping";
 import { createGrip, noteGrip } from "../core/grip";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
-import { Pad, type PadEvents } from "./pad";
+import { Pad, type PadEvents, type PadState } from "./pad";
 import { PadStorage } from "./pad_storage";
 import type { TouchSticks } from "./touch_sticks";
 
@@ -29,14 +29,22 @@ export class Controls {
     this.keyboard = new Keyboard(events);
   }
 
+  /** Whether a deadman is held, by what is known now. */
+  get deadman(): boolean {
+    return this.keyboard.deadman || this.sticks.deadman || this.readyPad?.deadman === true;
+  }
+
+  private get readyPad(): PadState | null {
+    return this.pad.state?.ready === true ? this.pad.state : null;
+  }
+
   sample(): ControlSample {
     this.pad.poll();
-    const { keyboard, sticks } = this;
-    const pad = this.pad.state?.ready === true ? this.pad.state : null;
+    const { keyboard, sticks, readyPad: pad } = this;
     const touch = sticks.deadman ? sticks.inputs : null;
     const held: HeldInputs = { pad: pad?.inputs ?? null, keys: keyboard.keys, touch };
     return {
-      deadman: keyboard.deadman || sticks.deadman || (pad?.deadman ?? false),
+      deadman: this.deadman,
       held,
       slowShare: keyboard.slow ? SLOW_SHARE : 1,
       signature: noteGrip(this.grip, held),

@@ -22,18 +22,18 @@ const READY: ArmConditions = {
 function armed(): Arming {
   const arming = createArming();
   sampleDeadman(arming, false, "", 0);
-  expect(arm(arming, READY)).toBeNull();
+  expect(arm(arming, READY, false)).toBeNull();
   return arming;
 }
 
 describe("arming", () => {
   it("needs the deadman seen released first", () => {
     const arming = createArming();
-    expect(arm(arming, READY)).toBe("deadman_held");
+    expect(arm(arming, READY, false)).toBe("deadman_held");
     sampleDeadman(arming, true, "", 0);
-    expect(arm(arming, READY)).toBe("deadman_held");
+    expect(arm(arming, READY, false)).toBe("deadman_held");
     sampleDeadman(arming, false, "", 1);
-    expect(arm(arming, READY)).toBeNull();
+    expect(arm(arming, READY, false)).toBeNull();
     expect(arming.state).toBe("armed");
   });
 
@@ -48,14 +48,21 @@ describe("arming", () => {
   ] as const)("is refused: %s", (refusal, change) => {
     const arming = createArming();
     sampleDeadman(arming, false, "", 0);
-    expect(arm(arming, { ...READY, ...change })).toBe(refusal);
+    expect(arm(arming, { ...READY, ...change }, false)).toBe(refusal);
     expect(arming.state).toBe("disarmed");
+  });
+
+  it("does not arm with a deadman that was pressed since the last sample", () => {
+    const arming = createArming();
+    sampleDeadman(arming, false, "", 0);
+    expect(arm(arming, READY, true)).toBe("deadman_held");
+    expect(arm(arming, READY, false)).toBeNull();
   });
 
   it("again while armed changes nothing", () => {
     const arming = armed();
     sampleDeadman(arming, true, "a", 1);
-    expect(arm(arming, READY)).toBeNull();
+    expect(arm(arming, READY, false)).toBeNull();
     expect(arming.state).toBe("driving");
   });
 });

@@ -47,7 +47,7 @@ function tapedAfter(held: (now: number) => HeldInputs, forMs: number): number | 
   const arming = createArming();
   const grip = createGrip();
   sampleDeadman(arming, false, "", 0);
-  expect(arm(arming, READY)).toBeNull();
+  expect(arm(arming, READY, false)).toBeNull();
   for (let now = 0; now <= forMs; now += TICK_MS)
     if (sampleDeadman(arming, true, noteGrip(grip, held(now)), now) === "taped_down") {
       expect([arming.state, arming.reason]).toEqual(["disarmed", "taped_down"]);
