@@ -18,7 +18,7 @@ __all__ = ["hostile", "memory_of"]
 WARM_UP = 3.0  # s
 INTERVAL = 0.05  # s between two commands
 ALLOWED = 1.2  # times the undisturbed median
-NICE = ("nice", "-n", "5")  # the crowd's processor time is not what is measured; it gives way to the console
+NICE = ("nice", "-n", "19")  # attackers have machines of their own; the crowd takes what the console leaves
 CROWD_SECONDS = 60.0  # for it to say something
 
 

@@ -79,6 +79,7 @@ async def _calibrate(console: ConsolePage, hand: Hand) -> None:
         await hand.move(axis, 1, -1)
     await hand.asked("up on the cross")
     await hand.move(6, -1, 23 / 7)
+    await page.locator(".pad-ask", has_text="up on the cross").wait_for(state="hidden")
     for _ in range(6):
         await page.get_by_role("button", name="Skip").click()
     await hand.asked("Try it")
@@ -113,6 +114,7 @@ async def test_a_pad_without_the_standard_mapping_is_calibrated_tried_and_drives
         # Armed with the deadman held it must not be; let go, it drives.
         await hand.hold(DEADMAN, True)
         await hand.press(ARM)
+        await hand.seen()
         assert not (await console.stats())["armed"]
         await hand.hold(DEADMAN, False)
         await hand.seen()
