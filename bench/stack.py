@@ -1,5 +1,6 @@
 """A robot bridge and a console, each a process of its own, so that the time of each can be told."""
 
+import asyncio
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -41,9 +42,11 @@ class Stack:
     observer: str
 
     async def metrics(self) -> "Metrics":
-        """The console's counters now."""
+        """The console's counters now; asks again where others at this address have used up its requests."""
         async with httpx.AsyncClient(trust_env=False) as http:
-            return Metrics((await http.get(f"{self.url}/metrics")).text)
+            while (answer := await http.get(f"{self.url}/metrics")).status_code == httpx.codes.TOO_MANY_REQUESTS:
+                await asyncio.sleep(float(answer.headers["Retry-After"]))
+            return Metrics(answer.raise_for_status().text)
 
 
 class Metrics:

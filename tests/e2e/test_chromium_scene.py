@@ -86,7 +86,7 @@ async def test_a_scene_that_stands_still_is_veiled_while_the_robot_goes_on(stack
         await console.until_live()
         await _open_scene(console)
         veil = console.page.locator('[data-view="3D scene"] .veil-words')
-        assert not await veil.is_visible()
+        await veil.wait_for(state="hidden")
         await console.page.evaluate("document.querySelector('.scene-frame').contentWindow.clearInterval(1)")
         await console.arm()
         await console.drive_forward()
