@@ -4,7 +4,7 @@ A second ICE connection is gathered beside the first, its credentials go to the 
 moves over to it: data channels, media and all that is in flight stay. `server/ice_restart_private.py` does the same on
 the other side; neither may import the other.
 
-Private parts of aiortc and aioice that are used, pinned by tests/client/test_ice_restart_private.py:
+Private parts of aiortc and aioice that are used, pinned by tests/client/test_ice_restart.py:
 
 - `RTCIceGatherer._connection`, `._remote_candidates_end`, `RTCIceTransport._connection`, `._recv`, `._send`: what DTLS
   sends and receives with

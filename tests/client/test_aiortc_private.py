@@ -29,6 +29,7 @@ from client.aiortc_private import (
     send_control,
     take_packets,
     take_raw_rtp,
+    transport_of,
 )
 from client.frame_assembler import MediaPacket
 from client.receiver_reports import ReceiverReports
@@ -211,7 +212,12 @@ async def test_raw_packets_come_without_threads_or_receivers_and_can_be_reported
         asyncio.timeout(SECONDS),
         connected(pc, VideoStreamTrack(), before_answer=lambda pc: take_raw_rtp(pc, count, control)),
     ):
+        dtls: Any = transport_of(pc)
+        queue = dtls.transport._connection._queue
+        forged = bytes([0x80, 97]) + bytes(30)
         await enough.wait()
+        queue.put_nowait((forged, 1))
+        assert queue.empty()  # neither kept nor taken
         assert decoder_threads() == []
         header = parse_rtp_header(taken[0])
         assert header is not None
@@ -223,6 +229,7 @@ async def test_raw_packets_come_without_threads_or_receivers_and_can_be_reported
         await send_control(pc, report)
         await heard.wait()
     assert all(parse_rtp_header(data) is not None for data in taken)
+    assert forged not in taken
 
 
 def test_the_stamp_is_read_beside_the_other_extensions() -> None:
