@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ROS2 := .ros2
 RUN_PACKAGES := libegl1 libgl1-mesa-dri
-TEST_PACKAGES := $(RUN_PACKAGES) gcc libc6-dev chromium firefox-esr pulseaudio pulseaudio-utils caddy coturn prometheus docker-compose systemd janus
+TEST_PACKAGES := $(RUN_PACKAGES) gcc libc6-dev chromium firefox-esr pulseaudio pulseaudio-utils caddy coturn prometheus docker-compose systemd janus redis-server
 WEB_SOURCES := $(shell find web -path web/node_modules -prune -o -type f -print 2>/dev/null)
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 ARGS ?=
@@ -63,8 +63,8 @@ generate: $(VENV)/.dev web/node_modules/.installed ## Write the JSON Schemas and
 	cd web && npm run --silent generate
 
 lock: ## Resolve the pinned, hashed dependencies again (needs uv)
-	uv pip compile pyproject.toml --extra build --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements.lock
-	uv pip compile pyproject.toml --extra build --extra dev -c requirements.lock --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements-dev.lock
+	uv pip compile pyproject.toml --extra build --extra redis --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements.lock
+	uv pip compile pyproject.toml --extra build --extra redis --extra dev -c requirements.lock --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements-dev.lock
 	uv pip compile requirements-ros2.in -c requirements-dev.lock --generate-hashes --no-emit-index-url --no-header --universal --python-version 3.11 --upgrade -q -o requirements-ros2.lock
 
 clean: ## Remove what the commands above made
