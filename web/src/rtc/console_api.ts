@@ -38,7 +38,11 @@ const RESTART_LIMIT_MS = 5000;
 
 /** The console's HTTP interface (docs/console-api.md), for the holder of one token. */
 export class ConsoleApi {
-  constructor(private readonly token: string) {}
+  /** `base`: where this robot's routes begin, against the page's own address. */
+  constructor(
+    private readonly token: string,
+    private readonly base = "./",
+  ) {}
 
   /** How many media there are to ask for; none while that is not known. */
   async media(signal: AbortSignal): Promise<MediaOffer> {
@@ -61,10 +65,11 @@ export class ConsoleApi {
   async offer(sdp: string, query: string, signal: AbortSignal): Promise<WhepAnswer> {
     const path = query === "" ? "/whep" : `/whep?${query}`;
     const response = await this.fetch("POST", path, { "Content-Type": "application/sdp" }, sdp, signal);
-    const { headers } = response;
+    const { headers, url } = response;
+    const location = headers.get("Location");
     return {
       sdp: await response.text(),
-      location: headers.get("Location") ?? "",
+      location: location === null ? "" : new URL(location, url).href,
       tag: headers.get("ETag") ?? "",
     };
   }
@@ -128,6 +133,12 @@ export class ConsoleApi {
     return answer;
   }
 
+  /** Of a path that begins with "/", below the base; a whole address stays as it is. */
+  private address(path: string): string {
+    if (!path.startsWith("/")) return path;
+    return new URL(path.slice(1), new URL(this.base, document.baseURI)).href;
+  }
+
   private async fetch(
     method: string,
     path: string,
@@ -138,14 +149,14 @@ export class ConsoleApi {
     const init: RequestInit = {
       method,
       headers: { ...headers, Authorization: `Bearer ${this.token}` },
-      keepalive: method === "DELETE" || path === "/api/stop",
+      keepalive: method === "DELETE" || path.endsWith("/stop"),
       cache: "no-store",
     };
     if (body !== undefined) init.body = body;
     if (signal !== undefined) init.signal = signal;
     let response: Response;
     try {
-      response = await fetch(path, init);
+      response = await fetch(this.address(path), init);
     } catch (error) {
       throw new ConsoleError(0, "console_unreachable", error instanceof Error ? error.message : "", null);
     }
