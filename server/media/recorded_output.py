@@ -28,14 +28,16 @@ class RecordedStream(Protocol):
     def full_plan(self) -> PicturePlan: ...
     @property
     def outputs(self) -> Mapping[tuple[str, Tier], Output]: ...
+    @property
+    def passed(self) -> Output | None: ...
     def output(self, codec: str, tier: Tier) -> Output: ...
 
 
 class RecordedOutput:
     """Call `choose` before each medium, `published` with each frame, `close` at the end.
 
-    The operator's encoding comes first; else that of observers; else one is made. Another one is taken from its next
-    keyframe on.
+    The operator's encoding comes first; then what a camera encoded itself; then that of observers; else one is made.
+    Another one is taken from its next keyframe on. A camera cannot be asked for one: ours is recorded until it comes.
 
     Args:
         codec: in which it is recorded
@@ -60,6 +62,7 @@ class RecordedOutput:
         self._attached = attached
         self._current: Output | None = None
         self._next: Output | None = None  # from its next keyframe on
+        self._meanwhile: Output | None = None  # ours, until the camera's own first keyframe
 
     def choose(self, stream: RecordedStream) -> None:
         wanted = self._best(stream)
@@ -67,37 +70,53 @@ class RecordedOutput:
             return
         self._drop(self._next)
         self._next = None if wanted is self._current else wanted
+        if wanted is self._meanwhile:
+            self._meanwhile = None
         if self._next is not None:
-            if not self._next.needed:
-                self._next.plan = stream.full_plan
-            self._next.recorded = True
-            self._next.keyframes.longest = self._keyframe_seconds
-            self._next.request_keyframe("record")
+            self._begin(self._next, stream)
+            if self._current is None and wanted is stream.passed:
+                self._meanwhile = stream.output(self._codec, self._own_tier)
+                self._begin(self._meanwhile, stream)
+
+    def _begin(self, output: Output, stream: RecordedStream) -> None:
+        if not output.needed:
+            output.plan = stream.full_plan
+        output.recorded = True
+        output.keyframes.longest = self._keyframe_seconds
+        output.request_keyframe("record")
 
     def _best(self, stream: RecordedStream) -> Output:
-        for tier in TIERS:
-            found = stream.outputs.get((self._codec, tier))
-            if found is not None and found.targets:
-                return found
-        return stream.output(self._codec, self._own_tier)
+        taken = [found for tier in TIERS if (found := stream.outputs.get((self._codec, tier))) and found.targets]
+        if taken and taken[0].tier == "operator":
+            return taken[0]
+        return stream.passed or next(iter(taken), None) or stream.output(self._codec, self._own_tier)
 
     def published(self, stream: str, output: Output, frame: EncodedFrame) -> None:
-        if output is self._next and frame.keyframe:
+        if frame.keyframe and output is self._next:
             self._drop(self._current)
-            self._current, self._next = output, None
+            self._drop(self._meanwhile)
+            self._current, self._next, self._meanwhile = output, None, None
+        elif frame.keyframe and output is self._meanwhile:
+            self._current, self._meanwhile = output, None
         if output is self._current:
-            self._take(stream, output.codec, frame, attached=self._attached)
+            self._take(stream, self._codec, frame, attached=self._attached)
 
     def request_keyframe(self) -> None:
         """A new file begins."""
-        if self._current is not None:
+        if self._current is None:
+            return
+        if self._current.codec == self._codec:
             self._current.request_keyframe("record")
+        else:  # a camera's own: what is recorded is chosen afresh, and begins with ours
+            for output in (self._current, self._next):
+                self._drop(output)
+            self._current = self._next = None
 
     def close(self) -> None:
         """Nothing is recorded any more."""
-        for output in (self._current, self._next):
+        for output in (self._current, self._next, self._meanwhile):
             self._drop(output)
-        self._current = self._next = None
+        self._current = self._next = self._meanwhile = None
 
     @staticmethod
     def _drop(output: Output | None) -> None:

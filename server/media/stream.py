@@ -77,6 +77,11 @@ class Stream(ABC, Generic[Job]):
         """By codec and tier, as far as they exist."""
         return self._outputs
 
+    @property
+    def passed(self) -> Output | None:
+        """What goes on as its source encoded it, while it gives something that can; None for most."""
+        return None
+
     def record(self, recorded: RecordedOutput | None) -> None:
         """Hand what `recorded` chooses to it from now on; None: no more."""
         if self._recorded is not None:

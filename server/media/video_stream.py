@@ -140,7 +140,7 @@ class VideoStream(Stream[PictureJob]):
         if media.width > 0 and media.height > 0:
             self.size = media.width, media.height
         output = self._passing.output
-        if not output.targets:
+        if not output.needed:
             return
         frame = EncodedFrame(
             media.payload,
@@ -150,6 +150,7 @@ class VideoStream(Stream[PictureJob]):
             stamp=media.stamp,
             capture_time=output.monotone(capture_time),
             media_time=self._clock.timestamp(media.time),
+            time=media.time,
         )
         if not frame.payloads(trailer=False):
             self._drop(PayloadError.name)
@@ -181,7 +182,11 @@ class VideoStream(Stream[PictureJob]):
         """Whether `target` must not get a camera's own H.264, because its path has no room."""
         self._passing.hold_back(target, wanted)
 
-    def passed(self, target: PeerStream) -> tuple[float, float] | None:
+    @property
+    def passed(self) -> Output | None:
+        return None if self._passing.profile is None else self._passing.output
+
+    def measured(self, target: PeerStream) -> tuple[float, float] | None:
         """Pictures and bits a second of the camera's own H.264, if `target` gets that."""
         return self._passing.measured if self._passing.holds(target) else None
 

@@ -176,7 +176,7 @@ class QualityDesk:
             plan = self._plan_of(camera.stream, peer.encoded_as)
             width, height = plan.size(*camera.stream.size)
             rate, bps = plan.frame_rate, float(plan.bitrate_bps)
-            if (passed := camera.stream.passed(camera.target)) is not None:  # as the camera made it
+            if (passed := camera.stream.measured(camera.target)) is not None:  # as the camera made it
                 (width, height), (rate, bps) = camera.stream.size, passed
             streams.append(
                 StreamQuality(

@@ -1,0 +1,154 @@
+"""Which of a stream's encodings is recorded: the operator's, a camera's own, the observers', else one made for it."""
+
+import asyncio
+
+import av
+import pytest
+
+from robot_bridge.protocol.messages import Media
+from server.media.frame import EncodedFrame
+from server.media.h264 import inspect
+from server.media.packetise import split_nal_units
+from server.media.plane import MediaPlane
+from tests.server.media.camera_h264 import camera_pictures
+from tests.server.media.feeding import timestamps, value
+from tests.server.media.viewer import TIMEOUT, description, picture, running_plane, viewing
+
+
+class Taken:
+    """What a recorder got."""
+
+    def __init__(self) -> None:
+        self.frames: list[EncodedFrame] = []
+        self._news = asyncio.Event()
+
+    def __call__(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
+        assert (stream, codec, attached) == ("camera0", "H264", False)
+        self.frames.append(frame)
+        self._news.set()
+
+    @property
+    def stamps(self) -> list[int]:
+        return [frame.stamp for frame in self.frames]
+
+    async def feed(self, plane: MediaPlane, pictures: list[Media]) -> None:
+        """One by one, each when the one before was recorded."""
+        for medium in pictures:
+            self._news.clear()
+            plane.feed(medium, medium.time)
+            async with asyncio.timeout(TIMEOUT):
+                await self._news.wait()
+
+
+def encoded(plane: MediaPlane, codec: str) -> float:
+    return value(plane, "frames_encoded_total", stream="camera0", codec=codec)
+
+
+def plain(first: int, last: int) -> list[Media]:
+    return [picture(stamp, stamp / 30) for stamp in range(first, last + 1)]
+
+
+def slices(picture: bytes) -> list[bytes]:
+    """Without what a packetiser leaves out: supplemental information and delimiters."""
+    return [nal.rstrip(b"\0") for nal in split_nal_units(picture) if nal[0] & 0x1F not in (6, 9)]
+
+
+def decoded(frames: list[EncodedFrame]) -> int:
+    decoder = av.CodecContext.create("h264", "r")
+    found = [*(one for frame in frames for one in decoder.decode(av.Packet(frame.data))), *decoder.decode(None)]
+    return len(found)
+
+
+async def test_what_the_operator_gets_in_h264_is_recorded_and_encoded_once() -> None:
+    taken = Taken()
+    async with (
+        running_plane(description(microphones=0)) as plane,
+        viewing(plane, ["video"], priority=True) as operator,
+    ):
+        plane.record(taken)
+        await taken.feed(plane, plain(1, 6))
+        await operator.until(lambda: timestamps(operator, "video") == 6)
+        assert taken.stamps == [1, 2, 3, 4, 5, 6]
+        assert encoded(plane, "H264") == 6
+        assert [slices(frame) for frame in operator.frames("video")] == [slices(frame.data) for frame in taken.frames]
+
+
+async def test_where_all_take_vp8_the_pictures_are_encoded_once_more_in_h264() -> None:
+    taken = Taken()
+    async with (
+        running_plane(description(microphones=0)) as plane,
+        viewing(plane, ["video"], codecs=["VP8"], priority=True) as operator,
+    ):
+        plane.record(taken)
+        await taken.feed(plane, plain(1, 4))
+        await operator.until(lambda: timestamps(operator, "video") == 4)
+        assert taken.stamps == [1, 2, 3, 4]
+        assert (encoded(plane, "H264"), encoded(plane, "VP8")) == (4, 4)
+
+
+@pytest.mark.parametrize("codecs", [["H264"], ["VP8"]])
+async def test_a_cameras_own_h264_is_recorded_as_it_came(codecs: list[str]) -> None:
+    """Also when the operator takes another codec: nothing is encoded for the recording."""
+    taken, pictures = Taken(), camera_pictures(8)
+    async with (
+        running_plane(description(microphones=0)) as plane,
+        viewing(plane, ["video"], codecs=codecs, priority=True),
+    ):
+        plane.feed(pictures[0], 0.0)
+        plane.record(taken)
+        await taken.feed(plane, camera_pictures(8, first=2))
+        assert taken.stamps == list(range(2, 10))
+        assert [frame.data for frame in taken.frames] == [medium.payload for medium in pictures]
+        assert [frame.time for frame in taken.frames] == [stamp / 30 for stamp in range(2, 10)]
+
+
+async def test_with_nobody_there_a_cameras_own_h264_costs_no_encoder() -> None:
+    taken = Taken()
+    async with running_plane(description(microphones=0)) as plane:
+        plane.record(taken)
+        await taken.feed(plane, camera_pictures(1))  # what it gives was not known before
+        await taken.feed(plane, camera_pictures(6, first=2))
+        before = encoded(plane, "H264")
+        await taken.feed(plane, camera_pictures(6, first=8))
+        assert encoded(plane, "H264") == before <= 1
+        assert taken.stamps == list(range(1, 14))
+
+
+async def test_until_a_cameras_next_keyframe_ours_is_recorded() -> None:
+    taken, pictures = Taken(), camera_pictures(9, gop=6)
+    async with running_plane(description(microphones=0)) as plane:
+        for medium in pictures[:3]:
+            plane.feed(medium, medium.time)
+        plane.record(taken)
+        await taken.feed(plane, pictures[3:])
+        assert taken.stamps == [4, 5, 6, 7, 8, 9]
+        assert [inspect(frame.data).keyframe for frame in taken.frames] == [True, False, False, True, False, False]
+        assert [frame.data for frame in taken.frames[3:]] == [medium.payload for medium in pictures[6:]]
+        assert decoded(taken.frames) == 6
+
+
+async def test_a_new_file_begins_with_a_keyframe_though_the_cameras_own_is_far() -> None:
+    taken, pictures = Taken(), camera_pictures(8, gop=6)
+    async with running_plane(description(microphones=0)) as plane:
+        plane.feed(pictures[0], 0.0)
+        plane.record(taken)
+        await taken.feed(plane, camera_pictures(2, first=2, gop=6))
+        plane.record_keyframes()
+        del taken.frames[:]
+        await taken.feed(plane, camera_pictures(8, first=2, gop=6)[2:])
+        assert taken.frames[0].keyframe
+        assert taken.stamps == [4, 5, 6, 7, 8, 9]
+        assert decoded(taken.frames) == 6
+
+
+async def test_a_camera_that_gives_other_pictures_is_recorded_on() -> None:
+    taken = Taken()
+    async with running_plane(description(microphones=0)) as plane:
+        plane.record(taken)
+        await taken.feed(plane, camera_pictures(3))
+        await taken.feed(plane, plain(4, 7))
+        assert taken.stamps == [1, 2, 3, 4, 5, 6, 7]
+        assert decoded(taken.frames) == 7
+        plane.record(None)
+        plane.feed(picture(8, 8 / 30), 8 / 30)
+        assert len(taken.frames) == 7
