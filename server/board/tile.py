@@ -1,0 +1,67 @@
+"""What one robot of a fleet looks like from outside. Consoles tell each other, and `GET /api/fleet` tells the overview."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+from urllib.parse import urlsplit
+
+from pydantic import AfterValidator, Field
+
+from robot_bridge.protocol.console import Role
+
+__all__ = ["MAX_PEOPLE", "ROBOT_NAME", "Person", "Tile"]
+
+ROBOT_NAME = r"^[a-z0-9][a-z0-9-]{0,31}\Z"
+MAX_PEOPLE = 20  # that a tile names; the others are counted
+
+Name = Annotated[str, Field(max_length=60)]
+Words = Annotated[str, Field(max_length=500)]
+Count = Annotated[int, Field(ge=0, le=1_000_000)]
+Number = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Event = Annotated[int, Field(ge=0, lt=2**31)]
+
+
+def _check_url(url: str) -> str:
+    """Only what a page may offer as a link: never a script, never somebody's password."""
+    parts = urlsplit(url)
+    if parts.scheme not in ("http", "https") or not parts.hostname or "@" in parts.netloc:
+        raise ValueError("not http(s)://host/…")
+    return url
+
+
+@dataclass(frozen=True, kw_only=True)
+class Person:
+    name: Name
+    role: Role
+    driving: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tile:
+    """The same for every reader. What is read from other consoles is checked against these bounds."""
+
+    name: Annotated[str, Field(pattern=ROBOT_NAME)]  # "left"
+    label: Name  # of the robot's description; "" before it was reached
+    url: Annotated[str, Field(max_length=300), AfterValidator(_check_url)]  # own robots': "robots/left/"
+    link: Literal["up", "down", "unknown"]  # unknown: its console is not heard; only of other consoles' robots
+    detail: Words = ""  # why it is down
+    link_age_ms: Number | None = None  # how long the link has been so; None: it was never up
+    epoch: Annotated[str, Field(max_length=64)] = ""
+    event: Event = 0  # 0 before the first feedback
+    event_rate: Number = 0.0  # events a second, over the last few seconds
+    stopped: bool = False
+    stop_by: Words = ""
+    stop_reason: Words = ""
+    at_rest: bool = True
+    driver: Name = ""  # who holds the seat; "": nobody
+    claims: Annotated[tuple[Name, ...], Field(max_length=MAX_PEOPLE)] = ()  # who asks for the seat
+    participants: Annotated[tuple[Person, ...], Field(max_length=MAX_PEOPLE)] = ()  # who drives first
+    participant_count: Count = 0
+    watching: Count = 0  # thumbnails
+    feedback_age_ms: Number | None = None  # None: never had one
+    gap: Annotated[int, Field(ge=-(2**31), lt=2**31)] | None = None  # as the driver's page saw it last
+    tolerance: Count | None = None
+    recording: bool = False
+    faults: Annotated[tuple[Words, ...], Field(max_length=20)] = ()
+    trouble: Words = ""
+    has_picture: bool = False
+    console: Name = ""  # name of the console that has it; "": this one
