@@ -22,7 +22,7 @@ from robot_bridge.protocol.messages import Media
 from server.media.plane import MediaPlane, MediaSettings
 from server.relay.janus_room import JanusRoom, RoomKeys
 from server.relay.janus_session import open_janus
-from server.relay.publication import publish
+from server.relay.janus_publishing import publish
 
 __all__ = ["main"]
 

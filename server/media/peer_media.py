@@ -1,16 +1,24 @@
 """What one peer gets, and how it does."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from robot_bridge.protocol.console import Quality, Report, StreamInfo, Tier
-from server.media.aiortc_private import MediaSender
 from server.media.packet_stream import SenderStats
 from server.media.peer_stream import PeerStream
 from server.media.quality.peer_quality import PeerQuality
 from server.media.stream import Stream
 
-__all__ = ["Delivery", "PeerMedia"]
+__all__ = ["Delivery", "DeliverySender", "PeerMedia"]
+
+
+class DeliverySender(Protocol):
+    """What it needs of what sends a stream."""
+
+    @property
+    def stats(self) -> SenderStats: ...
+    def report(self) -> None: ...
+    async def stop(self) -> None: ...
 
 
 class Delivery(NamedTuple):
@@ -19,7 +27,7 @@ class Delivery(NamedTuple):
     info: StreamInfo
     stream: Stream  # type: ignore[type-arg]  # the job type does not matter here
     target: PeerStream
-    sender: MediaSender
+    sender: DeliverySender
 
 
 class PeerMedia:
@@ -76,6 +84,12 @@ class PeerMedia:
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
         """Call `tell` when something else was decided for this peer's pictures."""
         self.quality.on_quality = tell
+
+    def request_keyframe(self, mid: str) -> None:
+        """Somebody behind this peer cannot decode."""
+        for delivery in self._deliveries:
+            if delivery.info.mid == mid:
+                delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
 
     def send_reports(self) -> None:
         """Send a sender report for each stream."""

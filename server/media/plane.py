@@ -25,12 +25,14 @@ from server.media.audio_stream import AudioStream
 from server.media.capture_clock import CaptureClock
 from server.media.codec_choice_private import keep_codec, negotiated_h264
 from server.media.fanout import FanOut
+from server.media.h264 import profile_of_fmtp
+from server.media.handover import FrameSink, HandedOverStream, HandoverSender
 from server.media.header_extensions import choose_carrier, wanted_uris
 from server.media.metrics import MediaMetrics
 from server.media.outbox import Outbox
 from server.media.peer_media import Delivery, PeerMedia
 from server.media.peer_stream import PeerStream
-from server.media.publishing_private import offer_section
+from server.media.publishing_private import H264_PROFILE, offer_section
 from server.media.quality.desk import QualityDesk
 from server.media.quality.metrics import QualityMetrics
 from server.media.quality.path import RateLimits
@@ -176,23 +178,27 @@ class MediaPlane:
         *,
         priority: bool,
         trailer: bool,
+        thumbnail: bool = False,
         voice: Callable[[VoicePacket], None] | None = None,
     ) -> PeerMedia:
         """Give a peer its streams. Call after setRemoteDescription(offer), before createAnswer.
 
         The i-th video section gets the i-th camera, the i-th audio section the i-th microphone; sections without
         one, or without a codec in common, are answered inactive. `priority` is for the operator: served first and at
-        once. `trailer` asks for the trailer carrier; otherwise the offer's header extensions decide. `voice` takes
-        the peer's own sound, from the first audio section in which it would only send.
+        once. `trailer` asks for the trailer carrier; otherwise the offer's header extensions decide. `thumbnail`: the
+        first camera alone, in the lowest tier. `voice` takes the peer's own sound, from the first audio section in
+        which it would only send.
         """
         guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc())
         extensions = offered_extensions(offer_sdp)
         sources: dict[str, Iterator[AnyStream]] = {
-            kind: iter([stream for stream in self._streams.values() if stream.kind == kind])
-            for kind in ("video", "audio")
+            kind: iter([stream for stream in self._streams.values() if stream.kind == kind][: 1 if thumbnail else None])
+            for kind in (("video",) if thumbnail else ("video", "audio"))
         }
         deliveries: list[Delivery] = []
         peer = PeerMedia(deliveries, self._peer_quality(pc, priority), self._detached)
+        if thumbnail and self._settings.quality:
+            peer.quality.stay_low()
         for transceiver in pc.getTransceivers():
             if offered_direction(transceiver) == "recvonly":  # it would send
                 transceiver.direction = "inactive"
@@ -200,7 +206,7 @@ class MediaPlane:
                 if wanted and voice is not None and take_voice(transceiver, voice):
                     peer.voice = transceiver.mid or ""
                 continue
-            stream = next(sources[transceiver.kind], None)
+            stream = next(sources.get(transceiver.kind, iter(())), None)
             codec = None
             if stream is not None and offered_direction(transceiver) in ("sendonly", "sendrecv"):
                 codec = keep_codec(transceiver, stream.codecs, h264_first=self._gives_h264(stream))
@@ -232,6 +238,25 @@ class MediaPlane:
             deliveries.append(self._deliver(peer, transceiver, stream, codec, "trailer", priority=False))
         return self._joined(peer, deliveries)
 
+    def hand_over(self, sink_of: Callable[[HandedOverStream], FrameSink], camera_codec: str = "") -> PeerMedia:
+        """Give every stream, each in one codec, to what sends it by its own means; `camera_codec` as for `publish`."""
+        deliveries: list[Delivery] = []
+        cameras = sum(isinstance(stream, VideoStream) for stream in self._streams.values())
+        peer = PeerMedia(deliveries, self._quality_of(cameras, priority=False), self._detached)
+        for index, stream in enumerate(self._streams.values()):
+            video = isinstance(stream, VideoStream)
+            codec = stream.codec_in_use(camera_codec if video else "")
+            size, rate = (stream.size, stream.frame_rate) if isinstance(stream, VideoStream) else ((0, 0), 0.0)
+            bitrate = self._settings.video_bitrate_bps if video else 0
+            sink = sink_of(HandedOverStream(stream.name, stream.kind, codec, size, rate, bitrate))
+            target = self._target(stream, codec, "trailer", priority=False)
+            target.h264 = profile_of_fmtp(H264_PROFILE) if codec == "H264" else None
+            sender = HandoverSender(sink)
+            deliveries.append(Delivery(_info(stream, str(index), codec, "trailer"), stream, target, sender))
+            target.sender = sender
+            stream.join(codec, target, peer.quality.encoded_as if video else "operator")
+        return self._joined(peer, deliveries)
+
     def _joined(self, peer: PeerMedia, deliveries: list[Delivery]) -> PeerMedia:
         self._peers[peer] = None
         peer.quality.cameras = [
@@ -255,11 +280,14 @@ class MediaPlane:
         return spec is not None and spec.passing and spec.size is None
 
     def _peer_quality(self, pc: RTCPeerConnection, priority: bool) -> PeerQuality:
-        settings = self._settings
         cameras = min(
             sum(transceiver.kind == "video" for transceiver in pc.getTransceivers()),
             sum(isinstance(stream, VideoStream) for stream in self._streams.values()),
         )
+        return self._quality_of(cameras, priority)
+
+    def _quality_of(self, cameras: int, priority: bool) -> PeerQuality:
+        settings = self._settings
         maximum = float(max(1, cameras) * settings.video_bitrate_bps)
         start = min(maximum, settings.quality_start_bps) if priority else maximum
         limits = RateLimits(min(settings.quality_min_bps, start), start, maximum)
@@ -281,15 +309,7 @@ class MediaPlane:
     ) -> Delivery:
         video = stream.kind == "video"
         quality = peer.quality
-        target = PeerStream(
-            Outbox(self._settings.video_queue_frames if video else self._settings.audio_queue_frames, video=video),
-            priority=priority,
-            stream=stream.name,
-            carrier=carrier,
-            metrics=self._metrics,
-            on_dropped=lambda: stream.request_keyframe(codec, target, "drop"),
-        )
-
+        target = self._target(stream, codec, carrier, priority)
         target.h264 = negotiated_h264(transceiver)
 
         def ready() -> None:
@@ -310,15 +330,19 @@ class MediaPlane:
             on_paced=lambda: self._fan_out.pace(target),
         )
         install_sender(transceiver, sender)
-        info = StreamInfo(
-            mid=transceiver.mid or "",
+        return Delivery(_info(stream, transceiver.mid or "", codec, carrier), stream, target, sender)
+
+    def _target(self, stream: AnyStream, codec: str, carrier: Carrier, priority: bool) -> PeerStream:
+        video = stream.kind == "video"
+        target = PeerStream(
+            Outbox(self._settings.video_queue_frames if video else self._settings.audio_queue_frames, video=video),
+            priority=priority,
             stream=stream.name,
-            label=stream.label,
-            kind=stream.kind,
-            codec=codec,
             carrier=carrier,
+            metrics=self._metrics,
+            on_dropped=lambda: stream.request_keyframe(codec, target, "drop"),
         )
-        return Delivery(info, stream, target, sender)
+        return target
 
     async def _report(self) -> None:
         """Sender reports of all peers, spread over the interval and varied (RFC 3550 6.2)."""
@@ -347,6 +371,10 @@ class MediaPlane:
         for task in self._service_tasks:
             task.cancel()
         await asyncio.gather(*self._ending, *self._service_tasks, return_exceptions=True)
+
+
+def _info(stream: AnyStream, mid: str, codec: str, carrier: Carrier) -> StreamInfo:
+    return StreamInfo(mid=mid, stream=stream.name, label=stream.label, kind=stream.kind, codec=codec, carrier=carrier)
 
 
 def _msid(name: str) -> str:

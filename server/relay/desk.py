@@ -1,12 +1,10 @@
 """Brings the session into the relays while somebody watches there, and tells observers where to watch."""
 
 import asyncio
-import hashlib
-import hmac
 import secrets
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractAsyncContextManager
 from typing import Protocol
 
 import structlog
@@ -18,12 +16,11 @@ from server.backoff import Backoff
 from server.media.errors import MediaError
 from server.relay.errors import RelayError
 from server.relay.handout import Handout
-from server.relay.janus_room import JanusRoom, RoomKeys
-from server.relay.janus_session import JanusSession, open_janus
-from server.relay.publication import Publication, PublishedMedia, publish
+from server.relay.publication import Engine, Publication, Watched
 from server.relay.relay_settings import RelaySettings
+from server.relay.relay_url import EngineName
 from server.relay.station import Station
-from server.relay.tickets import RelayTicket
+from server.relay.tickets import JanusTicket, LiveKitTicket
 
 __all__ = ["RelayDesk", "RelayedMedia", "RelayedPeer"]
 
@@ -57,23 +54,18 @@ class RelayDesk:
     def __init__(
         self,
         settings: RelaySettings,
-        media: PublishedMedia,
+        engines: Mapping[EngineName, Engine],
         peers: Callable[[], Iterable[RelayedPeer]],
-        key: str,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.stations = [
             Station(str(number), url, settings.relay_public[number] if settings.relay_public else url.address)
             for number, url in enumerate(settings.relay_urls)
         ]
-        self._codec = settings.relay_codec
-        self._admin_key = settings.relay_admin_key.get_secret_value()
-        self._media = media
+        self._engines = engines
         self._peers = peers
-        self._key = key.encode()
         self._clock = clock
         self._handout = Handout(settings.observers_direct)
-        self._pin = ""  # of the present publication; another one with each
         self._publication: Publication | None = None
         self._wanted = asyncio.Event()
         self._asked_at = float("-inf")  # when somebody last asked for a relay
@@ -87,7 +79,7 @@ class RelayDesk:
         self._restart(NEW_EPOCH)
 
     def _restart(self, why: str) -> None:
-        """Publish anew: another feed and another pin, so that who may not watch any more does not."""
+        """Publish anew: another feed with other keys, so that who may not watch any more does not."""
         if self._publication is not None:
             self._publication.end(why)
 
@@ -98,7 +90,7 @@ class RelayDesk:
 
     # What observers ask
 
-    async def ticket(self, peer: RelayedPeer | None, lost: str) -> RelayTicket | None:
+    async def ticket(self, peer: RelayedPeer | None, lost: str) -> JanusTicket | LiveKitTicket | None:
         """Where one more observer watches; None: directly.
 
         Args:
@@ -118,7 +110,8 @@ class RelayDesk:
             if each.relay in watching and each is not peer:
                 watching[each.relay] += 1
         choice = self._handout.choose(now, direct, watching)
-        return next((self._ticket(station) for station in usable if station.name == choice), None)
+        station = next((each for each in usable if each.name == choice), None)
+        return None if station is None else self._engine(station).ticket(station)
 
     def arrived(self, relay: str) -> bool:
         """A peer that watches there is connected to the console; False: there is no such relay."""
@@ -138,16 +131,8 @@ class RelayDesk:
             except TimeoutError:
                 continue
 
-    def _ticket(self, station: Station) -> RelayTicket:
-        return RelayTicket(
-            engine="janus",
-            relay=station.name,
-            url=station.public,
-            room=station.room,
-            pin=self._pin,
-            feed=station.feed,
-            streams=list(station.streams),
-        )
+    def _engine(self, station: Station) -> Engine:
+        return self._engines[station.url.engine]
 
     # Its own life
 
@@ -184,16 +169,11 @@ class RelayDesk:
 
     async def _carry(self, origin: Station) -> None:
         """From here into one relay, and from there into the others; returns when it ended or nobody watches."""
-        self._pin = secrets.token_urlsafe(12)
-        feed = secrets.randbits(52) | 1
-        async with (
-            open_janus(origin.url.address) as session,
-            publish(session, self._room_of(origin), self._media, feed, self._codec) as publication,
-        ):
+        async with self._engine(origin).publish(origin, secrets.randbits(52) | 1) as publication:
             self._publication = publication
             self._live(origin, publication)
             try:
-                await self._while_wanted(session, publication, origin)
+                await self._while_wanted(publication, origin)
             finally:
                 self._publication = None
                 for station in self.stations:
@@ -203,14 +183,14 @@ class RelayDesk:
         else:
             self._lost(origin, publication.why)
 
-    async def _while_wanted(self, session: JanusSession, publication: Publication, origin: Station) -> None:
+    async def _while_wanted(self, publication: Publication, origin: Station) -> None:
         loop = asyncio.get_running_loop()
         tasks = [
             loop.create_task(self._extend(origin, station, publication), name=f"relay {station.name}")
             for station in self.stations
-            if station is not origin
+            if station is not origin and station.url.engine == origin.url.engine
         ]
-        tasks += [loop.create_task(self._watch(session, publication)), loop.create_task(self._beat(publication))]
+        tasks += [loop.create_task(self._watch(publication)), loop.create_task(self._beat(publication))]
         try:
             await publication.ended.wait()
         finally:
@@ -218,17 +198,11 @@ class RelayDesk:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _watch(self, session: JanusSession, publication: Publication) -> None:
-        """Ends it with its session, when nobody watches any more, or when a link was revoked."""
+    async def _watch(self, publication: Publication) -> None:
+        """Ends it when nobody watches any more, or when a link was revoked."""
         quiet_since = self._clock()
         while True:
-            try:
-                async with asyncio.timeout(1.0):
-                    await session.ended.wait()
-                publication.end(session.why)
-                return
-            except TimeoutError:
-                pass
+            await asyncio.sleep(1.0)
             if self._shut_out():
                 publication.end(REVOKED)
             if self._in_demand():
@@ -250,15 +224,12 @@ class RelayDesk:
             publication.send_feedback(HEARTBEAT)
 
     async def _extend(self, origin: Station, station: Station, publication: Publication) -> None:
-        """Keep one more relay fed from the first, until cancelled."""
+        """Keep one more relay fed from the first, until cancelled. Relays that are not fed that way stand by."""
         backoff = Backoff(BACKOFF, BACKOFF_CAP)
-        while True:
+        while (feeding := self._engine(origin).pass_on(origin, station, publication)) is not None:
             began = self._clock()
             try:
-                async with self._fed(origin, station, publication) as session:
-                    self._live(station, publication)
-                    await session.ended.wait()
-                    self._lost(station, session.why)
+                await self._feed(feeding, station, publication)
             except RelayError as error:
                 self._lost(station, str(error))
             finally:
@@ -267,36 +238,17 @@ class RelayDesk:
                 backoff.healthy()
             await asyncio.sleep(backoff.next())
 
-    @asynccontextmanager
-    async def _fed(self, origin: Station, station: Station, publication: Publication) -> AsyncIterator[JanusSession]:
-        """`station` gets the feed from `origin` while entered."""
-        name = f"{station.name}-{secrets.token_hex(4)}"
-        async with open_janus(station.url.address) as session, open_janus(origin.url.address) as there:
-            handle, sender = await session.attach(_ignore), await there.attach(_ignore)
-            room, first = self._room_of(station)(session), self._room_of(origin)(there)
-            await room.prepare(handle)
-            inlet = await room.receive_from(handle, publication.feed, publication.streams)
-            await first.send_to(sender, publication.feed, name, station.url.host, inlet)
-            try:
-                yield session
-            finally:
-                if not there.ended.is_set():
-                    await _quietly(first.stop_sending(sender, publication.feed, name))
-                if not session.ended.is_set():
-                    await _quietly(room.forget(handle, publication.feed))
-
-    def _room_of(self, station: Station) -> Callable[[JanusSession], JanusRoom]:
-        """Its keys are made from the console's own, so that a console that was restarted can go on with its room."""
-        place = f"{station.url.address}/{station.room}"
-        keys = RoomKeys(self._admin_key, self._derived("secret", place), self._derived("publisher", place), self._pin)
-        return lambda session: JanusRoom(session, station.room, keys)
-
-    def _derived(self, purpose: str, place: str) -> str:
-        return hmac.new(self._key, f"relay {purpose} {place}".encode(), hashlib.sha256).hexdigest()[:32]
+    async def _feed(
+        self, feeding: AbstractAsyncContextManager[Watched], station: Station, publication: Publication
+    ) -> None:
+        async with feeding as link:
+            self._live(station, publication)
+            await link.ended.wait()
+            self._lost(station, link.why)
 
     def _live(self, station: Station, publication: Publication) -> None:
         station.feed, station.streams, station.trouble = publication.feed, tuple(publication.streams), ""
-        log.info("relay carries the session", relay=station.url.address, room=station.room)
+        log.info("relay carries the session", relay=station.url.address, room=station.url.room)
         self._tell()
 
     def _lost(self, station: Station, trouble: str) -> None:
@@ -336,12 +288,3 @@ class RelayedMedia:
 
     def feed(self, media: Media, now: float) -> None:
         self._media.feed(media, now)
-
-
-def _ignore(_: object) -> None:
-    """Handles for administration hear nothing that matters."""
-
-
-async def _quietly(request: Awaitable[None]) -> None:
-    with suppress(RelayError):
-        await request

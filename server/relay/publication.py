@@ -1,48 +1,39 @@
-"""The session as one publisher in a Janus: encoded media with trailers, and feedback on a data channel."""
+"""The session in one relay, and what an engine has to be able to do: Janus and LiveKit are two of them."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
 from typing import Protocol
 
-from aiortc import RTCBundlePolicy, RTCConfiguration, RTCPeerConnection, RTCSessionDescription
-
 from robot_bridge.protocol.console import StreamInfo
-from robot_bridge.protocol.janus import Heard, complete_description
-from server.channel_writer import ChannelWriter
-from server.data_transport_private import tune_data_transport
-from server.media.peer_media import PeerMedia
-from server.media.publishing_private import ask_for_no_delay, keep_answered_extensions
-from server.relay.errors import RelayRefused, RelaySilent
-from server.relay.janus_room import JanusRoom
-from server.relay.janus_session import JanusSession
+from server.relay.station import Station
+from server.relay.tickets import JanusTicket, LiveKitTicket
 
-__all__ = ["Publication", "PublishedMedia", "publish"]
-
-CONNECT_SECONDS = 5.0
-CLOSE_SECONDS = 2.0
-FEEDBACK = "feedback"  # label of the data channel
+__all__ = ["Engine", "Publication", "Watched"]
 
 
-class PublishedMedia(Protocol):
-    """What it needs of the media plane."""
+class Watched(Protocol):
+    """Something that ends by itself one day."""
 
-    def publish(self, pc: RTCPeerConnection, camera_codec: str = "") -> PeerMedia: ...
+    @property
+    def ended(self) -> asyncio.Event: ...
+    @property
+    def why(self) -> str: ...
 
 
 class Publication:
-    """One feed in one room."""
+    """What a relay carries. It ends once."""
 
-    def __init__(self, feed: int, streams: list[StreamInfo], writer: ChannelWriter) -> None:
+    def __init__(self, feed: int, streams: list[StreamInfo], send: Callable[[str], None]) -> None:
+        """`send` takes feedback; the newest wins."""
         self.feed = feed
         self.streams = streams
         self.ended = asyncio.Event()
         self.why = ""
-        self._writer = writer
+        self._send = send
 
     def send_feedback(self, text: str) -> None:
-        """The newest wins."""
-        self._writer.send_newest(text)
+        self._send(text)
 
     def end(self, why: str) -> None:
         """The first reason counts."""
@@ -51,83 +42,16 @@ class Publication:
             self.ended.set()
 
 
-@asynccontextmanager
-async def publish(
-    session: JanusSession,
-    room_of: Callable[[JanusSession], JanusRoom],
-    media: PublishedMedia,
-    feed: int,
-    codec: str = "",
-) -> AsyncIterator[Publication]:
-    """Published while entered; the yielded object says when it ended by itself. Raises RelayError on entering."""
-    room = room_of(session)
-    found: list[Publication] = []
+class Engine(Protocol):
+    """One kind of relay. What it raises is RelayError, MediaError or OSError."""
 
-    def heard(event: Heard) -> None:
-        if event.kind == "ended" and found:
-            found[0].end(event.detail)
+    def publish(self, station: Station, feed: int) -> AbstractAsyncContextManager[Publication]:
+        """The session is in that relay while entered. Nobody who was told of an earlier feed gets in with that."""
 
-    handle = await session.attach(heard)
-    await room.prepare(handle)
-    # One transport from the start: Janus bundles everything.
-    pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
-    given: PeerMedia | None = None
-    try:
-        given = media.publish(pc, codec)
-        writer = ChannelWriter(pc.createDataChannel(FEEDBACK, ordered=False, maxRetransmits=0))
-        tune_data_transport(pc)
-        offer = await pc.createOffer()
-        await pc.setLocalDescription(RTCSessionDescription(ask_for_no_delay(offer.sdp), "offer"))
-        mids = [transceiver.mid or "" for transceiver in pc.getTransceivers()]
-        streams = [_with_mid(stream, mid) for stream, mid in zip(given.streams, mids, strict=True)]
-        names = {stream.mid: stream.stream for stream in streams}
-        answer = complete_description(await room.publish(handle, feed, pc.localDescription.sdp, names))
-        publication = Publication(feed, streams, writer)
-        found.append(publication)
-        await _connect(pc, answer, publication)
-        yield publication
-    finally:
-        try:
-            async with asyncio.timeout(CLOSE_SECONDS):
-                if given is not None:
-                    await given.close()
-                await pc.close()
-        except TimeoutError:
-            pass  # what is left ends with the process
+    def pass_on(
+        self, origin: Station, station: Station, publication: Publication
+    ) -> AbstractAsyncContextManager[Watched] | None:
+        """While entered, the first relay feeds another one. None: relays of this kind are not fed that way."""
 
-
-async def _connect(pc: RTCPeerConnection, answer: str, publication: Publication) -> None:
-    connected = asyncio.Event()
-
-    def changed() -> None:
-        if pc.connectionState in ("failed", "closed"):
-            publication.end(f"connection {pc.connectionState}")
-            connected.set()
-        elif pc.connectionState == "connected":
-            connected.set()
-
-    pc.on("connectionstatechange", changed)
-    try:
-        await pc.setRemoteDescription(RTCSessionDescription(answer, "answer"))
-    except Exception as error:
-        # aiortc has no error of its own for an answer that it cannot use.
-        raise RelayRefused("its answer cannot be used") from error
-    keep_answered_extensions(pc, answer)
-    try:
-        async with asyncio.timeout(CONNECT_SECONDS):
-            await connected.wait()
-    except TimeoutError as error:
-        raise RelaySilent("no path for media") from error
-    if publication.ended.is_set():
-        raise RelaySilent(publication.why)
-
-
-def _with_mid(stream: StreamInfo, mid: str) -> StreamInfo:
-    return StreamInfo(
-        mid=mid,
-        stream=stream.stream,
-        label=stream.label,
-        kind=stream.kind,
-        codec=stream.codec,
-        carrier=stream.carrier,
-    )
+    def ticket(self, station: Station) -> JanusTicket | LiveKitTicket:
+        """For one observer, of a station that carries the session."""

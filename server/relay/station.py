@@ -23,7 +23,3 @@ class Station:
     @property
     def live(self) -> bool:
         return self.feed != 0
-
-    @property
-    def room(self) -> int:
-        return self.url.room

@@ -1,27 +1,36 @@
 """What an observer is told who watches through a relay: where, and what is there."""
 
-from typing import Literal
-
 import msgspec
 
 from robot_bridge.protocol.console import StreamInfo
 
-__all__ = ["RelayAnswer", "RelayTicket"]
+__all__ = ["JanusTicket", "LiveKitTicket", "RelayAnswer", "RelayTicket"]
 
 
-class RelayTicket(msgspec.Struct, frozen=True, kw_only=True):
+class RelayTicket(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine"):
     """All that it takes to watch, and nothing that would let anybody publish or change the room."""
 
-    engine: Literal["janus"]
     relay: str  # its number here; for POST /whep?relay=
     url: str  # WebSocket
+    feed: int  # what to watch; another one with every publication
+    streams: list[StreamInfo]  # `mid` is the publisher's
+
+
+class JanusTicket(RelayTicket, frozen=True, kw_only=True, tag="janus"):
+    """`feed` is the publisher to subscribe to."""
+
     room: int
     pin: str
-    feed: int  # who to subscribe to; another one with every publication
-    streams: list[StreamInfo]  # `mid` is the publisher's
+
+
+class LiveKitTicket(RelayTicket, frozen=True, kw_only=True, tag="livekit"):
+    """Every track has the name of its stream."""
+
+    token: str  # lets in for a minute, and to nothing but watching
+    publisher: str  # whose tracks and messages count; nobody else's
 
 
 class RelayAnswer(msgspec.Struct, frozen=True):
     """Answer of GET /api/relay."""
 
-    relay: RelayTicket | None  # None: connect to the console for media too
+    relay: JanusTicket | LiveKitTicket | None  # None: connect to the console for media too

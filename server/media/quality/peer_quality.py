@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from robot_bridge.protocol.console import Quality, Report, StreamQuality, Tier
 from robot_bridge.protocol.serial import event_gap
@@ -22,13 +22,20 @@ __all__ = ["CameraLink", "PeerQuality"]
 WIRE_SHARE = 0.92  # of what a receiver counts; the rest are headers
 
 
+class Counted(Protocol):
+    """What it needs of what sends a stream."""
+
+    @property
+    def stats(self) -> SenderStats: ...
+
+
 class CameraLink(NamedTuple):
     """One camera on its way to this peer."""
 
     stream: "VideoStream"
     codec: str
     target: PeerStream
-    sender: "MediaSender"
+    sender: Counted
 
 
 class PeerQuality:
@@ -39,6 +46,7 @@ class PeerQuality:
     ) -> None:
         self.operator = operator
         self.drives = False  # holds the control seat
+        self.stays_low = False  # a thumbnail: never more than the lowest tier
         self.cameras: list[CameraLink] = []  # the main one first
         self.sounds: list[AudioStream] = []
         self.pacer = Pacer()
@@ -50,6 +58,11 @@ class PeerQuality:
         self.quality: Quality | None = None  # last one told
         self._clock = clock
         self._estimates: dict[frozenset[int], int] = {}
+
+    def stay_low(self) -> None:
+        """Nobody looks closely at this peer's pictures. Call before it joins."""
+        self.stays_low = True
+        self.tier = self.encoded_as = "low"
 
     @property
     def estimate_bps(self) -> int | None:
