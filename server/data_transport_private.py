@@ -5,17 +5,21 @@ What is used and why:
 - `RTCSctpTransport._rto`, `._srtt`, `._rttvar`, `._update_rto`, `._t1_expired`, `._t3_expired`, `._cwnd`: it waits at
   least one second before it repeats a lost message, three while it connects, and then sends one packet at a time
 - `RTCSctpTransport._transmit`: runs in tasks that nobody awaits, and raises there when the connection has ended
+- `RTCSctpTransport._data_channel_flush`: each message is sent by a task of its own
 - `RTCSctpTransport._handle_data`, `RTCDtlsTransport._ssl`: one record is taken from OpenSSL for each datagram that
   comes in. A record that waits there, as one that overtook the end of the handshake does, is never caught up with:
   from then on every message is one datagram late
 """
 
+import asyncio
 import contextlib
 from typing import Any
 
 from aiortc import RTCPeerConnection
 from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH
 from OpenSSL import SSL
+
+from server.run_now import run_now
 
 __all__ = ["tune_data_transport"]
 
@@ -35,6 +39,7 @@ def tune_data_transport(pc: RTCPeerConnection) -> None:
     if pc.sctp is not None:
         _drain_dtls(pc.sctp)
         _hasten_sctp(pc.sctp)
+        _send_at_once(pc.sctp)
 
 
 def _drain_dtls(sctp: Any) -> None:
@@ -94,3 +99,28 @@ def _hasten_sctp(sctp: Any) -> None:
     sctp._t1_expired = expired_connecting
     sctp._t3_expired = expired_sending
     sctp._transmit = transmit_or_not
+
+
+def _send_at_once(sctp: Any) -> None:
+    """Send a message in the turn of the loop that it was given in: a task would cost more than the sending.
+
+    aiortc passes what `_data_channel_flush` returns to `asyncio.ensure_future`, which takes a future for what it is.
+    """
+    flush = sctp._data_channel_flush
+    flushed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+    flushed.set_result(None)
+    is_flushing = False
+
+    def flush_now() -> asyncio.Future[None]:
+        nonlocal is_flushing
+        if not is_flushing:  # else a listener sends another message, which the flush under way comes to
+            is_flushing = True
+            try:
+                run_now(flush())
+            except (ConnectionError, SSL.Error):
+                pass  # the connection has ended
+            finally:
+                is_flushing = False
+        return flushed
+
+    sctp._data_channel_flush = flush_now

@@ -1,8 +1,10 @@
-"""What a peer sends neither ends its connection nor fills memory; aiortc and aioice have no public hooks for that.
+"""What a peer sends is handled as it comes, and neither ends its connection nor fills memory.
 
-What is used and why:
+aiortc and aioice have no public hooks for that. What is used and why:
 
 - `RTCDtlsTransport._recv_next`: an exception there would end the connection
+- `RTCDtlsTransport._state`, `.__handshake_done`, `._ssl`, `._write_ssl`, `._rx_srtp`, `._handle_rtcp_data`,
+  `._data_receiver`: what `_recv_next` does with a datagram
 - `aioice.Connection._queue`: the receive queue, which has no bound
 - `RTCRtpReceiver.__remote_bitrate_estimator`: a third of a megabyte of small objects for each picture stream, on which
   nothing of ours depends: the console receives no pictures. A peer that left waits with it for the garbage collector
@@ -12,30 +14,91 @@ import asyncio
 from collections.abc import Callable
 from typing import Any, cast
 
+import pylibsrtp
 from aiortc import RTCPeerConnection, RTCRtpReceiver
-from aiortc.rtcdtlstransport import RTCDtlsTransport
+from aiortc.rtcdtlstransport import RTCDtlsTransport, State
+from aiortc.rtp import is_rtcp
+from OpenSSL import SSL
+
+from server.run_now import run_now
 
 __all__ = ["guard_transports"]
 
 RECEIVE_QUEUE_DATAGRAMS = 1024
+HANDSHAKE_DONE = "_RTCDtlsTransport__handshake_done"
 ESTIMATOR = "_RTCRtpReceiver__remote_bitrate_estimator"
 DATAGRAM_MAX = 1500  # bytes, what pylibsrtp takes
 
 
-class _BoundedReceiveQueue(asyncio.Queue[Any]):
-    """Drops what the connection could not use: datagrams beyond the bound, and those that would raise further on."""
+class _Intake(asyncio.Queue[Any]):
+    """Stands in for an ICE connection's receive queue: handles a datagram as it comes.
 
-    def __init__(self, on_error: Callable[[str], None]) -> None:
+    The way through the queue, a task and its coroutines costs more than most datagrams do. Voice goes that way, and so
+    does what comes before DTLS is connected, within a bound. What the connection could not use, or what would raise
+    further on, is dropped and counted.
+    """
+
+    def __init__(self, dtls: Any, on_error: Callable[[str], None]) -> None:
         super().__init__()
+        self._dtls = dtls
         self._on_error = on_error
+        self._awaited = False
+
+    async def get(self) -> Any:
+        self._awaited = True
+        try:
+            return await super().get()
+        finally:
+            self._awaited = False
 
     def put_nowait(self, item: tuple[bytes, int] | None) -> None:
-        if item is not None and not 0 < len(item[0]) <= DATAGRAM_MAX:
+        if item is None:
+            super().put_nowait(None)
+        elif not 0 < len(item[0]) <= DATAGRAM_MAX:
             self._on_error("datagram_size")
-        elif item is not None and self.qsize() >= RECEIVE_QUEUE_DATAGRAMS:
+        elif self._is_idle() and self._handled(item[0]):
+            pass
+        elif self.qsize() >= RECEIVE_QUEUE_DATAGRAMS:
             self._on_error("receive_overflow")
         else:
             super().put_nowait(item)
+
+    def _is_idle(self) -> bool:
+        """Whether DTLS is connected, and waits for just this datagram."""
+        dtls = self._dtls
+        return self._awaited and self.empty() and dtls._state is State.CONNECTED and getattr(dtls, HANDSHAKE_DONE)
+
+    def _handled(self, data: bytes) -> bool:
+        """False when it is to go through the queue."""
+        try:
+            if 19 < data[0] < 64:
+                self._take_record(data)
+            elif 127 < data[0] < 192 and is_rtcp(data):
+                run_now(self._dtls._handle_rtcp_data(self._dtls._rx_srtp.unprotect_rtcp(data)))
+            else:
+                return False
+        except ConnectionError:
+            super().put_nowait(None)  # to `RTCDtlsTransport.__run`, which ends the connection
+        except pylibsrtp.Error:
+            pass  # not from the peer, as aiortc ignores it
+        except Exception:  # what a parser of aiortc did not expect
+            self._on_error("malformed")
+        return True
+
+    def _take_record(self, data: bytes) -> None:
+        """As `RTCDtlsTransport._recv_next` does it."""
+        dtls = self._dtls
+        dtls._ssl.bio_write(data)
+        try:
+            record = dtls._ssl.recv(DATAGRAM_MAX)
+        except SSL.ZeroReturnError as error:
+            raise ConnectionError("the peer closed DTLS") from error
+        except SSL.Error:
+            record = b""
+        if not record:
+            run_now(dtls._write_ssl())  # alerts and handshake messages are answered, and bring no data
+        elif dtls._data_receiver is not None:
+            run_now(dtls._data_receiver._handle_data(record))
 
 
 def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None]) -> None:
@@ -60,9 +123,11 @@ def _estimate_nothing(receiver: RTCRtpReceiver) -> None:
 
 def _guard_transport(dtls: RTCDtlsTransport, on_error: Callable[[str], None]) -> None:
     connection = dtls.transport._connection
-    if isinstance(connection._queue, _BoundedReceiveQueue):
+    if isinstance(connection._queue, _Intake):
         return
-    connection._queue = _BoundedReceiveQueue(on_error)
+    if not hasattr(dtls, HANDSHAKE_DONE):
+        raise RuntimeError("aiortc moved __handshake_done; see server/media/receive_guard_private.py")
+    connection._queue = _Intake(dtls, on_error)
     receive = dtls._recv_next
 
     async def guarded() -> None:

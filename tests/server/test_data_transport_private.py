@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSctpTransport, RTCSessionDescription
-from aiortc.rtcdtlstransport import RTCDtlsTransport
+from aiortc.rtcdtlstransport import RTCDtlsTransport, State
 
 from server.data_transport_private import (
     RETRANSMISSION_CEILING,
@@ -108,6 +108,9 @@ async def test_sctp_has(name: str) -> None:
         (RTCSctpTransport._t3_restart, "call_later(self._rto, self._t3_expired)"),
         (RTCSctpTransport._t3_expired, "asyncio.ensure_future(self._transmit())"),
         (RTCSctpTransport._send, "await self._transmit()"),
+        (RTCSctpTransport._data_channel_send, "asyncio.ensure_future(self._data_channel_flush())"),
+        (RTCSctpTransport._set_state, "asyncio.ensure_future(self._data_channel_flush())"),
+        (RTCSctpTransport._receive_sack_chunk, "await self._data_channel_flush()"),
     ],
 )
 def test_aiortc_calls_what_is_replaced(caller: Callable[..., Any], call: str) -> None:
@@ -147,6 +150,46 @@ async def test_every_record_that_waits_is_delivered_at_once(ends: Ends) -> None:
     await write()
     async with asyncio.timeout(SOON):  # sooner than the client would repeat the second
         assert [await ends.at_server.get(), await ends.at_server.get()] == ["first", "second"]
+
+
+async def test_a_message_leaves_in_the_turn_that_it_is_sent_in(ends: Ends, monkeypatch: pytest.MonkeyPatch) -> None:
+    await ends.exchange()
+    left: list[bytes] = []
+    dtls: Any = ends.server.transport.transport
+    send = dtls._send_data
+
+    async def watch(data: bytes) -> None:
+        left.append(data)
+        await send(data)
+
+    monkeypatch.setattr(dtls, "_send_data", watch)
+    ends.server.send("now")
+    assert len(left) == 1
+    assert ends.server.bufferedAmount == 0
+    assert await ends.at_client.get() == "now"
+
+
+async def test_what_a_listener_sends_in_answer_leaves_in_order(ends: Ends) -> None:
+    rest = [str(number) for number in range(1000)]
+
+    def more() -> None:
+        if rest and ends.server.bufferedAmount == 0:
+            ends.server.send(rest.pop(0))
+
+    await ends.exchange()
+    ends.server.on("bufferedamountlow", more)
+    async with asyncio.timeout(PATIENCE):
+        ends.server.send("begin")
+        assert [await ends.at_client.get() for _ in range(1001)] == ["begin", *map(str, range(1000))]
+
+
+async def test_what_is_sent_after_the_end_raises_nothing(ends: Ends) -> None:
+    await ends.exchange()
+    sctp: Any = ends.server.transport
+    await sctp.transport.stop()
+    sctp.transport._set_state(State.CLOSED)
+    ends.server.send("to nobody")
+    sctp._t3_cancel()
 
 
 async def test_the_end_of_dtls_is_still_noticed(ends: Ends) -> None:

@@ -1,0 +1,172 @@
+"""Pins what receive_guard_private.py relies on, and what it is for."""
+
+import asyncio
+import inspect
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from aiortc.rtcdtlstransport import RTCDtlsTransport
+
+from server.media.aiortc_private import create_peer_connection
+from server.media.receive_guard_private import HANDSHAKE_DONE, _Intake, guard_transports
+from tests.server.rig import PATIENCE
+
+MOVED = "aiortc moved a private part: see server/media/receive_guard_private.py"
+
+
+class Ends:
+    """The client's channel; the server's connection, and what is counted there."""
+
+    def __init__(self, client: RTCDataChannel, server: RTCPeerConnection, errors: list[str]) -> None:
+        self.client = client
+        self.server = server
+        self.errors = errors
+        self.came: asyncio.Queue[str] = asyncio.Queue(100)
+
+    @property
+    def dtls(self) -> Any:
+        assert self.server.sctp is not None
+        return self.server.sctp.transport
+
+    @property
+    def intake(self) -> Any:
+        return self.dtls.transport._connection._queue
+
+
+@asynccontextmanager
+async def connected() -> AsyncIterator[Ends]:
+    client, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
+    opened = asyncio.Event()
+    errors: list[str] = []
+    channel = client.createDataChannel("any")
+    channel.on("open", opened.set)
+    ends = Ends(channel, server, errors)
+    server.on("datachannel", lambda there: there.on("message", ends.came.put_nowait))
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await client.setLocalDescription(await client.createOffer())
+            await server.setRemoteDescription(RTCSessionDescription(client.localDescription.sdp, "offer"))
+            guard_transports(server, errors.append)
+            await server.setLocalDescription(await server.createAnswer())
+            await client.setRemoteDescription(RTCSessionDescription(server.localDescription.sdp, "answer"))
+            await opened.wait()
+            yield ends
+    finally:
+        await server.close()
+        await client.close()
+
+
+async def exchanged(ends: Ends, text: str) -> None:
+    ends.client.send(text)
+    assert await ends.came.get() == text
+
+
+def test_what_is_done_with_a_datagram_is_as_expected() -> None:
+    source = inspect.getsource(RTCDtlsTransport._recv_next)
+    for expected in (
+        "if not self.__handshake_done:",
+        "if first_byte > 19 and first_byte < 64:",
+        "self._ssl.bio_write(data)",
+        "data = self._ssl.recv(1500)",
+        "except SSL.ZeroReturnError:",
+        "await self._write_ssl()",
+        "await self._data_receiver._handle_data(data)",
+        "elif first_byte > 127 and first_byte < 192 and self._rx_srtp:",
+        "data = self._rx_srtp.unprotect_rtcp(data)",
+        "await self._handle_rtcp_data(data)",
+        "except pylibsrtp.Error as exc:",
+    ):
+        assert expected in source, MOVED
+    run: Any = RTCDtlsTransport.__dict__["_RTCDtlsTransport__run"]
+    assert "except ConnectionError:" in inspect.getsource(run), MOVED
+
+
+def test_before_the_connection_is_up_the_queue_is_bounded_and_still_ends() -> None:
+    errors: list[str] = []
+    queue = _Intake(None, errors.append)
+    for _ in range(3000):
+        queue.put_nowait((b"data", 1))
+    queue.put_nowait((b"", 1))
+    queue.put_nowait((bytes(1501), 1))
+    queue.put_nowait(None)
+    assert queue.qsize() == 1025
+    assert errors == ["receive_overflow"] * (3000 - 1024) + ["datagram_size"] * 2
+
+
+async def test_a_message_is_handled_in_the_turn_that_its_datagram_comes_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with connected() as ends:
+        await exchanged(ends, "first")
+        handled: list[bool] = []
+        take = ends.intake.put_nowait
+
+        def put(item: Any) -> None:
+            before = ends.came.qsize()
+            take(item)
+            handled.append(ends.came.qsize() > before and ends.intake.empty())
+
+        monkeypatch.setattr(ends.intake, "put_nowait", put)
+        for number in range(5):
+            await exchanged(ends, str(number))
+        assert handled.count(True) == 5
+        assert ends.errors == []
+
+
+async def test_what_is_not_from_the_peer_is_ignored_and_the_connection_goes_on() -> None:
+    async with connected() as ends:
+        await exchanged(ends, "before")
+        for first in (0, 22, 23, 63, 64, 100, 128, 144, 191, 192, 255):
+            ends.intake.put_nowait((bytes([first, 200]) + bytes(40), 1))
+            ends.intake.put_nowait((bytes([first]), 1))
+        ends.intake.put_nowait((b"", 1))
+        await exchanged(ends, "after")
+        assert ends.errors == ["datagram_size"]
+
+
+async def test_a_message_that_cannot_be_handled_is_counted_and_the_connection_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with connected() as ends:
+        await exchanged(ends, "before")
+        sctp: Any = ends.server.sctp
+        failed = asyncio.Event()
+
+        async def fail(data: bytes) -> None:
+            failed.set()
+            raise IndexError(data)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(sctp, "_handle_data", fail)
+            ends.client.send("lost, and sent again")
+            await failed.wait()
+        assert set(ends.errors) == {"malformed"}
+        assert await ends.came.get() == "lost, and sent again"
+        await exchanged(ends, "after")
+
+
+async def test_the_peers_goodbye_ends_the_connection() -> None:
+    async with connected() as ends:
+        assert getattr(ends.dtls, HANDSHAKE_DONE), MOVED
+        closed = asyncio.Event()
+        ends.dtls.on("statechange", lambda: closed.set() if ends.dtls.state == "closed" else None)
+        client: Any = ends.client.transport
+        await client.transport.stop()
+        await closed.wait()
+        assert ends.errors == []
+
+
+async def test_what_estimates_a_path_that_no_picture_comes_from_is_left_out() -> None:
+    offering, answering = RTCPeerConnection(), create_peer_connection()
+    try:
+        offering.addTransceiver("video", direction="recvonly")
+        await answering.setRemoteDescription(RTCSessionDescription((await offering.createOffer()).sdp, "offer"))
+        [transceiver] = answering.getTransceivers()
+        receiver: Any = transceiver.receiver
+        assert receiver._RTCRtpReceiver__remote_bitrate_estimator is not None, MOVED
+        guard_transports(answering, lambda name: None)
+        assert receiver._RTCRtpReceiver__remote_bitrate_estimator is None
+    finally:
+        await offering.close()
+        await answering.close()
