@@ -1,4 +1,4 @@
-"""What one robot of a fleet looks like from outside. Consoles tell each other, and `GET /api/fleet` tells the overview."""
+"""What one robot of a fleet looks like from outside, to other consoles and in `GET /api/fleet`."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -10,7 +10,7 @@ from robot_bridge.protocol.console import Role
 
 __all__ = ["MAX_PEOPLE", "ROBOT_NAME", "Person", "Tile"]
 
-ROBOT_NAME = r"^[a-z0-9][a-z0-9-]{0,31}\Z"
+ROBOT_NAME = r"^[a-z0-9][a-z0-9-]{0,31}$"  # for pydantic; with `re`, use fullmatch
 MAX_PEOPLE = 20  # that a tile names; the others are counted
 
 Name = Annotated[str, Field(max_length=60)]
