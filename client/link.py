@@ -10,7 +10,7 @@ __all__ = ["ConsoleLink", "parse_link"]
 
 
 class ConsoleLink(NamedTuple):
-    base: str  # "http://127.0.0.1:8000"
+    base: str  # "http://127.0.0.1:8000", of one robot of a fleet "http://127.0.0.1:8000/robots/left"
     token: str
     loopback: bool  # the console is on this machine
 
@@ -20,7 +20,7 @@ class ConsoleLink(NamedTuple):
 
 
 def parse_link(link: str) -> ConsoleLink:
-    """The parts of `http://host:port/#token=…`.
+    """The parts of `http://host:port/#token=…`, or of `http://host:port/robots/NAME/#token=…` in a fleet.
 
     Raises:
         LinkFormatError: it is not such a link.
@@ -35,7 +35,7 @@ def parse_link(link: str) -> ConsoleLink:
     token = parse_qs(parts.fragment).get("token", [""])[0]
     if not token:
         raise LinkFormatError("the link has no #token=…; use the whole link that the console printed")
-    return ConsoleLink(f"{parts.scheme}://{parts.netloc}", token, _is_loopback(host))
+    return ConsoleLink(f"{parts.scheme}://{parts.netloc}{parts.path.rstrip('/')}", token, _is_loopback(host))
 
 
 def _is_loopback(host: str) -> bool:

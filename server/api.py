@@ -114,9 +114,10 @@ async def scene(request: Request, caller: Caller) -> Response:
     """A path for an iframe that shows the 3D scene; its ticket is good for a few minutes."""
     here = services(request)
     here.scene_or_error()
-    base = str(request.base_url).replace("http", "ws", 1)
+    root = str(request.scope.get("root_path", ""))
+    base = f"{str(request.base_url).replace('http', 'ws', 1).rstrip('/')}{root}"
     ticket = here.access.issue_ticket(caller.token_id)
-    return _json(ScenePath(f"/scene/?websocket={base}scene/ws/{ticket}&darkMode&hideViserLogo"))
+    return _json(ScenePath(f"{root}/scene/?websocket={base}/scene/ws/{ticket}&darkMode&hideViserLogo"))
 
 
 @router.get("/healthz")
@@ -130,10 +131,7 @@ async def healthz(request: Request) -> Response:
 
 @router.get("/metrics")
 async def metrics(request: Request) -> Response:
-    here = services(request)
-    here.metrics.collect(here.console.robot.bad_input(), here.console.robot.drops())
-    here.metrics.collect_audit(here.audit.lost, here.audit.failures)
-    text = here.metrics.text()
+    text = services(request).metrics_text()
     return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})
 
 

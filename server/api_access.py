@@ -9,7 +9,7 @@ import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from robot_bridge.protocol.console import Role
-from server.access import Identity, require_role
+from server.access import MAX_ROBOTS, Identity, RobotName, require_role
 from server.audit import AuditRecord
 from server.body import read_json
 from server.errors import NotAllowed, StateUnavailable
@@ -34,6 +34,8 @@ class InvitationRequest(msgspec.Struct, frozen=True, kw_only=True):
     role: Role = "observer"
     name: Annotated[str, msgspec.Meta(max_length=60)] = ""
     seconds: float = DEFAULT_SECONDS
+    # Of a fleet; unset: the one whose route this is; empty: as many as the inviter's own link.
+    robots: Annotated[list[RobotName], msgspec.Meta(max_length=MAX_ROBOTS)] | None = None
 
 
 class InvitationInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,6 +47,7 @@ class InvitationInfo(msgspec.Struct, frozen=True, kw_only=True):
     expires: float
     revoked: bool
     connected: int  # peers that are here with it now
+    robots: list[str]  # of a fleet, that it is good for; empty: all
 
 
 class InvitationList(msgspec.Struct, frozen=True, kw_only=True):
@@ -87,9 +90,14 @@ async def invite(request: Request, caller: Caller) -> Response:
     wanted = await read_json(request, InvitationRequest)
     _require_inviter(caller)
     now = time.time()
-    made = await _update(here, lambda known: known.invite(caller, wanted.role, wanted.name, wanted.seconds, now))
-    here.warden.enforce([made], caller.actor)
+    robots = _wanted_robots(here, wanted)
+    made = await _update(
+        here, lambda known: known.invite(caller, wanted.role, wanted.name, wanted.seconds, now, robots)
+    )
+    here.house.enforce([made], caller.actor)
     base = here.settings.public_url or str(request.base_url).rstrip("/")
+    if made.robots == (here.robot,):
+        base += str(request.scope.get("root_path", ""))  # to this robot, past the overview
     link = console_link(base, here.access.sign(made.identity, made.created))
     return _json(NewInvitation(link=link, **msgspec.structs.asdict(_info(here, made))), 201)
 
@@ -101,7 +109,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     _require_inviter(caller)
     now = time.time()
     revoked = await _update(here, lambda known: known.revoke(caller, invitation_id, now))
-    here.warden.enforce(revoked, caller.actor)
+    here.house.enforce(revoked, caller.actor)
     return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
 
 
@@ -126,6 +134,12 @@ async def _update(here: Services, change: Callable[[Invitations], Result]) -> Re
         raise StateUnavailable(f"nothing was changed: {error.reason}") from error
 
 
+def _wanted_robots(here: Services, wanted: InvitationRequest) -> tuple[str, ...]:
+    if wanted.robots is not None:
+        return tuple(wanted.robots)
+    return (here.robot,) if here.robot else ()
+
+
 def _require_inviter(caller: Identity) -> None:
     if not may_invite(caller.role):
         raise NotAllowed("observers invite nobody")
@@ -140,7 +154,8 @@ def _info(here: Services, invitation: Invitation) -> InvitationInfo:
         created=invitation.created,
         expires=invitation.expires,
         revoked=invitation.revoked_at is not None,
-        connected=sum(peer.identity.token_id == invitation.id for peer in here.console.peers),
+        connected=here.house.connected(invitation.id),
+        robots=list(invitation.robots),
     )
 
 

@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Annotated, TypeVar
 
 import msgspec
@@ -12,13 +11,13 @@ from fastapi.responses import FileResponse, StreamingResponse
 from robot_bridge.protocol.console import RecordingState
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.serial import MAX_EVENT, event_gap
-from server.access import Access, Identity, require_role
+from server.access import Identity, require_role
 from server.body import read_json
-from server.errors import BadParameter, NotFound, RecordingFailed
+from server.errors import BadParameter, NotFound, RecordingFailed, RobotFailed
 from server.recording.errors import RecordingError
 from server.recording.event_index import EventIndex
-from server.recording.library import Library
 from server.recording.reader import Record, RecordingReader
+from server.recording.service import RecordingService
 from server.recording.shelf import RecordingEntry
 
 __all__ = [
@@ -37,14 +36,6 @@ MAX_BYTES = 64 * 1024 * 1024
 
 Result = TypeVar("Result")
 Event = Annotated[int, Query(ge=1, le=MAX_EVENT)]
-
-
-@dataclass(frozen=True)
-class RecordingService:
-    """What the routes need; `app.state.recordings`."""
-
-    library: Library
-    access: Access
 
 
 class RecordingRequest(msgspec.Struct, frozen=True):
@@ -76,6 +67,8 @@ class FileTicket(msgspec.Struct, frozen=True):
 
 def _service(request: Request) -> RecordingService:
     found = request.app.state.recordings
+    if found is None:
+        raise RobotFailed("the console's session of this robot has failed; it is started again")
     if not isinstance(found, RecordingService):
         raise TypeError("the app is not running")
     return found
@@ -162,8 +155,9 @@ async def ticket(request: Request, caller: Caller, recording_id: str) -> Respons
     """For a link that the browser downloads by itself: it sends no token."""
     require_role(caller, "operator", "supervisor")
     await _with_reader(request, recording_id, lambda reader, entry: None)
+    root = request.scope.get("root_path", "")
     permission = _service(request).access.issue_file_ticket(recording_id, caller.token_id)
-    return _json(FileTicket(f"/api/recordings/{recording_id}/file?ticket={permission}"))
+    return _json(FileTicket(f"{root}/api/recordings/{recording_id}/file?ticket={permission}"))
 
 
 @router.get("/api/recordings/{recording_id}/file")

@@ -25,12 +25,14 @@ class AuditLog:
         tail: the last records, those of earlier runs included
         trouble: why it cannot be written at present, "" when it can
         on_trouble: called on the loop whenever `trouble` changes
+        on_record: called with every record
     """
 
     def __init__(self, file: RecordFile, earlier: list[AuditRecord]) -> None:
         self.tail = AuditTail(earlier)
         self.trouble = ""
         self.on_trouble: Callable[[str], None] = _ignore
+        self.on_record: Callable[[AuditRecord], None] = _ignore_record
         self._loop = asyncio.get_running_loop()
         self._writer = AuditWriter(file, self._changed)
         self._writer.start()
@@ -53,6 +55,7 @@ class AuditLog:
     def append(self, record: AuditRecord) -> None:
         self.tail.append(record)
         self._writer.append(record)
+        self.on_record(record)
 
     def close(self) -> None:
         self.on_trouble = _ignore
@@ -102,4 +105,8 @@ class _Nowhere:
 
 
 def _ignore(trouble: str) -> None:
+    pass
+
+
+def _ignore_record(record: AuditRecord) -> None:
     pass

@@ -5,6 +5,7 @@ ConsoleError
 │   ├── TokenMissing
 │   ├── TokenInvalid        wrong signature, malformed: never said which
 │   ├── LinkExpired         our own signature, too old
+│   ├── LinkOtherRobot      our own signature, good for other robots of the fleet
 │   ├── LinkRevoked         our own signature, called back
 │   ├── NotAllowed          the role does not permit it
 │   └── OriginRefused       a page of another site
@@ -36,6 +37,7 @@ ConsoleError
 └── Unavailable             right now it cannot be done
     ├── LinkDown
     ├── RecordingFailed     the disk, or what is on it
+    ├── RobotFailed         this console's session of the robot, which is started again
     ├── RobotUnreachable
     ├── SceneUnavailable
     ├── ShuttingDown
@@ -64,6 +66,7 @@ __all__ = [
     "HttpError",
     "LinkDown",
     "LinkExpired",
+    "LinkOtherRobot",
     "LinkRevoked",
     "MalformedMessage",
     "MessageTooLarge",
@@ -75,6 +78,7 @@ __all__ = [
     "PreconditionRequired",
     "RecordingFailed",
     "RequestError",
+    "RobotFailed",
     "RobotUnreachable",
     "SceneUnavailable",
     "ShuttingDown",
@@ -118,6 +122,10 @@ class TokenInvalid(AccessError):
 
 
 class LinkExpired(AccessError):
+    pass
+
+
+class LinkOtherRobot(AccessError):
     pass
 
 
@@ -251,6 +259,10 @@ class RecordingFailed(Unavailable):
     pass
 
 
+class RobotFailed(Unavailable):
+    pass
+
+
 class RobotUnreachable(Unavailable):
     pass
 
@@ -284,6 +296,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     TokenInvalid: HttpError(401, "unauthorized", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     LinkExpired: HttpError(401, "link_expired", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     LinkRevoked: HttpError(401, "link_revoked", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
+    LinkOtherRobot: HttpError(403, "link_other_robot"),
     NotAllowed: HttpError(403, "not_allowed"),
     OriginRefused: HttpError(403, "origin_refused"),
     AlreadyRecording: HttpError(409, "already_recording"),
@@ -303,6 +316,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     TooManyRequests: HttpError(429, "too_many_requests", {"Retry-After": "2"}),
     LinkDown: HttpError(503, "link_down", {"Retry-After": "1"}),
     RecordingFailed: HttpError(503, "recording_failed", {"Retry-After": "5"}),
+    RobotFailed: HttpError(503, "robot_failed", {"Retry-After": "2"}),
     RobotUnreachable: HttpError(503, "robot_unreachable", {"Retry-After": "1"}),
     SceneUnavailable: HttpError(503, "scene_unavailable", {"Retry-After": "5"}),
     ShuttingDown: HttpError(503, "shutting_down", {"Retry-After": "5"}),

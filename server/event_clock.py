@@ -24,6 +24,7 @@ class EventClock:
     def __init__(self) -> None:
         self.epoch = ""
         self.feedback: Feedback | None = None  # newest of this epoch; None before the first
+        self.heard_at = 0.0  # when it came
         self._changes: deque[Change] = deque(maxlen=HISTORY)
 
     @property
@@ -56,7 +57,7 @@ class EventClock:
                 return False
         if self.feedback is None or feedback.event != self.feedback.event:
             self._changes.append(Change(now, feedback.event))
-        self.feedback = feedback
+        self.feedback, self.heard_at = feedback, now
         return True
 
     def reference_at(self, time: float) -> EventReference | None:

@@ -12,10 +12,12 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from server.errors import ConsoleError, HostRefused, TooManyRequests, http_error
 from server.rate_limits import RateLimits
+from server.robot_paths import below_robot
 
 __all__ = ["FrontDoor", "HostNames", "client_address"]
 
-UNLIMITED = ("/api/stop", "/healthz")  # a stop is never turned away; a health check must not fail for others' floods
+# A stop is never turned away; a health check must not fail for others' floods.
+UNLIMITED = ("/api/stop", "/api/fleet/stop", "/healthz", "/readyz")
 POLICY_VIOLATION = 1008  # RFC 6455 7.4.1
 
 
@@ -74,7 +76,9 @@ class FrontDoor:
 
     def _check(self, scope: Scope) -> None:
         self._hosts.check(Headers(scope=scope).get("host"))
-        if scope["path"] not in UNLIMITED and not self._requests.spend(client_address(scope), self._clock()):
+        if below_robot(scope["path"]) not in UNLIMITED and not self._requests.spend(
+            client_address(scope), self._clock()
+        ):
             raise TooManyRequests("too many requests from this address")
 
 

@@ -103,7 +103,7 @@ def guarded_by(settings: LimitSettings, app: Starlette) -> type[H11Protocol]:
     """The protocol with the settings' bounds; refusals are counted in the app's metrics."""
 
     def refused(name: str) -> None:
-        app.state.services.metrics.bad_input.labels("http", name).inc()
+        app.state.house.metrics.bad_input.labels("http", name).inc()
 
     bounds = ConnectionBounds(settings.max_connections, settings.max_address_connections, refused)
     return guarded_http(bounds, settings.request_timeout)

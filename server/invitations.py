@@ -6,7 +6,8 @@
 | operator | observers, operators | what it invited |
 | supervisor | anyone | everything |
 
-An invitation ends no later than the link it was made with, and is revoked with it.
+An invitation ends no later than the link it was made with, is revoked with it, and is good for no robot that the other
+is not good for.
 """
 
 import secrets
@@ -45,10 +46,15 @@ class Invitation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     by_link: str = ""  # id of the link that it was made with
     at_start: bool = False  # printed by every start of the console
     revoked_at: float | None = None
+    robots: tuple[str, ...] = ()  # of a fleet, that it is good for; empty: all
 
     @property
     def identity(self) -> Identity:
-        return Identity(self.role, self.name, self.id, self.expires)
+        return Identity(self.role, self.name, self.id, self.expires, self.robots)
+
+    def concerns(self, robot: str) -> bool:
+        """Whether it is good for that robot; "" is the robot of a console that has only one."""
+        return self.identity.may_see(robot)
 
     def is_good(self, now: float) -> bool:
         return self.revoked_at is None and now < self.expires
@@ -71,16 +77,22 @@ class Invitations:
     def revoked(self) -> frozenset[str]:
         return frozenset(each.id for each in self._known.values() if each.revoked_at is not None)
 
-    def invite(self, by: Identity | None, role: Role, name: str, seconds: float, now: float) -> Invitation:
-        """A new invitation.
+    def invite(
+        self, by: Identity | None, role: Role, name: str, seconds: float, now: float, robots: tuple[str, ...] = ()
+    ) -> Invitation:
+        """A new invitation; for those `robots` of a fleet, or for as many as `by` may see.
 
         Raises:
-            NotAllowed: the role of `by` may not invite `role`.
+            NotAllowed: the role of `by` may not invite `role`, or it may not see a robot itself.
             BadParameter: the time is not within bounds.
             TooManyInvitations: revoke some first.
         """
         if by is not None and role not in may_invite(by.role):
             raise NotAllowed(f"{'an' if by.role != 'supervisor' else 'a'} {by.role} may not invite a person as {role}")
+        if by is not None and by.robots:
+            robots = robots or by.robots
+            if not set(robots) <= set(by.robots):
+                raise NotAllowed("your own link is not good for all of these robots")
         if not MIN_SECONDS <= seconds <= MAX_SECONDS:
             raise BadParameter(f"a link is good for {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
         if sum(each.is_good(now) for each in self._known.values()) >= MAX_LIVE:
@@ -95,6 +107,7 @@ class Invitations:
                 expires=expires,
                 by="" if by is None else by.name,
                 by_link="" if by is None else by.token_id,
+                robots=tuple(sorted(set(robots))),
             )
         )
 
@@ -128,10 +141,7 @@ class Invitations:
 
     def visible(self, by: Identity | None) -> list[Invitation]:
         """Those that `by` may see, newest first."""
-        everything = by is None or by.role == "supervisor"
-        found = [
-            each for each in self._known.values() if everything or (by is not None and each.by_link == by.token_id)
-        ]
+        found = [each for each in self._known.values() if by is None or _sees(by, each)]
         return sorted(found, key=lambda each: each.created, reverse=True)
 
     def prune(self, now: float) -> None:
@@ -141,3 +151,10 @@ class Invitations:
     def _add(self, invitation: Invitation) -> Invitation:
         self._known[invitation.id] = invitation
         return invitation
+
+
+def _sees(by: Identity, invitation: Invitation) -> bool:
+    if invitation.by_link == by.token_id:
+        return True
+    within = not by.robots or (bool(invitation.robots) and set(invitation.robots) <= set(by.robots))
+    return by.role == "supervisor" and within

@@ -1,4 +1,4 @@
-"""Adds to every log line which run of the robot bridge and which event it belongs to."""
+"""Adds to every log line which robot of a fleet, which run of the robot bridge and which event it belongs to."""
 
 from collections.abc import MutableMapping
 from contextvars import ContextVar
@@ -8,18 +8,27 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from server.event_clock import EventClock
 
-__all__ = ["LogContext", "add_session", "follow_clock"]
+__all__ = ["LogContext", "add_session", "follow_clock", "name_robot"]
 
 _clock: ContextVar[EventClock | None] = ContextVar("lockstep_event_clock", default=None)
+_robot: ContextVar[str] = ContextVar("lockstep_robot", default="")
 
 
-def follow_clock(clock: EventClock) -> None:
-    """From now on in this task, and in those that it starts."""
+def follow_clock(clock: EventClock, robot: str = "") -> None:
+    """From now on in this task, and in those that it starts. `robot`: its name in a fleet."""
     _clock.set(clock)
+    _robot.set(robot)
+
+
+def name_robot(robot: str) -> None:
+    """As `follow_clock`, before there is a clock."""
+    _robot.set(robot)
 
 
 def add_session(logger: object, method: str, line: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-    """A structlog processor: `epoch`, and as `s` the event reference that holds."""
+    """A structlog processor: `robot` in a fleet, `epoch`, and as `s` the event reference that holds."""
+    if robot := _robot.get():
+        line.setdefault("robot", robot)
     clock = _clock.get()
     if clock is not None and clock.feedback is not None:
         line.setdefault("epoch", clock.epoch)
@@ -36,5 +45,5 @@ class LogContext:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         found = getattr(scope["app"].state, "services", None) if "app" in scope else None
         if found is not None:
-            follow_clock(found.console.clock)
+            follow_clock(found.console.clock, found.robot)
         await self._app(scope, receive, send)

@@ -10,13 +10,15 @@ __all__ = ["Metrics"]
 class Metrics:
     """Everything that /metrics shows besides the media plane's, which shares the registry."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, process: bool = True) -> None:
+        """`process`: with what the whole process uses."""
         self.registry = CollectorRegistry()
         self._robot_bad_input: Totals[str] = Totals()
         self._robot_drops: Totals[str] = Totals()
         self._audit = (0, 0)
         registry = self.registry
-        ProcessCollector(registry=registry)
+        if process:
+            ProcessCollector(registry=registry)
         self.bad_input = Counter(
             "lockstep_bad_input", "Input refused, by where and why", ["where", "reason"], registry=registry
         )

@@ -28,6 +28,7 @@ from server.errors import (
     HttpError,
     LinkDown,
     LinkExpired,
+    LinkOtherRobot,
     LinkRevoked,
     NotAllowed,
     NotConnected,
@@ -61,7 +62,7 @@ MCAP = "application/x-mcap"
 Errors = tuple[type[ConsoleError], ...]
 
 EVERYWHERE: Errors = (HostRefused, TooManyRequests)
-WITH_TOKEN: Errors = (TokenMissing, TokenInvalid, LinkExpired, LinkRevoked)
+WITH_TOKEN: Errors = (TokenMissing, TokenInvalid, LinkExpired, LinkRevoked, LinkOtherRobot)
 WITH_BODY: Errors = (BodyTooLarge, BodyTooSlow)
 WITH_JSON: Errors = (BadJson, *WITH_BODY)
 
@@ -100,6 +101,7 @@ RESOURCE = Parameter("resource", "path", {"type": "string"}, required=True)
 MATCH = Parameter("If-Match", "header", {"type": "string", "pattern": r'^(\*|"[0-9a-f]{16}")$'}, required=True)
 STAMP = Parameter("stamp", "query", {"type": "string", "enum": ["trailer"]})
 RELAY = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{0,3}$"})
+VIEW = Parameter("view", "query", {"type": "string", "enum": ["thumbnail"]})
 PEER = Parameter("peer", "query", {"type": "string", "maxLength": 16})
 LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
 AFTER = Parameter("after", "query", {"type": "integer", "default": 0})
@@ -119,7 +121,7 @@ OPERATIONS: tuple[Operation, ...] = (
         *("post", "/whep", "Offer a WebRTC connection (WHEP).", 201, SDP),
         errors=(BadSdp, WrongMediaType, BadParameter, RobotUnreachable, TooManyPeers, ShuttingDown, *WITH_BODY),
         body=SDP,
-        parameters=(STAMP, RELAY),
+        parameters=(STAMP, RELAY, VIEW),
         headers=("Location", "ETag", "Accept-Patch"),
     ),
     Operation(

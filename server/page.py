@@ -20,8 +20,15 @@ NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Locks
 """
 
 
-def page_router(directory: Path = WEB_DIST) -> APIRouter:
-    """Routes for `/`, `/recordings`, the hashed assets (cached for good) and the few files beside them."""
+def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_robot: bool = True) -> APIRouter:
+    """Routes for `/`, `/recordings`, the hashed assets (cached for good) and the few files beside them.
+
+    Pages know their addresses by their own, so all of this may lie below any prefix.
+
+    Args:
+        first: the page at `/`
+        of_robot: with the pages that only a robot has
+    """
     router = APIRouter()
     root = directory.resolve()
 
@@ -32,11 +39,13 @@ def page_router(directory: Path = WEB_DIST) -> APIRouter:
 
     @router.get("/")
     async def index() -> Response:
-        return page("index.html")
+        return page(first)
 
-    @router.get("/recordings")
-    async def recordings() -> Response:
-        return page("recordings.html")
+    if of_robot:
+
+        @router.get("/recordings")
+        async def recordings() -> Response:
+            return page("recordings.html")
 
     @router.get("/{path:path}")
     async def asset(request: Request, path: str) -> Response:

@@ -109,6 +109,7 @@ class Peer:
         self.report = Report()  # newest
         self._quality: Quality | None = None  # newest
         self.ended = ""  # why; "" while it lives
+        self.thumbnail = False  # a small picture on somebody's overview, not somebody who takes part
         self.relay = ""  # the relay that it watches through; "": media and feedback come from here
         self._media = media
         self._host = host

@@ -36,6 +36,8 @@ class PeersLimits(Protocol):
     def reserved_places(self) -> int: ...
     @property
     def max_unconnected(self) -> int: ...
+    @property
+    def max_thumbnails(self) -> int: ...
 
 
 class Peers:
@@ -58,12 +60,23 @@ class Peers:
         self._closing = False
         self.ended = 0  # connections, ever
         self.relays: list[FeedbackReceiver] = []
+        self.further_bounds: list[Callable[[Identity], None]] = []  # raise TooManyPeers where there is no place
 
     def __iter__(self) -> Iterator[Peer]:
         return iter(list(self._sessions))
 
     def __len__(self) -> int:
         return len(self._sessions)
+
+    @property
+    def taken(self) -> int:
+        """Places that are taken, those of peers that are being negotiated included."""
+        return len(self._sessions) + self._reserved.total()
+
+    @property
+    def thumbnails(self) -> int:
+        """Of these, small pictures on somebody's overview: no participants."""
+        return sum(peer.thumbnail for peer in self._sessions)
 
     def drivers(self) -> list[Peer]:
         """Those whose role may drive."""
@@ -76,19 +89,21 @@ class Peers:
 
     def settle_names(self) -> list[Peer]:
         """Give everyone the name they asked for, or that with a number; those whose name changed."""
-        names = unique_names([(peer.wanted_name, peer.name) for peer in self._sessions])
+        people = [peer for peer in self._sessions if not peer.thumbnail]
+        names = unique_names([(peer.wanted_name, peer.name) for peer in people])
         changed = []
-        for peer, name in zip(self._sessions, names, strict=True):
+        for peer, name in zip(people, names, strict=True):
             if peer.name != name:
                 peer.name = name
                 changed.append(peer)
         return changed
 
     @contextmanager
-    def place(self, identity: Identity, *, relayed: bool = False) -> Iterator[None]:
+    def place(self, identity: Identity, *, relayed: bool = False, thumbnail: bool = False) -> Iterator[None]:
         """Keeps a place while a peer is being negotiated. The last ones are not for observers.
 
-        `relayed`: it has its media from a relay; such peers cost little, and are counted by themselves.
+        `relayed`: it has its media from a relay; such peers cost little, and are counted by themselves; as are those
+        that get a `thumbnail`.
 
         Raises:
             TooManyPeers: all places are taken.
@@ -98,12 +113,14 @@ class Peers:
         if self._closing:
             raise ShuttingDown("the console is shutting down")
         limits, token_id = self._limits, identity.token_id
-        bound = limits.max_relayed if relayed else limits.max_peers
-        if identity.role == "observer":
+        bound = limits.max_relayed if relayed else limits.max_thumbnails if thumbnail else limits.max_peers
+        if identity.role == "observer" and not thumbnail:
             bound = max(1, bound - limits.reserved_places)
-        here = sum(bool(peer.relay) == relayed for peer in self._sessions)
+        here = sum((bool(peer.relay), peer.thumbnail) == (relayed, thumbnail) for peer in self._sessions)
         if here + self._reserved.total() >= bound:
             raise TooManyPeers(f"all {bound} places are taken")
+        for check in self.further_bounds:
+            check(identity)
         waiting = sum(peer.identity.token_id == token_id and not peer.connected for peer in self._sessions)
         if waiting + self._reserved[token_id] >= limits.max_unconnected:
             raise TooManyRequests(f"{limits.max_unconnected} peers of this link have not connected yet")
@@ -142,7 +159,8 @@ class Peers:
 
     def participants(self) -> Participants:
         """Those who may drive first. In a crowd only they come with measured values: the list changes less often."""
-        everyone = sorted((peer.participant() for peer in self._sessions), key=lambda each: each.role == "observer")
+        people = [peer for peer in self._sessions if not peer.thumbnail]
+        everyone = sorted((peer.participant() for peer in people), key=lambda each: each.role == "observer")
         return Participants(
             participants=[
                 each if len(everyone) <= FEW or each.role != "observer" else _without_values(each) for each in everyone

@@ -47,11 +47,15 @@ class People:
             self._board.remember(record)
 
     def joined(self, peer: Peer) -> None:
+        if peer.thumbnail:
+            peer.name = peer.wanted_name  # nobody sees it, but a stop says whose it is
+            return
         self._audit.record("joined", peer.actor, ", ".join(sorted({stream.carrier for stream in peer.streams})))
 
     def left(self, peer: Peer) -> None:
         self._board.forget(peer.id)
-        self._audit.record("left", peer.actor, peer.ended)
+        if not peer.thumbnail:
+            self._audit.record("left", peer.actor, peer.ended)
 
     def welcome(self, peer: Peer) -> None:
         """Tell a newcomer who is here and what was written."""

@@ -6,6 +6,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.errors import OriginRefused
+from server.robot_paths import below_robot
 
 __all__ = ["PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "check_origin"]
 
@@ -57,7 +58,7 @@ class SecurityHeaders:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        policy = SCENE_POLICY if scope["path"].startswith("/scene/") else self._page_policy
+        policy = SCENE_POLICY if below_robot(scope["path"]).startswith("/scene/") else self._page_policy
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":

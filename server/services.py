@@ -1,4 +1,4 @@
-"""What the routes need, made by the app's lifespan."""
+"""What the routes of one robot need, made by its session."""
 
 from dataclasses import dataclass
 
@@ -8,11 +8,14 @@ from starlette.requests import HTTPConnection
 from server.access import Access, Identity
 from server.audit_log import AuditLog
 from server.console import Console
-from server.errors import SceneUnavailable
+from server.errors import RobotFailed, SceneUnavailable
 from server.guard import Guard
+from server.house import House
 from server.link_warden import LinkWarden
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
+from server.recording.recorder import Recorder
+from server.recording.service import RecordingService
 from server.relay.desk import RelayDesk
 from server.scene import SceneView
 from server.settings import Settings
@@ -22,23 +25,40 @@ from server.voice import VoiceService
 __all__ = ["Services", "authorized", "services"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Services:
+    robot: str  # its name in a fleet; "" is the only robot of a console
     settings: Settings
     metrics: Metrics
     console: Console
     media: MediaPlane
-    state: ConsoleState
+    house: House
+    access: Access
     audit: AuditLog
     warden: LinkWarden
-    guard: Guard
     scene: SceneView | None  # None when it is switched off or could not start
+    recorder: Recorder
     relays: RelayDesk
     voice: VoiceService
+    recordings: RecordingService
 
     @property
-    def access(self) -> Access:
-        return self.state.access
+    def state(self) -> ConsoleState:
+        return self.house.state
+
+    @property
+    def guard(self) -> Guard:
+        return self.house.guard
+
+    def metrics_text(self) -> bytes:
+        """All that is counted here, in the exposition format."""
+        self.collect()
+        return self.metrics.text()
+
+    def collect(self) -> None:
+        """Bring into the metrics what is counted elsewhere."""
+        self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
+        self.metrics.collect_audit(self.audit.lost, self.audit.failures)
 
     def scene_or_error(self) -> SceneView:
         """Raises SceneUnavailable when there is no 3D scene."""
@@ -48,7 +68,10 @@ class Services:
 
 
 def services(connection: HTTPConnection) -> Services:
+    """Raises RobotFailed while the session has failed and is started again."""
     found = connection.app.state.services
+    if found is None:
+        raise RobotFailed("the console's session of this robot has failed; it is started again")
     if not isinstance(found, Services):
         raise TypeError("the app is not running")
     return found

@@ -47,10 +47,13 @@ async def create(
     identity: Annotated[Identity, Depends(authorized)],
     stamp: Literal["trailer"] | None = None,
     relay: Annotated[str, Query(pattern=r"^\d{0,3}$")] = "",
+    view: Literal["thumbnail"] | None = None,
 ) -> Response:
     """An offer in, an answer out; the peer lives on until DELETE, or until its connection ends.
 
     `relay`: an observer has its media from that relay, and offers data channels alone.
+    `view`: a thumbnail is a small picture of the main camera on an overview, and takes part in nothing, whatever the
+    role of who asks.
     """
     here = services(request)
     offer = prepare_offer(await read_text(request, SDP, here.settings.max_sdp_bytes))
@@ -58,13 +61,16 @@ async def create(
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(identity.token_id)
     ice = servers_for(here.settings, identity.token_id)
-    relayed = bool(relay) and identity.role == "observer" and here.relays.arrived(relay)
-    with here.console.peers.place(identity, relayed=relayed):
-        peer, answer = await _negotiate(here, identity, offer, ice, trailer=stamp == "trailer")
+    thumbnail = view == "thumbnail"
+    if thumbnail:
+        identity = identity._replace(role="observer")
+    relayed = bool(relay) and not thumbnail and identity.role == "observer" and here.relays.arrived(relay)
+    with here.console.peers.place(identity, relayed=relayed, thumbnail=thumbnail):
+        peer, answer = await _negotiate(here, identity, offer, ice, trailer=stamp == "trailer", thumbnail=thumbnail)
         peer.relay = relay if relayed else ""
         here.console.peers.admit(peer)
     headers = {
-        "Location": f"/whep/{peer.resource}",
+        "Location": f"{request.scope.get('root_path', '')}/whep/{peer.resource}",
         "Accept-Patch": FRAGMENT,
         "Cache-Control": "no-store",
         "ETag": peer.ice.tag,
@@ -146,7 +152,7 @@ def _own(here: Services, resource: str, identity: Identity) -> Peer:
 
 
 async def _negotiate(
-    here: Services, identity: Identity, offer: str, ice: IceServers, *, trailer: bool
+    here: Services, identity: Identity, offer: str, ice: IceServers, *, trailer: bool, thumbnail: bool
 ) -> tuple[Peer, str]:
     # No STUN server unless asked for: our host candidates are a setting, the peer's address is learnt from its checks.
     own_servers = for_aiortc(ice) if here.settings.relay_console else []
@@ -161,6 +167,7 @@ async def _negotiate(
                 offer,
                 priority=identity.role == "operator",
                 trailer=trailer,
+                thumbnail=thumbnail,
                 voice=None if line is None else line.take,
             )
             try:
@@ -174,6 +181,7 @@ async def _negotiate(
                     lambda name: refused("transport", name).inc(),
                 )
                 peer = Peer(pc, media, session, identity, here.console, here.settings)
+                peer.thumbnail = thumbnail
                 if line is not None:
                     line.peer = peer
                 guard_data(pc, peer.transport_refused)

@@ -9,12 +9,12 @@ from starlette.exceptions import HTTPException
 
 from server import api_recordings
 from server.access import Access
-from server.api_recordings import RecordingService
 from server.errors import ConsoleError, http_error
 from server.front_door import FrontDoor, HostNames
 from server.page import page_router
 from server.rate_limits import RateLimits
 from server.recording.library import FileLibrary
+from server.recording.service import RecordingService
 from server.security import SecurityHeaders
 
 __all__ = ["create_replay_app"]

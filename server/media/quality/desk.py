@@ -4,7 +4,7 @@
 |---|---|---|
 | operator | who holds the control seat; while nobody does, all operators | of the one with the least |
 | high | observers (and other operators) whose paths carry it | all |
-| low | the others | of the one with the least, but no less than a floor and no more than half of high |
+| low | the others, and thumbnails | of the one with the least, but no less than a floor and no more than half of high |
 
 While the operator's pictures are whole and their path shows no limit, the high tier gets the same pictures: one
 encoder serves both. As soon as that ends it has an encoder of its own. So there are at most three encoders for a camera
@@ -87,7 +87,7 @@ class QualityDesk:
         for i, peer in enumerate(observers):
             if (i + self._ticks) % OBSERVER_TICKS == 0:
                 peer.decide(now)
-                peer.tier = peer.choice.decide(peer.path, self._needs(peer), now)
+                peer.tier = "low" if peer.stays_low else peer.choice.decide(peer.path, self._needs(peer), now)
         self._plan_low([peer for peer in observers if peer.tier == "low"], now)
         shared = self._whole_since is not None and now - self._whole_since >= SHARE_AFTER
         for peer in leaders:
@@ -143,7 +143,8 @@ class QualityDesk:
 
     def _plan_low(self, members: list[PeerQuality], now: float) -> None:
         if members:
-            least = min(peer.path.rate for peer in members)
+            watched = [peer for peer in members if not peer.stays_low]
+            least = min((peer.path.rate for peer in watched), default=LOW_FLOOR_BPS)
             most = LOW_SHARE * max(self._needs(peer) for peer in members)
             self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now)
 

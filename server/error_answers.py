@@ -1,0 +1,67 @@
+"""How errors are answered over HTTP: by name, counted, and never cached."""
+
+import msgspec
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from prometheus_client import Counter
+from starlette.exceptions import HTTPException
+from starlette.types import Scope
+
+from server.errors import AccessError, ConsoleError, TooManyRequests, http_error
+from server.house import House
+from server.services import Services
+
+__all__ = ["answer_errors", "count_refused"]
+
+
+def answer_errors(app: FastAPI) -> None:
+    """Everything that a route of `app` raises on purpose. It needs `app.state.house`."""
+    app.add_exception_handler(ConsoleError, _answer_console_error)
+    app.add_exception_handler(HTTPException, _answer_http_exception)
+    app.add_exception_handler(RequestValidationError, _answer_validation_error)
+
+
+def count_refused(scope: Scope, name: str) -> None:
+    """What the front door turned away."""
+    _bad_input(scope["app"].state).labels("http", name).inc()
+
+
+def _bad_input(state: object) -> Counter:
+    """Of the robot whose routes these are; of the house while it has no session, and where there is no robot."""
+    here = getattr(state, "services", None)
+    counted: Counter = here.metrics.bad_input if isinstance(here, Services) else _house(state).metrics.bad_input
+    return counted
+
+
+def _house(state: object) -> House:
+    found = getattr(state, "house", None)
+    if not isinstance(found, House):
+        raise TypeError("the app is not running")
+    return found
+
+
+async def _answer_console_error(request: Request, error: Exception) -> Response:
+    if not isinstance(error, ConsoleError):
+        raise error
+    if isinstance(error, AccessError) and not _house(request.app.state).guard.may_fail(request.scope):
+        error = TooManyRequests("too many requests without a valid token from this address")
+    entry = http_error(error)
+    return _error_response(request, entry.status, entry.name, error.detail, entry.headers)
+
+
+async def _answer_http_exception(request: Request, error: Exception) -> Response:
+    """Routes that do not exist, methods that are not allowed."""
+    if not isinstance(error, HTTPException):
+        raise error
+    name = {404: "not_found", 405: "method_not_allowed"}.get(error.status_code, "http_error")
+    return _error_response(request, error.status_code, name, error.detail, dict(error.headers or {}))
+
+
+async def _answer_validation_error(request: Request, error: Exception) -> Response:
+    return _error_response(request, 422, "bad_parameter", "a parameter has a value that is not allowed", {})
+
+
+def _error_response(request: Request, status: int, name: str, detail: str, headers: dict[str, str]) -> Response:
+    _bad_input(request.app.state).labels("http", name).inc()
+    body = msgspec.json.encode({"error": name, "detail": detail})
+    return Response(body, status, {**headers, "Cache-Control": "no-store"}, media_type="application/json")

@@ -1,0 +1,1 @@
+"""Several robots on one console: a whole session each, one way in."""

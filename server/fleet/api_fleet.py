@@ -1,0 +1,165 @@
+"""The HTTP API of a fleet: the overview's state, STOP for all, health, metrics (docs/console-api.md)."""
+
+import time
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import msgspec
+from fastapi import APIRouter, Depends, Request, Response
+
+from robot_bridge.protocol.console import Role
+from server.access import Identity
+from server.api import StopRequest
+from server.board.board import BoardState
+from server.board.tile import Tile
+from server.body import read_json
+from server.errors import LinkOtherRobot
+from server.fleet.fleet import Fleet, Stopped, fleet_of
+
+__all__ = ["FleetHealth", "FleetInfo", "FleetReadiness", "FleetStop", "RobotTile", "router"]
+
+router = APIRouter()
+
+
+def _fleet_caller(request: Request) -> Identity:
+    return fleet_of(request).caller(request)
+
+
+Caller = Annotated[Identity, Depends(_fleet_caller)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotTile(Tile):
+    """A tile as one caller sees it."""
+
+    role_may_drive: bool
+
+
+class Notice(msgspec.Struct, frozen=True):
+    """For the whole page."""
+
+    level: Literal["warning", "error"]
+    text: str
+
+
+class You(msgspec.Struct, frozen=True):
+    role: Role
+    name: str
+
+
+class FleetInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /api/fleet."""
+
+    you: You
+    time: float  # s since 1970, the console's clock: for people
+    robots: list[RobotTile]  # by name; those that the caller's link is good for
+    consoles: BoardState
+    notices: list[Notice]
+
+
+class StoppedRobot(msgspec.Struct, frozen=True, kw_only=True):
+    name: str
+    delivered: bool
+    event: int
+    detail: str  # why it was not delivered
+    console: str  # that has the robot; "" is this one
+
+
+class FleetStop(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of POST /api/fleet/stop."""
+
+    robots: list[StoppedRobot]
+
+
+class RobotHealth(msgspec.Struct, frozen=True, kw_only=True):
+    robot_link: Literal["up", "down"]
+    detail: str
+
+
+class FleetHealth(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /healthz. `degraded`: the console runs, some robot cannot be reached."""
+
+    status: Literal["ok", "degraded"]
+    robots: dict[str, RobotHealth]
+
+
+class FleetReadiness(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /readyz. A robot that is away does not make a console unready."""
+
+    ready: bool
+    unreachable: list[str]  # names of robots
+
+
+@router.get("/api/fleet")
+async def fleet(request: Request, caller: Caller) -> Response:
+    here = fleet_of(request)
+    may_drive = caller.role != "observer"
+    return _json(
+        FleetInfo(
+            you=You(caller.role, caller.name),
+            time=round(time.time(), 3),
+            robots=[RobotTile(**vars(tile), role_may_drive=may_drive) for tile in here.tiles(caller)],
+            consoles=here.board.state,
+            notices=_notices(here.board.state),
+        )
+    )
+
+
+@router.post("/api/fleet/stop")
+async def stop(request: Request, caller: Caller) -> Response:
+    """Anyone with a token, for every robot that it is good for."""
+    here = fleet_of(request)
+    wanted = await read_json(request, StopRequest)
+    stopped = await here.stop_all(caller, caller.actor, wanted.reason)
+    if not stopped:
+        raise LinkOtherRobot("this link is good for none of the robots here")
+    return _json(FleetStop(robots=[_stopped(each) for each in stopped]))
+
+
+@router.get("/healthz")
+async def healthz(request: Request) -> Response:
+    robots = _health(fleet_of(request))
+    well = all(each.robot_link == "up" for each in robots.values())
+    return _json(FleetHealth(status="ok" if well else "degraded", robots=robots))
+
+
+@router.get("/readyz")
+async def readyz(request: Request) -> Response:
+    robots = _health(fleet_of(request))
+    away = [name for name, each in robots.items() if each.robot_link == "down"]
+    return _json(FleetReadiness(ready=True, unreachable=away))
+
+
+@router.get("/metrics")
+async def metrics(request: Request) -> Response:
+    text = fleet_of(request).metrics.text()
+    return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})
+
+
+def _health(here: Fleet) -> dict[str, RobotHealth]:
+    return {
+        tile.name: RobotHealth(robot_link="up" if tile.link == "up" else "down", detail=tile.detail or tile.trouble)
+        for tile in here.own_tiles()
+    }
+
+
+def _stopped(each: Stopped) -> StoppedRobot:
+    return StoppedRobot(**each._asdict())
+
+
+def _notices(state: BoardState) -> list[Notice]:
+    """What is wrong among the consoles, in words."""
+    found = []
+    if state.unknown_since is not None:
+        since = time.strftime("%H:%M:%S UTC", time.gmtime(state.unknown_since))
+        found.append(Notice("warning", f"Other consoles are unknown since {since}: {state.detail or 'no answer'}"))
+    elif state.detail:
+        found.append(Notice("warning", f"Other consoles may not see this one: {state.detail}"))
+    for each in state.conflicts:
+        names = " and ".join(each.consoles)
+        found.append(Notice("error", f"{each.error}: {names} both say that they have the robot {each.robot!r}."))
+    return found
+
+
+def _json(answer: msgspec.Struct) -> Response:
+    return Response(msgspec.json.encode(answer), media_type="application/json", headers={"Cache-Control": "no-store"})

@@ -1,0 +1,207 @@
+"""All robots of one console: their sessions, who may see which, STOP for all, and the board of other consoles."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import structlog
+from starlette.requests import HTTPConnection
+
+from server.access import Access, Identity
+from server.audit import Actor, AuditRecord
+from server.board.board import Board
+from server.board.memory_board import MemoryBoard
+from server.board.tile import Tile
+from server.fleet.fleet_metrics import FleetMetrics
+from server.fleet.session import FleetSession
+from server.fleet.tiles import UNREADABLE, absent_tile, tile_of
+from server.house import House
+from server.invitations import Invitation
+from server.settings import Settings
+from server.state_dir import StateDir
+from server.sweeper import sweep_forever
+
+__all__ = ["Fleet", "Stopped", "fleet_of"]
+
+log = structlog.get_logger(__name__)
+
+LOOK_SECONDS = 1.0  # between two looks at every robot
+START_SECONDS = 20.0  # that the console waits for its sessions before it answers
+RESTART_AFTER = 1.0  # s until a background task that failed runs again
+ELSEWHERE = Actor("another console")
+KEPT = "It could not be told; the stop is kept and sent first when the link is back."
+
+
+class Stopped(NamedTuple):
+    """What became of a STOP at one robot."""
+
+    name: str
+    delivered: bool
+    event: int
+    detail: str  # why it was not delivered; "" when it was
+    console: str = ""  # that has the robot; "" is this one
+
+
+class Fleet:
+    """Enter `running` once. Everything else is called on the same loop and returns at once, but for `stop_all`.
+
+    Attributes:
+        sessions: by the robots' names
+        board: where other consoles are; it never decides anything about a robot of ours
+    """
+
+    def __init__(self, robots: Mapping[str, Settings]) -> None:
+        self.metrics = FleetMetrics()
+        self.sessions = {name: FleetSession(name, settings) for name, settings in robots.items()}
+        self.board: Board = MemoryBoard()
+        self.metrics.robots.set(len(self.sessions))
+        self._house: House | None = None
+        self._door: Access | None = None
+
+    @asynccontextmanager
+    async def running(self, house: House, board: Board) -> AsyncIterator[None]:
+        """While entered, all sessions run. On entering it waits for their starts, but not long for one that hangs."""
+        self._house, self._door, self.board = house, house.state.access.at(None), board
+        directory = house.state.directory.path
+        async with asyncio.TaskGroup() as tasks:
+            running = [
+                tasks.create_task(self._run_session(each, house, directory), name=f"robot {name}")
+                for name, each in self.sessions.items()
+            ]
+            running += [
+                tasks.create_task(house.run(), name="links"),
+                tasks.create_task(self._guard("fleet", self._look), name="fleet"),
+                tasks.create_task(self._guard("board", board.run), name="board"),
+                tasks.create_task(sweep_forever(self._ended, self._moving), name="sweeper"),
+            ]
+            settled = [tasks.create_task(each.settled.wait()) for each in self.sessions.values()]
+            await asyncio.wait(settled, timeout=START_SECONDS)
+            yield
+            for task in (*running, *settled):
+                task.cancel()
+
+    # who may
+
+    def caller(self, connection: HTTPConnection) -> Identity:
+        """Whose link a request brings. Raises AccessError."""
+        if self._door is None:
+            raise TypeError("the fleet is not running")
+        return self._door.bearer(connection.headers.get("authorization"))
+
+    def may(self, identity: Identity, name: str) -> bool:
+        """Whether that link is good for that robot."""
+        return identity.may_see(name)
+
+    # what there is to see
+
+    def own_tiles(self) -> list[Tile]:
+        now = time.monotonic()
+        return [self._tile(session, now) for session in self.sessions.values()]
+
+    def tiles(self, identity: Identity) -> list[Tile]:
+        """Of all robots, other consoles' too, that this link may see; by name."""
+        found = [tile for tile in (*self.own_tiles(), *self.board.others()) if identity.may_see(tile.name)]
+        return sorted(found, key=lambda tile: (tile.name, tile.console))
+
+    def _tile(self, session: FleetSession, now: float) -> Tile:
+        """A fault with one robot must not hide the others."""
+        here = session.services
+        if here is None:
+            return absent_tile(session.name)
+        try:
+            return tile_of(here, session.pulse, now)
+        except Exception:
+            here.metrics.internal_errors.labels("tile").inc()
+            log.exception("a robot cannot be shown", robot=session.name)
+            return absent_tile(session.name, UNREADABLE)
+
+    # STOP
+
+    async def stop_all(self, identity: Identity, by: Actor, reason: str) -> list[Stopped]:
+        """Every robot that this link may see: our own at once, then those of other consoles."""
+        self.metrics.stops.inc()
+        found = [
+            self._stop(session, by, "http", reason) for name, session in self.sessions.items() if identity.may_see(name)
+        ]
+        self.board.publish(self.own_tiles())
+        elsewhere = {tile.name: tile for tile in self.board.others() if identity.may_see(tile.name)}
+        if elsewhere:
+            answers = await self.board.stop(elsewhere.keys(), by, reason)
+            found += [
+                Stopped(name, answer.delivered, answer.event, answer.detail, elsewhere[name].console)
+                for name, answer in answers.items()
+            ]
+        return sorted(found)
+
+    def _stop(self, session: FleetSession, by: Actor, where: str, reason: str) -> Stopped:
+        """A fault with one robot must not keep the stop from the others."""
+        try:
+            delivered, event = session.stop(by, where, reason)
+        except Exception:
+            self.metrics.internal_errors.labels("stop").inc()
+            log.exception("a robot could not be stopped", robot=session.name)
+            return Stopped(session.name, False, 0, UNREADABLE)
+        return Stopped(session.name, delivered, event, "" if delivered else KEPT)
+
+    # BoardHost
+
+    def stop_robot(self, name: str, by: Actor, reason: str) -> tuple[bool, int]:
+        """Somebody stops it at another console."""
+        session = self.sessions.get(name)
+        if session is None:
+            return False, 0
+        stopped = self._stop(session, by, "board", reason)
+        return stopped.delivered, stopped.event
+
+    def links_revoked(self, ended: list[Invitation]) -> None:
+        if self._house is not None:
+            self._house.enforce(ended, ELSEWHERE)
+
+    # background tasks
+
+    async def _run_session(self, session: FleetSession, house: House, directory: Path) -> None:
+        """Each has a directory of its own for recordings and audit."""
+        own = StateDir(directory / "robots" / session.name)
+        await session.run(house, own, self.metrics, self._recorded)
+
+    def _recorded(self, robot: str, record: AuditRecord) -> None:
+        try:
+            self.board.record(robot, record)
+        except Exception:
+            self.metrics.internal_errors.labels("board").inc()
+            log.exception("a record could not be shared")
+
+    async def _look(self) -> None:
+        while True:
+            now = time.monotonic()
+            for session in self.sessions.values():
+                session.look(now)
+            self.board.publish(self.own_tiles())
+            await asyncio.sleep(LOOK_SECONDS)
+
+    def _ended(self) -> int:
+        return sum(session.ended for session in self.sessions.values())
+
+    def _moving(self) -> bool:
+        return any(session.moving for session in self.sessions.values())
+
+    async def _guard(self, name: str, task: Callable[[], Awaitable[None]]) -> None:
+        """Runs `task` again when it fails."""
+        while True:
+            try:
+                await task()
+            except Exception:
+                self.metrics.internal_errors.labels(name).inc()
+                log.exception("background task failed", task=name)
+            await asyncio.sleep(RESTART_AFTER)
+
+
+def fleet_of(connection: HTTPConnection) -> Fleet:
+    """The fleet that a request came to."""
+    found = connection.app.state.fleet
+    if not isinstance(found, Fleet):
+        raise TypeError("the app has no fleet")
+    return found

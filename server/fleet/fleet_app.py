@@ -1,0 +1,69 @@
+"""The app of a console with several robots: the overview in front, and each robot's routes below /robots/NAME/."""
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+
+import msgspec
+from fastapi import Depends, FastAPI, Request, Response
+from starlette.routing import Mount
+
+from server.app import guard_app, restrict_ice, same_origin
+from server.error_answers import answer_errors
+from server.errors import NotFound
+from server.fleet import api_fleet
+from server.fleet.fleet import Fleet, fleet_of
+from server.fleet.fleet_openapi import fleet_openapi
+from server.guard import Guard
+from server.house import House
+from server.page import page_router
+from server.robot_paths import ROBOTS
+from server.settings import Settings
+from server.state import ConsoleState, open_state
+
+__all__ = ["create_fleet_app"]
+
+
+def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: ConsoleState | None = None) -> FastAPI:
+    """The app. It connects to the robots while its lifespan runs; `robots` are their settings by name."""
+    fleet = Fleet(robots)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        opened = state or open_state(settings)
+        restrict_ice(settings)
+        guard = Guard(settings)
+        house = House(opened, guard, fleet.metrics, settings.max_total_peers, settings.reserved_places)
+        app.state.house = house
+        async with fleet.running(house, fleet.board):
+            yield
+
+    app = FastAPI(
+        title="Lockstep fleet",
+        lifespan=lifespan,
+        dependencies=[Depends(same_origin)],
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+    )
+    app.state.settings = settings
+    app.state.fleet = fleet
+    app.include_router(api_fleet.router)
+    app.add_api_route("/openapi.json", _describe, include_in_schema=False)
+    for name, session in fleet.sessions.items():
+        app.router.routes.append(Mount(f"{ROBOTS}/{name}", app=session.app))
+    app.add_api_route(f"{ROBOTS}/{{name}}", _with_slash, include_in_schema=False)
+    app.include_router(page_router(first="fleet.html", of_robot=False))
+    answer_errors(app)
+    guard_app(app, settings)
+    return app
+
+
+async def _with_slash(request: Request, name: str) -> Response:
+    """Pages find everything by their own address, which ends with a slash. A browser keeps the fragment."""
+    if name not in fleet_of(request).sessions:
+        raise NotFound("no such robot")
+    return Response(status_code=308, headers={"Location": f"{name}/"})
+
+
+async def _describe() -> Response:
+    return Response(msgspec.json.encode(fleet_openapi()), media_type="application/json")

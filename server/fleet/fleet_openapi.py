@@ -1,0 +1,39 @@
+"""The OpenAPI document of a fleet: its own operations, and those of each robot below /robots/{robot}."""
+
+from typing import Any
+
+from server.api import StopRequest
+from server.errors import LinkOtherRobot, NotFound, RobotFailed
+from server.fleet.api_fleet import FleetHealth, FleetInfo, FleetReadiness, FleetStop
+from server.fleet.robot_names import NAME_PATTERN
+from server.openapi import OPERATIONS, WITH_JSON, Operation, Parameter, openapi_document
+from server.robot_paths import ROBOTS
+
+__all__ = ["FLEET_OPERATIONS", "fleet_openapi"]
+
+ROBOT = Parameter("robot", "path", {"type": "string", "pattern": f"^{NAME_PATTERN}$"}, required=True)
+
+FLEET_OPERATIONS: tuple[Operation, ...] = (
+    Operation("get", "/api/fleet", "All robots that the link is good for.", 200, FleetInfo),
+    Operation(
+        *("post", "/api/fleet/stop", "Stop all of them, latched. From every role.", 200, FleetStop),
+        errors=(LinkOtherRobot, *WITH_JSON),
+        body=StopRequest,
+    ),
+    Operation("get", "/healthz", "Whether the console runs, and reaches its robots.", 200, FleetHealth, token=False),
+    Operation("get", "/readyz", "Whether the console serves.", 200, FleetReadiness, token=False),
+    Operation("get", "/metrics", "Prometheus; the label robot names one.", 200, "text/plain", token=False),
+)
+
+
+def fleet_openapi() -> dict[str, Any]:
+    """OpenAPI 3.1, in JSON's types alone."""
+    of_robots = [
+        each._replace(
+            path=f"{ROBOTS}/{{robot}}{each.path}",
+            errors=(*each.errors, NotFound, RobotFailed),
+            parameters=(ROBOT, *each.parameters),
+        )
+        for each in OPERATIONS
+    ]
+    return openapi_document((*FLEET_OPERATIONS, *of_robots))

@@ -1,0 +1,122 @@
+"""One robot's whole session: console, media, seat, recorder, scene, audit. Everything that one robot does not share."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from server.audit_log import AuditLog, open_audit_log
+from server.console import Console
+from server.event_clock import EventClock
+from server.house import House
+from server.link_warden import LinkWarden
+from server.log_context import follow_clock
+from server.media.plane import MediaPlane
+from server.media.sources.desk import SourceDesk
+from server.metrics import Metrics
+from server.recording.library import ConsoleLibrary
+from server.recording.recorder import Recorder, recordings_directory
+from server.recording.service import RecordingService
+from server.recording.shelf import Shelf
+from server.relay.desk import RelayDesk, RelayedMedia
+from server.relay.engines import relay_engines
+from server.scene import SceneView
+from server.services import Services
+from server.settings import Settings
+from server.state_dir import StateDir
+from server.voice import VoiceService
+
+__all__ = ["running_session"]
+
+
+@asynccontextmanager
+async def running_session(
+    settings: Settings, house: House, metrics: Metrics, directory: StateDir, robot: str = ""
+) -> AsyncIterator[Services]:
+    """While entered, the session runs. A fault in a task of its own ends it, and comes out as an ExceptionGroup.
+
+    Args:
+        directory: where it keeps what is its own
+        robot: its name in a fleet; "" is the only robot of a console
+    """
+    with open_audit_log(directory, settings) as audit:
+        async with _session(settings, house, metrics, directory, robot, audit) as made:
+            house.wardens.append(made.warden)
+            try:
+                yield made
+            finally:
+                house.wardens.remove(made.warden)
+
+
+@asynccontextmanager
+async def _session(
+    settings: Settings, house: House, metrics: Metrics, directory: StateDir, robot: str, audit: AuditLog
+) -> AsyncIterator[Services]:
+    access = house.state.access.at(robot)
+    media = MediaPlane(settings.media, metrics.registry, settings.sources)
+    scene = await _start_scene(settings, metrics)
+    clock = EventClock()
+    shelf = Shelf(recordings_directory(settings.recording, directory.path), settings.recording)
+    recorder = Recorder(settings.recording, shelf, clock, media, lambda news: console.peers.tell("session", news))
+    engines = relay_engines(settings, media, house.state.signing_key(settings) + robot)
+    relays = RelayDesk(settings, engines, lambda: console.peers)
+    console = Console(settings, metrics, RelayedMedia(media, relays), scene, audit, clock, recorder)
+    console.peers.relays.append(relays)
+    console.peers.further_bounds.append(house.check_room)
+    console.further_news.append(recorder.state)
+    sources = SourceDesk(
+        settings.sources, console.clock, media, metrics.registry, lambda news: console.peers.tell("session", news)
+    )
+    if sources.sources:
+        console.further_news.append(sources.state)
+    voice = VoiceService(
+        settings.speaker_spec,
+        console.seat.rules.holds,
+        metrics.registry,
+        lambda news: console.peers.tell("session", news),
+    )
+    if voice.enabled:
+        console.further_news.append(voice.state)
+    follow_clock(console.clock, robot)
+    audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
+    made = Services(
+        robot=robot,
+        settings=settings,
+        metrics=metrics,
+        console=console,
+        media=media,
+        house=house,
+        access=access,
+        audit=audit,
+        warden=LinkWarden(house.state.invitations, console.peers, console.audit, robot),
+        scene=scene,
+        recorder=recorder,
+        relays=relays,
+        voice=voice,
+        recordings=RecordingService(ConsoleLibrary(recorder), access),
+    )
+    try:
+        async with asyncio.TaskGroup() as tasks:
+            running = [
+                tasks.create_task(console.run(), name="console"),
+                tasks.create_task(sources.run(), name="sources"),
+                tasks.create_task(voice.run(), name="voice"),
+                tasks.create_task(recorder.run(), name="recorder"),
+                tasks.create_task(relays.run(), name="relays"),
+            ]
+            if scene is not None:
+                running.append(tasks.create_task(scene.run(), name="scene"))
+            yield made
+            for task in running:
+                task.cancel()
+    finally:
+        await media.close()
+        if scene is not None:
+            await scene.close()
+
+
+async def _start_scene(settings: Settings, metrics: Metrics) -> SceneView | None:
+    if not settings.scene:
+        return None
+    scene = SceneView(settings.scene_hz, settings.max_scene_viewers, metrics)
+    await scene.start()
+    return scene
