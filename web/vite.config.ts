@@ -8,7 +8,7 @@ export default defineConfig({
     target: "es2023",
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
-    rolldownOptions: { input: ["index.html", "recordings.html"] },
+    rolldownOptions: { input: ["index.html", "recordings.html", "fleet.html"] },
   },
   worker: { format: "es" },
   server: { fs: { allow: [".."] } },

@@ -43,6 +43,7 @@ import { createStatusBar } from "./ui/status_bar";
 import { createStopPanel } from "./ui/stop_panel";
 import { createStreamTable } from "./ui/stream_table";
 import { Tabs, type Tab } from "./ui/tabs";
+import { watchTouch } from "./ui/touch_mark";
 import { ViewBoard } from "./ui/view_board";
 
 const REDRAW_MS = 66;
@@ -256,11 +257,4 @@ export class Page {
 function openRecordings(): void {
   const { token } = readFragment(location.hash);
   window.open(`./recordings${replayHash({ token: token ?? "", recording: null, event: null })}`, "_blank");
-}
-
-/** On-screen sticks appear where fingers are. */
-function watchTouch(): void {
-  const html = document.documentElement;
-  if (matchMedia("(pointer: coarse)").matches) setData(html, "touch", "true");
-  addEventListener("touchstart", () => setData(html, "touch", "true"), { once: true, passive: true });
 }

@@ -19,6 +19,7 @@ export interface ReplayFeedback {
   readonly axes: readonly number[];
   readonly joints: readonly number[];
   readonly wrench: readonly number[];
+  readonly ranges: readonly number[];
   readonly atRest: boolean;
   readonly stopped: boolean;
   readonly stopBy: string;
@@ -120,6 +121,7 @@ function parseFeedback(value: unknown, arrived: number): ReplayFeedback[] {
       axes: numbers(value["axes"]),
       joints: numbers(value["joints"]),
       wrench: numbers(value["wrench"]),
+      ranges: numbers(value["ranges"]),
       atRest: value["at_rest"] !== false,
       stopped: stop["stopped"] === true,
       stopBy: text(stop["by"]),

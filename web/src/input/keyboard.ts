@@ -19,6 +19,12 @@ const ANSWER_KEYS: ReadonlyMap<string, boolean> = new Map([
 export const FIELDS = "input, textarea, select";
 const CONTROLS = "button, a, summary, [role=button]";
 
+/** Whether this key says STOP: everywhere, but that a field keeps the one that deletes in it. */
+export function isStopKey(event: KeyboardEvent): boolean {
+  const inField = event.target instanceof Element && event.target.matches(FIELDS);
+  return STOP_KEYS.has(event.code) && !(inField && event.code === "Backspace");
+}
+
 /** Keys held now. While armed, keys drive; else they work the page as anywhere. */
 export class Keyboard {
   readonly keys = new Set<string>();
@@ -55,7 +61,7 @@ export class Keyboard {
   private down(event: KeyboardEvent): void {
     const target = event.target instanceof Element ? event.target : null;
     const inField = target?.matches(FIELDS) ?? false;
-    if (STOP_KEYS.has(event.code) && !(inField && event.code === "Backspace")) {
+    if (isStopKey(event)) {
       event.preventDefault();
       if (!event.repeat) this.events.stop();
       return;

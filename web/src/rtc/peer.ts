@@ -22,6 +22,7 @@ export interface PeerOptions {
   readonly trailer: boolean; // the event reference travels in trailers
   readonly relayOnly: boolean; // through TURN or not at all
   readonly watches: boolean; // the link is an observer's: the console may send it to a relay
+  readonly thumbnail?: boolean; // one camera, small, without sound, nobody to be listed
 }
 
 /** How a connection ended. */
@@ -83,7 +84,8 @@ export class Peer {
     const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(CONNECT_LIMIT_MS)]);
     // Without an answer about relays there is still the console.
     const ticket = this.options.watches ? await this.api.relay("", "", signal).catch(() => null) : null;
-    if (ticket === null) await this.connectForMedia(signal);
+    if (this.options.thumbnail === true) await this.connectSmall(signal);
+    else if (ticket === null) await this.connectForMedia(signal);
     else await this.connectBeside(ticket, signal);
     this.connection.onicegatheringstatechange = () => this.sendCandidates();
     this.sendCandidates();
@@ -107,6 +109,14 @@ export class Peer {
       },
     );
     void this.relay.watch(ticket);
+  }
+
+  /** For one picture. Nothing has to be asked first: a robot has a first camera or none. */
+  private async connectSmall(signal: AbortSignal): Promise<void> {
+    await this.refresh().catch(() => undefined);
+    const trailer = this.addSections(1, 0);
+    await this.connection.setLocalDescription();
+    await this.exchange(trailer ? "view=thumbnail&stamp=trailer" : "view=thumbnail", signal);
   }
 
   private async connectForMedia(signal: AbortSignal): Promise<void> {

@@ -1,0 +1,27 @@
+/** Links between the overview and the page of one robot. What stands behind the `#` goes along: token, name, carrier. */
+
+/** The robot's page. null: the address is none that a browser should follow. */
+export function robotPage(url: string, hash: string, base: string): string | null {
+  if (!URL.canParse(url, base)) return null;
+  const found = new URL(url, base);
+  if (!/^https?:$/.test(found.protocol)) return null;
+  const fields = new URLSearchParams(hash.replace(/^#/, ""));
+  fields.set("from", "fleet");
+  found.hash = `#${fields}`;
+  return found.href;
+}
+
+/** The overview that a robot's page was opened from; null when it was not. */
+export function overviewPage(hash: string, page: string): string | null {
+  const fields = new URLSearchParams(hash.replace(/^#/, ""));
+  if (fields.get("from") !== "fleet") return null;
+  fields.delete("from");
+  const found = new URL("../../", page);
+  found.hash = `#${fields}`;
+  return found.href;
+}
+
+/** Whether this page may ask there: another console's pictures are shown by its own pages. */
+export function isOwnOrigin(url: string, base: string): boolean {
+  return URL.canParse(url, base) && new URL(url, base).origin === new URL(base).origin;
+}

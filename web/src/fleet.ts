@@ -1,0 +1,24 @@
+import "./style/fonts.css";
+import "./style/base.css";
+import "./style/layout.css";
+import "./style/views.css";
+import "./style/panels.css";
+import "./style/deck.css";
+import "./style/controls.css";
+import "./style/library.css";
+import "./style/fleet.css";
+import "./style/fleet_tiles.css";
+import { readFragment } from "./core/fragment";
+import { installFleetHook } from "./fleet/fleet_hook";
+import { FleetPage } from "./fleet/fleet_page";
+import { ConsoleApi } from "./rtc/console_api";
+import { watchTouch } from "./ui/touch_mark";
+
+const link = readFragment(location.hash);
+const page = new FleetPage(new ConsoleApi(link.token ?? ""), link);
+installFleetHook(page);
+watchTouch();
+page.start();
+
+// Another link pasted into the same tab changes only the fragment.
+addEventListener("hashchange", () => location.reload());

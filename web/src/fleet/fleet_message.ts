@@ -1,0 +1,64 @@
+import type { FleetTrouble } from "../core/fleet_news";
+import { tokenIn } from "../core/replay_link";
+import { END_WORDS, TROUBLE_WORDS, type Words } from "../core/trouble";
+import { button, h, setText } from "../ui/dom";
+
+/** Why there are no tiles, and what to do about it. `field`: where another link can be pasted. */
+export interface FleetMessage extends Words {
+  readonly key: string; // the same key is the same message
+  readonly action: "paste" | "clear" | null;
+}
+
+export const NO_LINK: FleetMessage = {
+  key: "no_link",
+  title: "Open the link",
+  text: "This page needs the link that lockstep serve printed, or one that somebody gave you: it ends in #token=… Paste it here.",
+  action: "paste",
+};
+
+export const NO_ROBOTS: FleetMessage = {
+  key: "no_robots",
+  title: "No robots",
+  text: "Your link is good for none of this console’s robots. Ask whoever runs it for a link that names one.",
+  action: "paste",
+};
+
+export function notFound(query: string): FleetMessage {
+  return {
+    key: `not_found ${query}`,
+    title: "No robot found",
+    text: `No name has “${query}” in it.`,
+    action: "clear",
+  };
+}
+
+export function shutOut(trouble: FleetTrouble): FleetMessage {
+  const words = "ended" in trouble ? END_WORDS[trouble.ended] : TROUBLE_WORDS[trouble.why];
+  return { key: words.title, ...words, action: "paste" };
+}
+
+/** `clear`: shows all robots again. */
+export function messageElement(message: FleetMessage, clear: () => void): HTMLElement {
+  const title = h("h2", "message-title", {}, message.title);
+  const text = h("p", "message-text", { role: "status" }, message.text);
+  const element = h("div", "fleet-message", {}, title, text);
+  if (message.action === "clear") element.append(button("field-button", "Show all robots", clear));
+  if (message.action === "paste") element.append(pasteForm());
+  return element;
+}
+
+function pasteForm(): HTMLElement {
+  const field = h("input", "field", { type: "password", "aria-label": "Your link", autocomplete: "off" });
+  const trouble = h("p", "library-trouble", { role: "alert" });
+  trouble.hidden = true;
+  setText(trouble, "This is no link of a console: it has no token behind the #.");
+  const send = h("button", "field-button", { type: "submit" }, "Open");
+  const form = h("form", "message-form", {}, field, send, trouble);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const token = tokenIn(field.value);
+    trouble.hidden = token !== "";
+    if (token !== "") location.hash = `#${new URLSearchParams({ token })}`;
+  });
+  return form;
+}

@@ -1,0 +1,131 @@
+import type { FleetRobot } from "../core/fleet_answer";
+import { robotPage } from "../core/fleet_link";
+import { gapWords, pictureWords } from "../core/tile_figures";
+import type { TileState } from "../core/tile_state";
+import { grouped, h, setData, setHidden, setText } from "../ui/dom";
+import type { Thumbnail } from "./thumbnail";
+import { createTileIcon } from "./tile_icon";
+
+/** One robot in the overview. Lives as long as the console tells of the robot. */
+export class Tile {
+  readonly canvas = h("canvas", "picture", { role: "img", width: "320", height: "240" });
+  readonly element: HTMLLIElement;
+  robot: FleetRobot | null = null;
+  state: TileState | null = null;
+  thumbnail: Thumbnail | null = null; // the live picture; null: it has none
+  instead: string | null = ""; // why it has none; null while it has one
+  pictureSays: string | null = null; // why its picture is not live
+  private readonly label = h("span", "tile-label");
+  private readonly recording = h("span", "tile-recording", {}, "Rec");
+  private readonly veil = h("div", "veil");
+  private readonly veilWords = h("strong", "veil-words");
+  private readonly pictureGap = h("span", "tile-gap");
+  private readonly icon = createTileIcon();
+  private readonly stateWords = h("span", "tile-words");
+  private readonly stateMore = h("span", "tile-more");
+  private readonly figures = {
+    gap: createFigure("Driver’s gap"),
+    event: createFigure("Event"),
+    rate: createFigure("Events/s"),
+    people: createFigure("People"),
+  };
+  private readonly openWords = h("span");
+  private readonly link = h("a", "tile-open", {}, this.openWords);
+  private isPointedAt = false;
+
+  constructor(readonly name: string) {
+    const id = `robot-${name}`;
+    const title = h("h2", "tile-name", { id }, name);
+    this.veil.append(h("div", "veil-plate", {}, this.veilWords));
+    this.canvas.setAttribute("aria-label", `Live picture of ${name}`);
+    this.link.append(h("span", "unseen", {}, `: ${name}`));
+    this.recording.setAttribute("title", "This robot’s session is recorded");
+    const body = h(
+      "article",
+      "tile",
+      { "aria-labelledby": id },
+      h("header", "tile-head", {}, title, this.label, this.recording),
+      h("div", "tile-picture", {}, this.canvas, this.veil, this.pictureGap),
+      h(
+        "div",
+        "tile-state",
+        {},
+        this.icon.element,
+        h("p", "tile-says", {}, this.stateWords, this.stateMore),
+        this.link,
+      ),
+      h("dl", "tile-figures", {}, ...Object.values(this.figures).map((figure) => figure.element)),
+    );
+    this.element = h("li", "tile-place", { "data-robot": name }, body);
+    this.element.addEventListener("pointerenter", () => (this.isPointedAt = true));
+    this.element.addEventListener("pointerleave", () => (this.isPointedAt = false));
+    this.showPicture(performance.now());
+  }
+
+  /** Whether somebody points at it, or has the keyboard there. */
+  hasAttention(): boolean {
+    return this.isPointedAt || this.element.contains(document.activeElement);
+  }
+
+  /** What the console told last. */
+  show(robot: FleetRobot, state: TileState): void {
+    this.robot = robot;
+    this.state = state;
+    setData(this.element, "kind", state.kind);
+    setData(this.element, "tone", state.tone);
+    setText(this.label, robot.label === robot.name ? "" : robot.label);
+    setHidden(this.recording, !robot.recording || state.kind === "unknown");
+    this.icon.show(state.kind);
+    setText(this.stateWords, state.words);
+    setText(this.stateMore, state.more);
+    setHidden(this.stateMore, state.more === "");
+    this.showFigures(robot);
+    this.showLink(robot);
+  }
+
+  /** The picture and its veil, as they are now. */
+  showPicture(now: number): void {
+    const video = this.thumbnail?.video ?? null;
+    const words = pictureWords(this.state?.kind ?? null, this.instead, this.thumbnail?.veil(now) ?? null);
+    const wasDrawn = (video?.lastDrawnMs ?? null) !== null;
+    setData(this.element, "picture", words === null ? "live" : wasDrawn ? "stale" : "none");
+    this.pictureSays = words;
+    setHidden(this.veil, words === null);
+    if (words !== null) setText(this.veilWords, words);
+    const gap = video?.gate.counts.gap ?? null;
+    setHidden(this.pictureGap, words !== null || gap === null);
+    if (gap !== null) setText(this.pictureGap, `gap ${gapWords(gap, this.thumbnail?.tolerance ?? null)}`);
+  }
+
+  private showFigures(robot: FleetRobot): void {
+    const { gap, event, rate, people } = this.figures;
+    gap.show(gapWords(robot.gap, robot.tolerance));
+    event.show(robot.event === 0 ? "–" : grouped(robot.event));
+    rate.show(robot.eventRate.toFixed(robot.eventRate < 9.95 ? 1 : 0));
+    people.show(`${robot.peopleCount}`, robot.people.join(", "));
+  }
+
+  private showLink(robot: FleetRobot): void {
+    const href = robotPage(robot.url, location.hash, document.baseURI);
+    setText(this.openWords, robot.mayDrive ? "Open to drive" : "Open to watch");
+    if (href === null) this.link.removeAttribute("href");
+    else if (this.link.getAttribute("href") !== href) this.link.setAttribute("href", href);
+  }
+}
+
+interface Figure {
+  readonly element: HTMLElement;
+  show(text: string, title?: string): void;
+}
+
+function createFigure(label: string): Figure {
+  const value = h("dd");
+  const element = h("div", "tile-figure", {}, h("dt", "", {}, label), value);
+  return {
+    element,
+    show(text, title = "") {
+      setText(value, text);
+      if (element.title !== title) element.title = title;
+    },
+  };
+}
