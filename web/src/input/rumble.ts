@@ -42,8 +42,8 @@ export class Rumble {
 }
 
 /** What browsers with the older interface have instead. */
-interface PulseActuator extends GamepadHapticActuator {
-  pulse?(value: number, duration: number): Promise<boolean>;
+interface PulseActuator {
+  readonly pulse?: (value: number, duration: number) => Promise<boolean>;
 }
 
 function actuatorOf(gamepad: Gamepad): GamepadHapticActuator | null {
@@ -54,15 +54,15 @@ function actuatorOf(gamepad: Gamepad): GamepadHapticActuator | null {
   return vibrationActuator ?? hapticActuators?.[0] ?? null;
 }
 
-function play(actuator: PulseActuator, effect: RumbleEffect): Promise<unknown> {
+function play(actuator: GamepadHapticActuator | PulseActuator, effect: RumbleEffect): Promise<unknown> {
   if (!("playEffect" in actuator))
-    return (actuator as PulseActuator).pulse?.(effect.weakMagnitude, effect.duration) ?? Promise.resolve();
+    return actuator.pulse?.(effect.weakMagnitude, effect.duration) ?? Promise.resolve();
   const effects = (actuator as { effects?: readonly string[] }).effects ?? [];
   const kind = effects.includes("trigger-rumble") ? "trigger-rumble" : "dual-rumble";
   return actuator.playEffect(kind, effect);
 }
 
-function reset(actuator: PulseActuator): Promise<unknown> {
+function reset(actuator: GamepadHapticActuator | PulseActuator): Promise<unknown> {
   if ("reset" in actuator) return actuator.reset();
-  return (actuator as PulseActuator).pulse?.(0, 0) ?? Promise.resolve();
+  return actuator.pulse?.(0, 0) ?? Promise.resolve();
 }

@@ -15,6 +15,7 @@ import { downloadRecording, mayDownload } from "./list_view";
 import { MarkList } from "./mark_list";
 import { Player, type ShownMoment } from "./player";
 import type { RecordingDetails, RecordingsApi } from "./recordings_api";
+import { SceneCard } from "./scene_card";
 import { SoundCard } from "./sound_card";
 import { Timeline } from "./timeline";
 import { createTransport, type Transport } from "./transport";
@@ -38,6 +39,7 @@ export class PlayerView {
   private readonly when = h("span", "event-rate");
   private readonly state = h("p", "replay-state");
   private readonly trouble = h("p", "library-trouble", { role: "alert" });
+  readonly scene: SceneCard | null; // null: the robot does not describe its shape
   private readonly axes: AxisRows | null;
   private readonly gauge: { element: HTMLElement; update(now: number): void } | null;
   private readonly force: Parameters<typeof createForceGauge>[0] & {
@@ -75,15 +77,17 @@ export class PlayerView {
       () => this.update(),
     );
     this.transport = createTransport(this.player, () => this.marks.shown);
-    const pictures = h("div", "replay-pictures", { "data-count": String(this.player.cameras.length) });
+    this.scene = description === null || description.bodies.length === 0 ? null : new SceneCard(description);
+    const views = this.player.cameras.length + (this.scene === null ? 0 : 1);
+    const pictures = h("div", "replay-pictures", { "data-count": String(views) });
     for (const topic of this.player.cameras) {
       const name = topic.slice(CAMERA.length);
       const view = createCameraView(name, labels.get(name) ?? name);
       this.cameras.set(topic, view);
       pictures.append(view.element);
     }
-    if (this.player.cameras.length === 0)
-      pictures.append(h("p", "replay-empty", {}, "This recording has no pictures."));
+    if (this.scene !== null) pictures.append(this.scene.element);
+    if (views === 0) pictures.append(h("p", "replay-empty", {}, "This recording has no pictures."));
     const event = h(
       "section",
       "card event",
@@ -114,6 +118,7 @@ export class PlayerView {
 
   close(): void {
     this.player.close();
+    this.scene?.close();
   }
 
   /** Left and right step, space plays; true: it was one of these. */
@@ -154,6 +159,7 @@ export class PlayerView {
         this.rendered.set(topic.slice(CAMERA.length), [{ stamp, event }]);
     }
     const { feedback, command } = moment;
+    this.scene?.show(event, feedback);
     const description = this.player.description;
     const unknown = new Set(
       feedback?.unknown.map((name) => description?.axes.findIndex((axis) => axis.name === name) ?? -1),

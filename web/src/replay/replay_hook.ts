@@ -11,7 +11,7 @@ export function installReplayHook(view: PlayerView | null): void {
   });
 }
 
-function statsOf({ player, sounds }: PlayerView): object {
+function statsOf({ player, sounds, scene }: PlayerView): object {
   const { shown, place, isLoading, isPlaying, index } = player;
   const moment = shown?.moment;
   return {
@@ -25,6 +25,7 @@ function statsOf({ player, sounds }: PlayerView): object {
     ended: index.ended,
     command: moment?.command ?? null,
     feedback: moment?.feedback ?? null,
+    scene: scene?.statistics() ?? null,
     troubles: Object.fromEntries(shown?.troubles ?? []),
     pictures: Object.fromEntries(
       [...(moment?.pictures ?? [])].map(([topic, { record }]) => [topic.slice(CAMERA.length), record.event]),

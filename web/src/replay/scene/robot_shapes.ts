@@ -1,0 +1,43 @@
+import {
+  BoxGeometry,
+  CapsuleGeometry,
+  Color,
+  CylinderGeometry,
+  Mesh,
+  MeshStandardMaterial,
+  SphereGeometry,
+  SRGBColorSpace,
+  type BufferGeometry,
+} from "three";
+import type { Geom } from "../../wire";
+
+const ROUND = 28; // segments of a circle
+
+/** One shape of a robot's description. */
+export function shapeOf(geom: Geom): Mesh {
+  const mesh = new Mesh(geometryOf(geom), materialOf(geom.rgba));
+  const [w, x, y, z] = geom.orientation;
+  mesh.position.fromArray([...geom.position]);
+  mesh.quaternion.set(x, y, z, w);
+  return mesh;
+}
+
+function geometryOf({ shape, size }: Geom): BufferGeometry {
+  const [first, second, third] = size;
+  switch (shape) {
+    case "box":
+      return new BoxGeometry(2 * first, 2 * second, 2 * third);
+    case "sphere":
+      return new SphereGeometry(first, ROUND, ROUND / 2);
+    // Ours stand on z, those of the library on y.
+    case "cylinder":
+      return new CylinderGeometry(first, first, 2 * second, ROUND).rotateX(Math.PI / 2);
+    case "capsule":
+      return new CapsuleGeometry(first, 2 * second, 8, ROUND).rotateX(Math.PI / 2);
+  }
+}
+
+function materialOf([red, green, blue, alpha]: Geom["rgba"]): MeshStandardMaterial {
+  const color = new Color().setRGB(red, green, blue, SRGBColorSpace);
+  return new MeshStandardMaterial({ color, roughness: 0.75, opacity: alpha, transparent: alpha < 1 });
+}

@@ -1,0 +1,90 @@
+import type { ReplayFeedback } from "../core/replay_chunk";
+import type { RobotDescription } from "../wire";
+import { grouped, h, setHidden, setText } from "../ui/dom";
+import type { SceneStage } from "./scene/scene_stage";
+
+export type SceneCardState = "waiting" | "loading" | "on" | "failed";
+
+/** The 3D scene of the event that is shown. What draws it is loaded only when something has been shown. */
+export class SceneCard {
+  readonly element: HTMLElement;
+  private readonly canvas = h("canvas", "picture", { role: "img" });
+  private readonly words = h("p", "replay-empty", {}, "Opening the 3D scene …");
+  private readonly stamp = h("span", "view-stamp");
+  private readonly scale = h("span", "scene-scale");
+  private state: SceneCardState = "waiting";
+  private stage: SceneStage | null = null;
+  private shown: { event: number; feedback: ReplayFeedback | null } | null = null;
+  private closed = false;
+
+  constructor(private readonly description: RobotDescription) {
+    const caption = h("figcaption", "view-caption", {}, h("span", "view-label", {}, "3D scene"), this.stamp);
+    this.element = h(
+      "figure",
+      "view replay-view replay-scene",
+      {},
+      this.canvas,
+      this.words,
+      caption,
+      this.scale,
+    );
+    this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault()); // it may come back
+  }
+
+  /** The robot as feedback `event` measured it; null: that was not recorded. */
+  show(event: number, feedback: ReplayFeedback | null): void {
+    this.shown = { event, feedback };
+    this.draw();
+    if (this.state === "waiting") void this.load();
+  }
+
+  close(): void {
+    this.closed = true;
+    this.stage?.close();
+    this.stage = null;
+  }
+
+  /** What stands in the scene, for tests: the event, and where each body is, in metres. */
+  statistics(): object {
+    const { stage, shown, state } = this;
+    const names = stage === null ? [] : [...stage.model.bodies.keys()];
+    const bodies = names.map((name) => [name, stage?.model.positionOf(name)?.toArray() ?? null]);
+    const drawn = stage !== null && (shown?.feedback ?? null) !== null;
+    return { state, event: drawn ? shown?.event : null, bodies: Object.fromEntries(bodies) as object };
+  }
+
+  private async load(): Promise<void> {
+    this.state = "loading";
+    try {
+      const { SceneStage } = await import("./scene/scene_stage");
+      if (this.closed) return;
+      this.stage = new SceneStage(this.canvas, this.description);
+      this.state = "on";
+      setText(this.scale, this.stage.scale);
+    } catch {
+      this.state = "failed";
+    }
+    this.draw();
+  }
+
+  private draw(): void {
+    const { shown, stage } = this;
+    if (this.state === "failed")
+      setText(this.words, "This browser cannot draw the 3D scene: it has no WebGL");
+    if (shown === null || stage === null) return;
+    const { event, feedback } = shown;
+    const missing = feedback === null ? "No state of this event was recorded" : "";
+    setHidden(this.words, missing === "");
+    setText(this.words, missing);
+    this.canvas.classList.toggle("is-blank", feedback === null);
+    const stopped = feedback?.stopped === true ? " · STOPPED" : "";
+    const unknown = feedback !== null && this.lacksJoints(feedback) ? " · not all joints measured" : "";
+    setText(this.stamp, feedback === null ? "" : `s ${grouped(event)}${stopped}${unknown}`);
+    this.canvas.setAttribute("aria-label", `The robot at event ${event}`);
+    if (feedback !== null) stage.show(feedback);
+  }
+
+  private lacksJoints(feedback: ReplayFeedback): boolean {
+    return this.description.joints.some((joint) => feedback.unknown.includes(joint.name));
+  }
+}
