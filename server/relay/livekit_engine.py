@@ -1,4 +1,7 @@
-"""Relays that are LiveKit: pictures as they are encoded, sound as samples, feedback as data messages.
+"""Relays that are LiveKit: pictures as they are encoded, sound and feedback as data messages.
+
+Its client takes sound as samples only. They would be encoded a second time and carry no event, so that no gate could
+let them pass: sound goes in its packets, with the trailer behind each.
 
 A LiveKit grows by servers of its own behind one address. So of several the console publishes into the first that it
 reaches, and the others stand by.
@@ -12,7 +15,6 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from robot_bridge.protocol.console import StreamInfo
 from server.media.frame import EncodedFrame, frame_trailer
 from server.media.handover import FrameSink, HandedOverStream
 from server.media.peer_media import PeerMedia
@@ -59,7 +61,7 @@ class LiveKitEngine:
             given = self._media.hand_over(outlet.open, self._codec)
             listening: asyncio.Task[None] | None = None
             try:
-                publication = Publication(feed, [_told(stream) for stream in given.streams], process.put_newest)
+                publication = Publication(feed, given.streams, process.put_newest)
                 room = _room(station, feed)
                 token = self._keys.publisher_token(room, PUBLISHER, self._wall_clock())
                 await process.join(Join(station.url.address, token, outlet.tracks))
@@ -107,10 +109,10 @@ class Outlet:
         def take(frame: EncodedFrame) -> bool:
             if not self.joined:
                 return False
-            if stream.kind == "audio":
-                return self.process.put(Sound(index, frame.data))
             # Behind the frame and not as the client's own metadata: docs/relay.md says why.
             data = frame.data + frame_trailer(frame.stamp, frame.capture_time)
+            if stream.kind == "audio":
+                return self.process.put(Sound(index, frame.media_time & 0xFFFFFFFF, data))
             return self.process.put(Picture(index, frame.keyframe, frame.media_time / 90_000, data))
 
         return take
@@ -134,16 +136,3 @@ def _heed(said: Said, given: PeerMedia) -> None:
 
 def _room(station: Station, feed: int) -> str:
     return f"{station.url.room}-{feed:x}"
-
-
-def _told(stream: StreamInfo) -> StreamInfo:
-    """LiveKit's client takes sound as samples, and no reference with them."""
-    carrier = stream.carrier if stream.kind == "video" else "none"
-    return StreamInfo(
-        mid=stream.mid,
-        stream=stream.stream,
-        label=stream.label,
-        kind=stream.kind,
-        codec=stream.codec,
-        carrier=carrier,
-    )

@@ -57,9 +57,10 @@ class Picture(msgspec.Struct, frozen=True, tag="picture", array_like=True):
 
 
 class Sound(msgspec.Struct, frozen=True, tag="sound", array_like=True):
-    """One encoded packet."""
+    """One encoded packet, with the trailer behind it. The newest win."""
 
     track: int
+    time: int  # in the codec's RTP clock, 32 bits
     data: bytes
 
 
