@@ -8,7 +8,6 @@ from fastapi import Request
 from starlette.requests import ClientDisconnect
 
 from server.errors import BadJson, BodyTooLarge, BodyTooSlow, WrongMediaType
-from server.services import services
 
 __all__ = ["media_type", "read_json", "read_text"]
 
@@ -54,7 +53,7 @@ async def read_json(request: Request, kind: type[Body]) -> Body:
 async def _read(request: Request, bound: int) -> bytes:
     body = bytearray()
     try:
-        async with asyncio.timeout(services(request).settings.request_timeout):
+        async with asyncio.timeout(request.app.state.settings.request_timeout):
             async for chunk in request.stream():
                 body += chunk
                 if len(body) > bound:

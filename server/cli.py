@@ -1,14 +1,8 @@
 """The command `lockstep`: `up` runs a robot and a console, `serve` only the console, `robot` only the robot …"""
 
-import asyncio
-import datetime
-import gc
-import json
 import logging
-import socket
 import sys
-from collections.abc import Coroutine
-from contextlib import suppress
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -20,7 +14,6 @@ from pydantic import SecretStr, ValidationError
 from robot_bridge.cli import robot_app
 from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.robots.registry import robot_names
-from server.app import create_app
 from server.bench_commands import add_bench_commands
 from server.bridge_process import BridgeFailed, BridgeProcess
 from server.cli_access import StateDirOption, add_access_commands
@@ -42,28 +35,25 @@ from server.cli_options import (
     TurnSecret,
 )
 from server.cli_recordings import add_recording_commands
-from server.console_address import write_address
-from server.guarded_http import guarded_by
+from server.fleet.robot_names import BadFleet, is_named
+from server.fleet.robots import robot_settings
+from server.fleet.simulated import own_event_log, simulated_robots
 from server.link_access import link_access
-from server.links import ConsoleLinks, console_links, listening_url
 from server.logs import LogFormat, configure_logs
-from server.media.aiortc_private import own_addresses
-from server.serve import PortTaken, bind, running, wait_for_signal
-from server.services import Services
+from server.run_console import run_console, say
+from server.serve import PortTaken, bind
 from server.settings import Settings
-from server.state import ConsoleState, open_state
-from server.state_dir import StateDirUnusable, default_state_dir
-from server.tls import Certificate, fingerprint, own_names, self_signed
+from server.state import open_state
+from server.state_dir import StateDirUnusable
 
 __all__ = ["app", "main"]
 
+DEFAULT_ROBOT = "mobile-manipulator"
 EXIT_USAGE = 2
 EXIT_PORT_TAKEN = 3
 EXIT_BRIDGE = 4
-PATIENCE = 2.0  # s until somebody who waits for a robot is told so
 # A worker thread of ours (encoders, the 3D scene) may hold the interpreter this long while a command waits.
 SWITCH_INTERVAL = 0.0005  # s; Python's own is ten times that
-GC_THRESHOLDS = (5_000, 20, 10)  # allocations, young collections, middle collections
 
 
 class Switch(StrEnum):
@@ -90,7 +80,13 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings.")]
 
 @app.command()
 def up(
-    robot: Annotated[str, typer.Option(help=f"The robot: {', '.join(robot_names())}.")] = "mobile-manipulator",
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=f"The robot: {', '.join(robot_names())}; {DEFAULT_ROBOT} unless set. Given again, or as NAME=robot: "
+            "a fleet of several, docs/fleet.md."
+        ),
+    ] = None,
     ros2: Annotated[
         Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
     ] = None,
@@ -101,7 +97,9 @@ def up(
             envvar="LOCKSTEP_ROBOT_PYTHON", help="Python that runs the bridge, as that of a ROS installation; or ours."
         ),
     ] = None,
-    robot_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the bridge; 0 takes any free one.")] = 5600,
+    robot_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the bridge, and of the first of several; 0: any free one.")
+    ] = 5600,
     event_log: Annotated[Path | None, typer.Option(help="The bridge appends what happens to events here.")] = None,
     host: Host = None,
     port: Port = None,
@@ -145,19 +143,36 @@ def up(
         state_dir=state_dir,
         **network,
     )
-    options = [] if event_log is None else ["--event-log", str(event_log)]
-    options += [] if ros2 is None else ["--ros2", str(ros2)]
+    options = [] if ros2 is None else ["--ros2", str(ros2)]
     options += [] if mjcf is None else ["--mjcf", str(mjcf)]
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
-    bridge = BridgeProcess(robot, "127.0.0.1", robot_port, options, secret.reveal(), _say, robot_python)
-    _run(settings, bridge, as_json, quiet)
+    bridges = {}
+    kinds = _simulated(robot)
+    if options and "" not in kinds:
+        raise _usage("--ros2 and --mjcf are for one robot; run the others by `lockstep robot` and use `lockstep serve`")
+    for number, (name, kind) in enumerate(kinds.items()):
+        log = [] if event_log is None else ["--event-log", str(own_event_log(event_log, name))]
+        port_of_bridge = robot_port + number if robot_port else 0
+        bridges[name] = BridgeProcess(
+            kind, "127.0.0.1", port_of_bridge, [*options, *log], secret.reveal(), say, robot_python
+        )
+    if "" not in bridges:  # where they will be, is known when they run
+        settings = settings.model_copy(update={"robots": tuple(f"{name}=tcp://127.0.0.1:1" for name in bridges)})
+    _run(settings, bridges, as_json, quiet)
 
 
 @app.command()
 def serve(
     robot: Annotated[
-        str | None, typer.Option(help="Where the robot bridge is, tcp://host:port or tls://host:port.")
+        list[str] | None,
+        typer.Option(
+            help="Where the robot bridge is, tcp://host:port or tls://host:port. As NAME=tcp://…, which may be given "
+            "again: one robot of a fleet, docs/fleet.md.",
+        ),
+    ] = None,
+    fleet: Annotated[
+        Path | None, typer.Option(help="TOML file with a table for each robot of a fleet, docs/fleet.md.")
     ] = None,
     link_secret_file: Annotated[
         Path | None, typer.Option(help="File with the secret that the bridge asks for; or LOCKSTEP_LINK_SECRET.")
@@ -192,7 +207,8 @@ def serve(
     """Run the console for a robot bridge that runs elsewhere."""
     network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
     settings = _settings(
-        robot=robot,
+        **_robots(robot),
+        fleet_file=fleet,
         link_secret_file=link_secret_file,
         link_tls_ca=link_tls_ca,
         link_tls_cert=link_tls_cert,
@@ -212,7 +228,24 @@ def serve(
         state_dir=state_dir,
         **network,
     )
-    _run(settings, None, as_json, quiet)
+    _run(settings, {}, as_json, quiet)
+
+
+def _robots(given: list[str] | None) -> dict[str, object]:
+    """One address alone is the only robot of a console; anything else is a fleet."""
+    if not given:
+        return {}
+    if len(given) == 1 and not is_named(given[0]):
+        return {"robot": given[0]}
+    return {"robots": tuple(given)}
+
+
+def _simulated(given: list[str] | None) -> dict[str, str]:
+    """Kinds of the robots to run, by name; "" is the only robot of a console."""
+    try:
+        return simulated_robots(given or [DEFAULT_ROBOT])
+    except BadFleet as error:
+        raise _usage(f"robot: {error}") from error
 
 
 def _media(quality: Switch | None) -> dict[str, bool] | None:
@@ -254,22 +287,23 @@ def _settings(**flags: object) -> Settings:
         raise typer.Exit(EXIT_USAGE) from error
 
 
-def _run(settings: Settings, bridge: BridgeProcess | None, as_json: bool, quiet: bool) -> None:
+def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool, quiet: bool) -> None:
     configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         _check_files(settings)
+        if settings.is_fleet:
+            robot_settings(settings)
         listener = bind(settings.host, settings.port)
         state = open_state(settings, fall_back=True)
-        uvloop.run(_serve(settings, state, listener, bridge, as_json))
+        uvloop.run(run_console(settings, state, listener, bridges, as_json))
     except PortTaken as error:
-        _say(f"{error}; choose another with --port")
+        say(f"{error}; choose another with --port")
         raise typer.Exit(EXIT_PORT_TAKEN) from error
-    except StateDirUnusable as error:
-        _say(str(error))
-        raise typer.Exit(EXIT_USAGE) from error
+    except (StateDirUnusable, BadFleet) as error:
+        raise _usage(str(error)) from error
     except BridgeFailed as error:
-        _say(str(error))
+        say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error
 
 
@@ -280,101 +314,17 @@ def _check_files(settings: Settings) -> None:
             if path is not None:
                 path.read_bytes()
     except OSError as error:
-        _say(f"{error.filename}: {error.strerror}")
+        say(f"{error.filename}: {error.strerror}")
         raise typer.Exit(EXIT_USAGE) from error
-
-
-def _calm_garbage_collection() -> None:
-    """A full collection over all modules stalls the loop by 100 ms and more with a hundred peers.
-
-    What lives now lives until the end, so it is taken out of the collector's sight; the rest is looked at less often.
-    """
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(*GC_THRESHOLDS)
-
-
-async def _serve(
-    settings: Settings, state: ConsoleState, listener: socket.socket, bridge: BridgeProcess | None, as_json: bool
-) -> None:
-    """Until a signal: the bridge first, then the console; the console ends first."""
-    certificate = _certificate(settings)
-    stopping = asyncio.get_running_loop().create_task(wait_for_signal())
-    try:
-        if bridge is not None:
-            address = await _unless(stopping, bridge.start())
-            if address is None:
-                return
-            settings = settings.model_copy(update={"robot": address})
-        application = create_app(settings, state)
-        http = guarded_by(settings, application)
-        async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
-            _calm_garbage_collection()
-            watching = None if bridge is None else tasks.create_task(bridge.watch())
-            url = listening_url(settings, listener)
-            links = console_links(settings, url, state)
-            with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
-                write_address(state.directory, url)
-            announcing = tasks.create_task(_announce(application.state.services, links, as_json))
-            await stopping
-            for task in (watching, announcing):
-                if task is not None:
-                    task.cancel()
-    finally:
-        listener.close()
-        stopping.cancel()
-        with suppress(asyncio.CancelledError):
-            await stopping
-        if bridge is not None:
-            await bridge.close()
-
-
-def _certificate(settings: Settings) -> Certificate | None:
-    """What to encrypt HTTP with; None: not at all."""
-    if settings.tls_cert is not None and settings.tls_key is not None:
-        return Certificate(settings.tls_cert, settings.tls_key)
-    if not settings.tls:
-        return None
-    names = own_names(settings.host) | set(settings.tls_names) | set(settings.own_names) | set(own_addresses())
-    certificate = self_signed(
-        settings.state_dir or default_state_dir(), names - {"*"}, datetime.datetime.now(datetime.UTC)
-    )
-    _say(f"the certificate is our own; its SHA-256 fingerprint is {fingerprint(certificate)}")
-    return certificate
-
-
-async def _unless(stopping: asyncio.Task[None], starting: Coroutine[None, None, str]) -> str | None:
-    """What `starting` returns; None when we are asked to stop first."""
-    task = asyncio.get_running_loop().create_task(starting)
-    await asyncio.wait((task, stopping), return_when=asyncio.FIRST_COMPLETED)
-    if task.done():
-        return task.result()
-    task.cancel()
-    with suppress(asyncio.CancelledError):
-        await task
-    return None
-
-
-async def _announce(here: Services, links: ConsoleLinks, as_json: bool) -> None:
-    """The links, once they lead to a robot. For people at once when the robot is not there yet."""
-    robot = here.console.robot
-    if not as_json and not robot.up:
-        with suppress(TimeoutError):
-            async with asyncio.timeout(PATIENCE):
-                await robot.reached.wait()
-        if not robot.up:
-            _say(f"waiting for the robot at {links.robot}: {robot.detail}")
-    await robot.reached.wait()
-    sys.stdout.write(json.dumps(links._asdict()) + "\n" if as_json else links.for_people())
-    sys.stdout.flush()
 
 
 add_access_commands(app, _settings)
 add_recording_commands(app, _settings)
 
 
-def _say(text: str) -> None:
-    typer.echo(f"lockstep: {text}", err=True)
+def _usage(text: str) -> typer.Exit:
+    say(text)
+    return typer.Exit(EXIT_USAGE)
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 import socket
 import time
+from collections.abc import Mapping
 from typing import NamedTuple, get_args
 
 import structlog
@@ -26,17 +27,32 @@ class ConsoleLinks(NamedTuple):
     operator: str
     observer: str
     supervisor: str
-    robot: str
+    robot: str  # where it is; "" in a fleet
+    robots: Mapping[str, str] = {}  # of a fleet, where each is, by name
+
+    def address(self, name: str) -> str:
+        """Where the robot of this name is; "" is the only one of a console."""
+        return self.robots.get(name, self.robot)
+
+    def fields(self) -> dict[str, object]:
+        """What is printed for programs."""
+        return {name: value for name, value in self._asdict().items() if value}
 
     def for_people(self) -> str:
         return (
-            f"\n  Lockstep is ready. The robot is at {self.robot}.\n"
+            f"\n  Lockstep is ready. {self._whereabouts()}\n"
             f"\n  To drive, open:   {self.operator}\n"
             f"\n  To watch, open:   {self.observer}\n"
             f"\n  To supervise:     {self.supervisor}\n"
             "\n  Whoever has the first link can drive the robot; share the second. The third takes control from anyone."
             "\n  `lockstep invite` makes links that end when you say. Ctrl-C ends everything.\n\n"
         )
+
+    def _whereabouts(self) -> str:
+        if not self.robots:
+            return f"The robot is at {self.robot}."
+        each = "".join(f"\n    {name:<20} {address}" for name, address in self.robots.items())
+        return f"Its robots:{each}"
 
 
 def console_link(console: str, token: str) -> str:
@@ -64,7 +80,7 @@ def console_links(settings: Settings, console: str, state: ConsoleState) -> Cons
         log.error("the links that are printed cannot be revoked and end with this console", detail=str(error))
         made = for_start(Invitations(state.invitations.known.all))
     links = {role: console_link(console, state.access.sign(each.identity, each.created)) for role, each in made.items()}
-    return ConsoleLinks(console=console, robot=settings.robot, **links)
+    return ConsoleLinks(console, links["operator"], links["observer"], links["supervisor"], settings.robot)
 
 
 def _own_address() -> str:
