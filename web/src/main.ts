@@ -27,6 +27,7 @@ import "./style/scale_bar.css";
 import "./style/pads.css";
 import "./style/layers.css";
 import "./style/record.css";
+import "./style/way_back.css";
 import { readFragment } from "./core/fragment";
 import { installHook } from "./lockstep_hook";
 import { Page } from "./page";

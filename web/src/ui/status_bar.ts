@@ -1,4 +1,5 @@
 import { robotIsUp } from "../core/console_state";
+import { overviewPage } from "../core/fleet_link";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setHidden, setPressed, setText, type Panel } from "./dom";
 
@@ -25,6 +26,7 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
     "header",
     "bar",
     {},
+    ...wayBack(),
     h("span", "bar-brand", {}, "Lockstep"),
     robotName,
     h("div", "bar-chips", {}, consoleChip.element, robotChip.element),
@@ -46,6 +48,12 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
       level.style.setProperty("--level", loudest.toFixed(2));
     },
   };
+}
+
+/** To the overview, on a page that was opened from there. */
+function wayBack(): HTMLElement[] {
+  const href = overviewPage(location.hash, location.href);
+  return href === null ? [] : [h("a", "bar-back", { href }, "All robots")];
 }
 
 /** Browsers let a page make sound only after the user touched it. */
