@@ -54,8 +54,8 @@ class ArmDrive:
         self.faults = []
         velocities = self._resolve(twist, joints) if twist.any() else np.zeros(len(joints))
         posture = self._posture + velocities * seconds
-        posture = np.clip(posture, joints - LEAD, joints + LEAD)
-        self._posture = np.clip(posture, self._lower, self._upper)
+        posture = np.minimum(np.maximum(posture, joints - LEAD), joints + LEAD)
+        self._posture = np.minimum(np.maximum(posture, self._lower), self._upper)
         self._foreseen = None
         # A servo follows a moving target with the lag kv/kp; aiming ahead by it makes the arm stop where it is told.
         self._simulation.data.ctrl[ARM] = self._posture + velocities * self._lag

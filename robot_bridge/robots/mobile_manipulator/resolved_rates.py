@@ -1,5 +1,8 @@
 """From a twist of the tool to velocities of the arm's joints, near singularities and joint limits too. No physics."""
 
+import contextlib
+import math
+from operator import truediv
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -10,6 +13,7 @@ __all__ = ["Resolution", "ResolvedRates"]
 Array = npt.NDArray[np.float64]
 
 LENGTH: Final = 0.25  # m, weighs rotation against translation: 1 rad/s counts as much as 0.25 m/s
+SCALE: Final = np.array((1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH))
 SMALL: Final = 0.06  # m, singular values below this are damped
 DAMPING: Final = 0.05  # m, at a singular value of zero
 LIMIT_ZONE: Final = 0.20  # rad before a joint limit in which the joint is used less and less
@@ -27,40 +31,50 @@ class ResolvedRates:
     """Damped least squares, with weights that fade out a joint that runs into its limit."""
 
     def __init__(self, lower: Array, upper: Array, fastest: Array) -> None:
-        self._lower = lower  # rad
-        self._upper = upper  # rad
-        self._fastest = fastest  # rad/s
+        self._lower: list[float] = lower.tolist()  # rad
+        self._upper: list[float] = upper.tolist()  # rad
+        self._fastest: list[float] = fastest.tolist()  # rad/s
 
     def resolve(self, jacobian: Array, twist: Array, joints: Array) -> Resolution:
         """Joint velocities that move the tool by `twist` (m/s, rad/s), as nearly as the arm can."""
-        scale = np.array((1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH))
-        scaled_jacobian = jacobian * scale[:, None]
-        scaled_twist = twist * scale
-        weights = np.ones(len(joints))
+        scaled_jacobian = jacobian * SCALE[:, None]
+        scaled_twist = twist * SCALE
+        places = joints.tolist()
+        weights = [1.0] * len(places)
         velocities = damped_inverse(scaled_jacobian, scaled_twist)
+        freedom = self._freedom(places, velocities)
         for _ in range(PASSES):
-            allowed = np.minimum(weights, self._freedom(joints, velocities))
-            if np.array_equal(allowed, weights):
+            allowed = list(map(min, weights, freedom))
+            if allowed == weights:
                 break
             weights = allowed
-            velocities = weights * damped_inverse(scaled_jacobian * weights, scaled_twist)
-        velocities = np.where(self._freedom(joints, velocities) > 0.0, velocities, 0.0)
-        missing = float(np.linalg.norm(scaled_jacobian @ velocities - scaled_twist))
+            shares = np.array(weights)
+            velocities = shares * damped_inverse(scaled_jacobian * shares, scaled_twist)
+            freedom = self._freedom(places, velocities)
+        if min(freedom) <= 0.0:
+            velocities = np.where(np.array(freedom) > 0.0, velocities, 0.0)
+        missing = math.hypot(*(scaled_jacobian @ velocities - scaled_twist).tolist())
         return Resolution(
-            velocities / max(1.0, float(np.max(np.abs(velocities) / self._fastest))),  # slower, same direction
-            tuple(int(index) for index in np.flatnonzero(weights < 0.5)),
-            missing > LOST * float(np.linalg.norm(scaled_twist)),
+            velocities / max(1.0, *map(truediv, np.abs(velocities).tolist(), self._fastest)),  # slower, same direction
+            tuple(index for index, weight in enumerate(weights) if weight < 0.5),
+            missing > LOST * math.hypot(*scaled_twist.tolist()),
         )
 
-    def _freedom(self, joints: Array, velocities: Array) -> Array:
+    def _freedom(self, places: list[float], velocities: Array) -> list[float]:
         """1 for a joint that may move on, falling to 0 at the limit that it moves to."""
-        room = np.where(velocities > 0.0, self._upper - joints, joints - self._lower)
-        freedom = np.clip(room / LIMIT_ZONE, 0.0, 1.0)
-        return np.where(velocities == 0.0, 1.0, freedom)
+        freedom = []
+        for place, velocity, lower, upper in zip(places, velocities.tolist(), self._lower, self._upper, strict=True):
+            room = upper - place if velocity > 0.0 else place - lower
+            freedom.append(1.0 if velocity == 0.0 else min(max(room / LIMIT_ZONE, 0.0), 1.0))
+        return freedom
 
 
 def damped_inverse(jacobian: Array, twist: Array) -> Array:
     """Least squares where only the directions that are nearly singular are damped, so that others stay exact."""
+    with contextlib.suppress(np.linalg.LinAlgError):
+        inverse = np.linalg.inv(jacobian)
+        if np.vdot(inverse, inverse) <= SMALL**-2:  # the sum of 1 / value² over all singular values: none is small
+            return inverse @ twist
     left, values, right = np.linalg.svd(jacobian)
     damping = DAMPING**2 * np.clip(1.0 - (values / SMALL) ** 2, 0.0, 1.0)
     return right.T @ ((left.T @ twist) * values / (values**2 + damping))  # type: ignore[no-any-return]

@@ -1,6 +1,7 @@
 """The physics: the model, its state, and where the robot's parts are in MuJoCo's arrays."""
 
 import logging
+import math
 from importlib.resources import files
 from typing import Any, Final
 
@@ -37,7 +38,7 @@ class Simulation:
         self.restarts = 0
         self._home = self.model.key("home").id
         self._tip = self.model.site(TOOL_TIP).id
-        self._jacobian = np.zeros((6, self.model.nv))
+        self._jacobian = np.zeros((2, 3, self.model.nv))  # linear, angular
         self.restart()
 
     def restart(self) -> None:
@@ -75,10 +76,10 @@ class Simulation:
 
     def tool_jacobian(self) -> Array:
         """Twist of the tool tip against the base, in the base frame, per velocity of each arm joint (6 x 6)."""
-        mujoco.mj_jacSite(self.model, self.data, self._jacobian[:3], self._jacobian[3:], self._tip)
-        rotation = base_from_world(self.data.qpos[2])
-        arm = self._jacobian[:, ARM]
-        return np.vstack((rotation @ arm[:3], rotation @ arm[3:]))
+        linear, angular = self._jacobian
+        mujoco.mj_jacSite(self.model, self.data, linear, angular, self._tip)
+        rotated: Array = base_from_world(self.data.qpos[2]) @ self._jacobian[:, :, ARM]
+        return rotated.reshape(6, -1)
 
     def tool_twist(self) -> Array:
         """The tool's measured twist against the base, in the base frame."""
@@ -91,5 +92,5 @@ def warn(text: str) -> None:
 
 def base_from_world(yaw: float) -> Array:
     """Rotation that expresses a world vector in the base frame."""
-    cosine, sine = np.cos(yaw), np.sin(yaw)
+    cosine, sine = math.cos(yaw), math.sin(yaw)
     return np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)))

@@ -7,6 +7,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from robot_bridge.robots.mujoco_view.read_back import drop_stencil, read_rgba
+
 __all__ = ["DEFAULT_LOOK", "FREE_CAMERA", "Canvas", "Look"]
 
 FREE_CAMERA: Final = -1  # looks at the middle of the model, from as far as its extent asks for
@@ -36,6 +38,7 @@ class Canvas:
         self._gl.make_current()
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        drop_stencil(self._context, self._context.offWidth, self._context.offHeight)
         self._scene = mujoco.MjvScene(model, look.max_geoms)
         self._scene.flags[:] = 0  # no shadows, no reflections, no fog: on a CPU they cost ten times the rest
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = 1
@@ -50,10 +53,10 @@ class Canvas:
             for flag in ("TENDON", "SKIN", "FLEXFACE", "FLEXSKIN"):
                 self._options.flags[getattr(mujoco.mjtVisFlag, f"mjVIS_{flag}")] = 1
         self._views: dict[str, Any] = {}
-        self._pixels: dict[tuple[int, int], npt.NDArray[np.uint8]] = {}
 
-    def draw(self, camera: str, width: int, height: int, positions: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
-        """RGB rows, the lowest first, which the next picture of this size overwrites."""
+    def draw(self, camera: str, positions: npt.NDArray[np.float64], pixels: npt.NDArray[np.uint8]) -> None:
+        """Fill `pixels` (height, width, RGBA) with the camera's view, the lowest row first."""
+        height, width, _ = pixels.shape
         self._data.qpos[:] = positions
         self._pose()
         everything = mujoco.mjtCatBit.mjCAT_ALL
@@ -63,11 +66,7 @@ class Canvas:
         )
         viewport = mujoco.MjrRect(0, 0, width, height)
         mujoco.mjr_render(viewport, self._scene, self._context)
-        pixels = self._pixels.get((height, width))
-        if pixels is None:
-            pixels = self._pixels[height, width] = np.empty((height, width, 3), np.uint8)
-        mujoco.mjr_readPixels(pixels, None, viewport, self._context)
-        return pixels
+        read_rgba(pixels, viewport)
 
     def _pose(self) -> None:
         mujoco.mj_kinematics(self._model, self._data)

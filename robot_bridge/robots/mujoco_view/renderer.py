@@ -4,17 +4,16 @@ import asyncio
 import concurrent.futures
 from typing import Any
 
-import av
 import mujoco
 import numpy as np
 import numpy.typing as npt
-from av.video.reformatter import VideoReformatter
 
 from robot_bridge.protocol.description import Camera
 from robot_bridge.robots.mujoco_view.canvas import DEFAULT_LOOK, Canvas, Look
 from robot_bridge.robots.mujoco_view.graphics import graphics_unavailable
+from robot_bridge.robots.mujoco_view.sheet import Sheet
 
-__all__ = ["Converter", "Renderer"]
+__all__ = ["Renderer"]
 
 
 class Renderer:
@@ -26,7 +25,7 @@ class Renderer:
         Raises:
             RobotUnavailable: OpenGL cannot be used here.
         """
-        self._converter = Converter()
+        self._sheets: dict[tuple[int, int], Sheet] = {}  # by size, used again for each picture
         self._thread = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="render")
         try:
             self._canvas: Canvas | None = self._thread.submit(Canvas, model, width, height, look).result()
@@ -48,22 +47,8 @@ class Renderer:
     def _draw(self, camera: Camera, positions: npt.NDArray[np.float64]) -> bytes:
         if self._canvas is None:
             raise RuntimeError("the renderer is closed")
-        return self._converter.yuv420p(self._canvas.draw(camera.name, camera.width, camera.height, positions))
-
-
-class Converter:
-    """From RGB rows, the lowest first, to planes Y, U, V without padding, BT.601 limited range. For one thread."""
-
-    def __init__(self) -> None:
-        self._reformatter = VideoReformatter()  # kept: it holds the prepared conversion
-        self._sources: dict[tuple[int, ...], av.VideoFrame] = {}  # by shape, kept: each picture overwrites the last
-
-    def yuv420p(self, rgb: npt.NDArray[np.uint8]) -> bytes:
-        height, width, _ = rgb.shape
-        source = self._sources.setdefault(rgb.shape, av.VideoFrame(width, height, "rgb24"))
-        rows = np.frombuffer(memoryview(source.planes[0]), np.uint8).reshape(height, -1)  # a row may be padded
-        rows[:, : 3 * width] = rgb.reshape(height, -1)[::-1]  # OpenGL's first row is the lowest
-        converted = self._reformatter.reformat(source, format="yuv420p", threads=1)
-        if all(plane.line_size == plane.width for plane in converted.planes):
-            return b"".join(converted.planes)
-        return converted.to_ndarray().tobytes()
+        sheet = self._sheets.get((camera.width, camera.height))
+        if sheet is None:
+            sheet = self._sheets[camera.width, camera.height] = Sheet(camera.width, camera.height)
+        self._canvas.draw(camera.name, positions, sheet.pixels)
+        return sheet.yuv420p()
