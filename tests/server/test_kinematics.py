@@ -1,11 +1,14 @@
 import math
+from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_bridge.protocol.description import Body, BodyJoint, RobotDescription
-from server.kinematics import Pose, about, body_pose, product, rotate, scene_paths, world_positions
+from server.kinematics import Pose, about, body_pose, product, rotate, scene_paths, world_poses, world_positions
+from tests.client.vectors import load_vectors
 
 QUARTER = math.pi / 2
 Z = (0.0, 0.0, 1.0)
@@ -74,3 +77,15 @@ def test_world_positions_follow_the_chain() -> None:
         Body(name="arm", parent="base", position=(1.0, 0.0, 0.5)),
     )
     assert world_positions(robot, {"yaw": QUARTER})[1] == pytest.approx((0.0, 1.0, 0.5))
+
+
+POSES: dict[str, Any] = load_vectors("poses.json")
+
+
+@pytest.mark.parametrize("case", POSES["cases"])
+def test_bodies_stand_where_the_replay_page_draws_them(case: dict[str, Any]) -> None:
+    robot = _robot(*msgspec.convert(POSES["bodies"], tuple[Body, ...]))
+    poses = world_poses(robot, dict(zip(POSES["joints"], case["joints"], strict=True)))
+    assert set(poses) == set(case["positions"])
+    for name, position in case["positions"].items():
+        assert poses[name].position == pytest.approx(position, abs=1e-6)

@@ -7,6 +7,8 @@ import "./style/gauges.css";
 import "./style/controls.css";
 import "./style/library.css";
 import "./style/replay.css";
+import "./style/replay_cards.css";
+import "./style/replay_deck.css";
 import { readReplayLink, replayHash, tokenIn } from "./core/replay_link";
 import { ListView } from "./replay/list_view";
 import { PlayerView } from "./replay/player_view";
