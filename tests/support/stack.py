@@ -11,22 +11,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Stack", "running_console", "running_stack"]
+from server.fleet.simulated import own_event_log
+
+__all__ = ["Stack", "running_console", "running_fleet", "running_stack"]
 
 START_SECONDS = 40.0  # a loaded two-core machine importing everything and opening GL
 STOP_SECONDS = 15.0
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Stack:
-    """A running console with its robot bridge.
+    """A running console with its robot bridge; or of a fleet, whose robots are then named in every question.
 
     Attributes:
         console: "http://127.0.0.1:PORT"
         operator: the operator's link, token in the fragment
         observer: the observers' link
         supervisor: the supervisors' link
-        robot: "tcp://127.0.0.1:PORT"
+        robot: "tcp://127.0.0.1:PORT"; "" in a fleet
+        robots: of a fleet, the same by name
         event_log: the bridge's own record, JSON lines
     """
 
@@ -35,21 +38,24 @@ class Stack:
     operator: str
     observer: str
     supervisor: str
-    robot: str
+    robot: str = ""
+    robots: dict[str, str] = field(default_factory=dict)
     event_log: Path
     output: list[str] = field(default_factory=list)  # its last lines on standard error
 
-    def bridge_pid(self) -> int:
-        """The bridge's process: the one child of `lockstep up`."""
+    def bridge_pid(self, robot: str = "") -> int:
+        """The bridge's process: the child of `lockstep up` that writes this robot's log."""
         children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-        if len(children) != 1:
-            raise RuntimeError(f"expected one child process, found {children}")
-        return int(children[0])
+        log = str(own_event_log(self.event_log, robot)).encode()
+        found = [child for child in children if log in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")]
+        if len(found) != 1:
+            raise RuntimeError(f"expected one bridge among the child processes {children}, found {found}")
+        return int(found[0])
 
     @contextmanager
-    def frozen_bridge(self) -> Iterator[None]:
+    def frozen_bridge(self, robot: str = "") -> Iterator[None]:
         """The bridge's process does not run inside the block."""
-        with _frozen(self.bridge_pid()):
+        with _frozen(self.bridge_pid(robot)):
             yield
 
     @contextmanager
@@ -58,14 +64,14 @@ class Stack:
         with _frozen(self.process.pid):
             yield
 
-    def records(self) -> Iterator[dict[str, Any]]:
+    def records(self, robot: str = "") -> Iterator[dict[str, Any]]:
         """The bridge's records so far."""
-        for line in self.event_log.read_text().splitlines():
+        for line in own_event_log(self.event_log, robot).read_text().splitlines():
             yield json.loads(line)
 
-    def events(self, kind: str) -> Iterator[dict[str, Any]]:
+    def events(self, kind: str, robot: str = "") -> Iterator[dict[str, Any]]:
         """Those of one kind."""
-        return (record for record in self.records() if record["kind"] == kind)
+        return (record for record in self.records(robot) if record["kind"] == kind)
 
 
 @contextmanager
@@ -90,6 +96,18 @@ async def running_stack(
     event_log = directory / "events.jsonl"
     command = ("up", "--json", "--robot", robot, "--port", str(port), "--robot-port", "0")
     async with _running(directory, (*command, "--event-log", str(event_log), *extra), event_log, settings) as stack:
+        yield stack
+
+
+@asynccontextmanager
+async def running_fleet(
+    directory: Path, robots: Mapping[str, str], *, settings: Mapping[str, str] | None = None
+) -> AsyncIterator[Stack]:
+    """Start `lockstep up` with several simulated robots, `{"left": "planar"}`; end it on leaving."""
+    event_log = directory / "events.jsonl"
+    named = [argument for name, kind in robots.items() for argument in ("--robot", f"{name}={kind}")]
+    command = ("up", "--json", *named, "--port", "0", "--robot-port", "0", "--event-log", str(event_log))
+    async with _running(directory, command, event_log, settings) as stack:
         yield stack
 
 
@@ -122,14 +140,14 @@ async def _running(
         await reader
 
 
-async def _ready_line(process: asyncio.subprocess.Process, output: list[str]) -> dict[str, str]:
+async def _ready_line(process: asyncio.subprocess.Process, output: list[str]) -> dict[str, Any]:
     if process.stdout is None:
         raise RuntimeError("the process has no output to read")
     async with asyncio.timeout(START_SECONDS):
         line = await process.stdout.readline()
     if not line:
         raise RuntimeError("lockstep up ended before it was ready:\n" + "\n".join(output))
-    links: dict[str, str] = json.loads(line)
+    links: dict[str, Any] = json.loads(line)
     return links
 
 

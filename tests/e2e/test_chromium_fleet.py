@@ -1,0 +1,151 @@
+"""The overview of a fleet in Chromium: three simulated robots of one console."""
+
+import re
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.async_api import Browser, BrowserContext, Page, expect
+
+from bench.browsers.chromium import PAD, open_page
+from bench.browsers.console_page import ConsolePage
+from tests.support.stack import Stack, running_fleet
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+
+NAMES = ("left", "middle", "right")
+
+
+@pytest.fixture
+async def fleet(tmp_path: Path) -> AsyncIterator[Stack]:
+    async with running_fleet(tmp_path, dict.fromkeys(NAMES, "planar")) as running:
+        yield running
+
+
+async def _until(page: Page, condition: str, seconds: float = 30.0) -> None:
+    """Until `condition`, over `s`, the overview's figures, and `r`, its robots by name, is true."""
+    waiting = """(limit) => new Promise((resolve) => {
+      const holds = () => {
+        try {
+          const s = window.lockstepFleet.stats(), r = Object.fromEntries(s.robots.map((each) => [each.name, each]));
+          return Boolean(%s);
+        } catch { return false; }
+      };
+      const end = performance.now() + limit;
+      const look = () => {
+        if (holds()) resolve(null);
+        else if (performance.now() > end) resolve(JSON.stringify(window.lockstepFleet?.stats() ?? null));
+        else setTimeout(look, 20);
+      };
+      look();
+    })"""
+    missed = await page.evaluate(waiting % condition, seconds * 1000)
+    if missed is not None:
+        raise AssertionError(f"never came true: {condition}\nthe overview: {missed}")
+
+
+async def _stats(page: Page) -> dict[str, Any]:
+    found: dict[str, Any] = await page.evaluate("window.lockstepFleet.stats()")
+    return found
+
+
+async def _names(page: Page) -> list[str]:
+    return [robot["name"] for robot in (await _stats(page))["robots"]]
+
+
+async def _in_view(page: Page, name: str) -> bool:
+    box = await page.get_by_role("button", name=name).bounding_box()
+    size = page.viewport_size
+    if box is None or size is None:
+        return False
+    return box["x"] >= 0 and box["x"] + box["width"] <= size["width"] and box["y"] + box["height"] <= size["height"]
+
+
+async def _drive(context: BrowserContext, link: str) -> ConsolePage:
+    """A page of its own in which somebody drives until it is closed."""
+    page = await context.new_page()
+    await page.goto(link)
+    console = ConsolePage(page)
+    await console.until_live()
+    await console.arm()
+    await console.drive_forward()
+    return console
+
+
+async def test_every_robot_has_a_live_tile_behind_its_gate_that_leads_to_its_page_and_back(
+    fleet: Stack, chromium: Browser
+) -> None:
+    async with open_page(chromium, fleet.operator, pad=True) as page:
+        await _until(page, f"s.robots.length === {len(NAMES)} && s.robots.every((x) => x.picture === 'live')")
+        await expect(page.get_by_role("heading", level=2)).to_have_text(list(NAMES))
+        await expect(page.get_by_role("article", name="middle")).to_contain_text("Free")
+        await page.context.add_init_script(path=PAD)
+        driver = await _drive(page.context, fleet.operator.replace("/#", "/robots/middle/#"))
+        await page.bring_to_front()
+        await _until(page, "r.middle.state === 'driven' && r.middle.words.startsWith('Driven by ')")
+        await expect(page.get_by_role("article", name="left")).to_contain_text("Free")
+        before = (await _stats(page))["robots"][1]["rendered"]
+        await _until(page, f"r.middle.rendered > {before + 20}")
+        assert {robot["violations"] for robot in (await _stats(page))["robots"]} == {0}
+        await driver.page.close()
+        await page.get_by_role("link", name="Open to drive: middle").click()
+        await ConsolePage(page).until_live()
+        assert "/robots/middle/#token=" in page.url
+        assert await _in_view(page, "Stop the robot")
+        await page.get_by_role("link", name="All robots").click()
+        await _until(page, f"s.robots.length === {len(NAMES)}")
+        assert page.url == fleet.operator
+
+
+async def test_a_robot_that_is_away_says_so_first_and_stop_reaches_the_others(fleet: Stack, chromium: Browser) -> None:
+    async with open_page(chromium, fleet.observer) as page:
+        await _until(page, "s.open === 3 && s.robots.every((x) => x.picture === 'live')")
+        with fleet.frozen_bridge("right"):
+            await _until(page, "r.right.state === 'unreachable' && !r.right.connected && r.right.picture !== 'live'")
+            assert (await _names(page))[0] == "right"
+            await expect(page.get_by_role("article", name="right")).to_contain_text("Unreachable since")
+            await _until(page, "r.left.picture === 'live' && r.middle.picture === 'live'")
+            await page.get_by_role("searchbox").fill("left")
+            await _until(page, "s.robots.length === 1 && s.open === 1")
+            await page.keyboard.press("Escape")
+            await _until(page, "s.stop && s.stop.stopped.length === 2 && s.stop.tone === 'bad'")
+            answer = page.get_by_role("alert")
+            await expect(answer).to_contain_text("2 of 3 robots stopped")
+            await expect(answer).to_contain_text("right: not delivered")
+            await expect(answer).to_contain_text("emergency stops")
+            for name in ("left", "middle"):
+                assert list(fleet.events("stopped", name))
+        await _until(page, "s.stop && s.stop.tone === 'done' && s.stop.title === 'All 3 robots are stopped'")
+        await page.get_by_role("button", name="Close").click()
+        await page.get_by_role("searchbox").fill("")
+        await expect(page.get_by_role("article", name="left")).to_contain_text("Stopped by")
+
+
+async def test_a_lost_console_leaves_no_picture_that_looks_live(fleet: Stack, chromium: Browser) -> None:
+    async with open_page(chromium, fleet.observer, width=390, height=844, touch=True) as page:
+        await _until(page, "s.robots.length === 3 && s.robots.some((x) => x.picture === 'live')")
+        assert (await page.evaluate("document.documentElement.scrollWidth")) <= 390
+        with fleet.frozen_console():
+            await _until(page, "s.phase === 'unknown' && s.robots.every((x) => x.picture !== 'live')")
+            await expect(page.get_by_role("article").first).to_contain_text("Unknown since")
+            await expect(page.locator(".banner")).to_contain_text("What stands here was so at")
+            await page.get_by_role("button", name="Stop all robots").tap()
+            await expect(page.get_by_role("alert")).to_contain_text("stopped")
+            assert await _in_view(page, "Stop all robots")
+        await _until(page, "s.phase === 'live' && s.stop && s.stop.tone === 'done'")
+
+
+async def test_a_link_that_is_no_good_says_what_to_do_and_can_be_replaced(fleet: Stack, chromium: Browser) -> None:
+    bad = re.sub("token=.*", "token=not-a-token", fleet.observer)
+    async with open_page(chromium, bad) as page:
+        await expect(page.get_by_role("heading", name="This link is not valid")).to_be_visible()
+        assert await _in_view(page, "Stop all robots")
+        await page.get_by_label("Your link").fill("hello")
+        await page.get_by_role("button", name="Open").click()
+        await expect(page.get_by_role("alert").first).to_contain_text("no link of a console")
+        await page.get_by_label("Your link").fill(fleet.observer)
+        await page.get_by_role("button", name="Open").click()
+        await _until(page, "s.robots.length === 3")
+        await page.goto(fleet.console)
+        await expect(page.get_by_role("heading", name="Open the link")).to_be_visible()
