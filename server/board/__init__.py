@@ -1,1 +1,53 @@
 """Several consoles behind one entry: what they tell each other, and through what (docs/fleet.md)."""
+
+import importlib.util
+import socket
+
+from prometheus_client import CollectorRegistry
+
+from server.board.board import Board, BoardHost
+from server.board.board_metrics import BoardMetrics
+from server.board.board_settings import MAX_NAME, BoardSettings
+from server.board.errors import BoardUnusable
+from server.board.memory_board import MemoryBoard
+from server.board.revocations import KnownLinks
+from server.board.seal import Seal
+
+__all__ = ["Board", "BoardHost", "check_board", "make_board"]
+
+NOT_INSTALLED = "a board needs the package redis: pip install 'lockstep[redis]'"
+NO_ADDRESS = "a board needs LOCKSTEP_PUBLIC_URL: other consoles' pages link here"
+
+
+def make_board(
+    settings: BoardSettings,
+    signing_key: str,
+    host: BoardHost,
+    invitations: KnownLinks,
+    public_url: str,
+    registry: CollectorRegistry,
+) -> Board:
+    """The board that the settings name.
+
+    Raises:
+        BoardUnusable: there can be none here.
+    """
+    if not settings.board_url:
+        return MemoryBoard()
+    check_board(settings, public_url)
+    from server.board.redis_board import RedisBoard  # an optional extra
+
+    name = settings.console_name or socket.gethostname()[:MAX_NAME]
+    return RedisBoard(
+        settings.board_url, Seal(signing_key), host, invitations, BoardMetrics(registry), public_url, name
+    )
+
+
+def check_board(settings: BoardSettings, public_url: str) -> None:
+    """Raises BoardUnusable when there can be no board; called before anything else is started."""
+    if not settings.board_url:
+        return
+    if not public_url:
+        raise BoardUnusable(NO_ADDRESS)
+    if importlib.util.find_spec("redis") is None:
+        raise BoardUnusable(NOT_INSTALLED)

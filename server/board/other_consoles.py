@@ -80,11 +80,11 @@ class OtherConsoles:
         return sorted(found.values(), key=lambda tile: tile.name)
 
     def conflicts(self, own: Collection[str], now: float) -> tuple[Conflict, ...]:
-        claims = {name: {self._own_name} for name in own}
+        claims: dict[str, list[str]] = {name: [self._own_name] for name in own}
         for other in self._others.values():
             if other.lives(now):
-                for tile in other.shown.robots:
-                    claims.setdefault(tile.name, set()).add(other.shown.name)
+                for name in {tile.name for tile in other.shown.robots}:
+                    claims.setdefault(name, []).append(other.shown.name)
         return tuple(
             Conflict(robot=robot, consoles=tuple(sorted(names)))
             for robot, names in sorted(claims.items())

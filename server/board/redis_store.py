@@ -10,7 +10,7 @@
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any
 from urllib.parse import urlsplit
@@ -31,6 +31,7 @@ from redis.exceptions import (
 from redis.exceptions import TimeoutError as RedisTimeout
 
 from server.board.errors import (
+    BoardError,
     BoardFull,
     BoardRefused,
     BoardSilent,
@@ -72,7 +73,9 @@ class RedisStore:
             url,
             protocol=2,
             parser_class=BoundedParser,
-            socket_timeout=timeout,
+            # The bounds are ours. With one of redis-py's its writes pass through asyncio.wait_for, which swallows a
+            # cancellation in Python 3.11.
+            socket_timeout=None,
             socket_connect_timeout=timeout,
             retry=Retry(NoBackoff(), 0),
             max_connections=CONNECTIONS,
@@ -95,8 +98,8 @@ class RedisStore:
             if news is not None:
                 commands.publish(NEWS, news)
 
-    async def shown(self, own: str) -> AsyncIterator[bytes]:
-        """What the other living consoles show."""
+    async def shown(self, own: str, refused: Callable[[BoardError], None]) -> AsyncIterator[bytes]:
+        """What the other living consoles show; what is wrong with a single one is `refused`."""
         with self._named():
             async with asyncio.timeout(self._timeout):
                 ids = await self._redis.zrevrange(CONSOLES, 0, MAX_CONSOLES)
@@ -105,8 +108,14 @@ class RedisStore:
         async with self._pipeline() as commands:
             for each in others:
                 commands.getrange(f"{PREFIX}console:".encode() + each, 0, MAX_PUBLISHED + SIZE)
-            found = await self._answers(commands)
+            found = await self._execute(commands)
         for each in found:
+            try:
+                with self._named():
+                    if isinstance(each, RedisError):
+                        raise each
+            except BoardError as error:
+                refused(error)
             if isinstance(each, bytes) and each:  # empty: it has expired
                 yield each
 
@@ -178,17 +187,16 @@ class RedisStore:
         with self._named():
             async with self._redis.pipeline(transaction=False) as commands:
                 yield commands
-                await self._answers(commands)
+                for each in await self._execute(commands):
+                    if isinstance(each, RedisError):
+                        raise each
 
-    async def _answers(self, commands: Pipeline) -> list[Any]:
-        """Raises the first error, after all have been carried out."""
+    async def _execute(self, commands: Pipeline) -> list[Any]:
+        """The answers; those that are errors too."""
         if not len(commands):
             return []
         async with asyncio.timeout(self._timeout):
             answers: list[Any] = await commands.execute(raise_on_error=False)
-        for each in answers:
-            if isinstance(each, RedisError):
-                raise each
         return answers
 
     @contextmanager

@@ -1,6 +1,6 @@
 """What one robot of a fleet looks like from outside, to other consoles and in `GET /api/fleet`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
@@ -8,10 +8,11 @@ from pydantic import AfterValidator, Field
 
 from robot_bridge.protocol.console import Role
 
-__all__ = ["MAX_PEOPLE", "ROBOT_NAME", "Person", "Tile"]
+__all__ = ["MAX_PEOPLE", "ROBOT_NAME", "Person", "Tile", "loud", "within_bounds"]
 
 ROBOT_NAME = r"^[a-z0-9][a-z0-9-]{0,31}$"  # for pydantic; with `re`, use fullmatch
 MAX_PEOPLE = 20  # that a tile names; the others are counted
+MAX_FAULTS = 20
 
 Name = Annotated[str, Field(max_length=60)]
 Words = Annotated[str, Field(max_length=500)]
@@ -61,7 +62,33 @@ class Tile:
     gap: Annotated[int, Field(ge=-(2**31), lt=2**31)] | None = None  # as the driver's page saw it last
     tolerance: Count | None = None
     recording: bool = False
-    faults: Annotated[tuple[Words, ...], Field(max_length=20)] = ()
+    faults: Annotated[tuple[Words, ...], Field(max_length=MAX_FAULTS)] = ()
     trouble: Words = ""
     has_picture: bool = False
     console: Name = ""  # name of the console that has it; "": this one
+
+
+def within_bounds(tile: Tile, public_url: str) -> Tile:
+    """As others take it: nothing longer than they read, and an address that leads here from anywhere."""
+    return replace(
+        tile,
+        label=tile.label[:60],
+        url=tile.url if "://" in tile.url else f"{public_url}/{tile.url}",
+        detail=tile.detail[:500],
+        stop_by=tile.stop_by[:500],
+        stop_reason=tile.stop_reason[:500],
+        driver=tile.driver[:60],
+        claims=tuple(name[:60] for name in tile.claims[:MAX_PEOPLE]),
+        participants=tuple(replace(each, name=each.name[:60]) for each in tile.participants[:MAX_PEOPLE]),
+        faults=tuple(fault[:500] for fault in tile.faults[:MAX_FAULTS]),
+        trouble=tile.trouble[:500],
+        console="",
+    )
+
+
+def loud(tile: Tile) -> tuple[object, ...]:
+    """What others should know at once; the rest can wait for a second."""
+    return (
+        tile.name, tile.link, tile.epoch, tile.stopped, tile.driver, tile.claims, tile.participants,
+        tile.participant_count, tile.recording, tile.faults, tile.trouble,
+    )  # fmt: skip

@@ -1,0 +1,71 @@
+"""Settings of the board that several consoles behind one entry share."""
+
+from pathlib import Path
+from typing import Self
+from urllib.parse import parse_qsl, urlsplit
+
+from pydantic import SecretStr, field_validator, model_validator
+from pydantic_settings import BaseSettings
+
+__all__ = ["MAX_NAME", "BoardSettings", "board_place"]
+
+MAX_NAME = 40
+QUERY = ("ssl_ca_certs", "ssl_certfile", "ssl_keyfile", "ssl_check_hostname", "ssl_cert_reqs")
+
+
+class BoardSettings(BaseSettings):
+    """Part of `Settings`."""
+
+    board: SecretStr = SecretStr("")  # "rediss://:password@host:6379/0"; "": this console is alone
+    board_file: Path | None = None  # the same, in a file; comes first
+    console_name: str = ""  # what other consoles' overviews call this one; "": the machine's name and a number
+
+    @field_validator("board_file", mode="before")
+    @classmethod
+    def _no_file(cls, value: object) -> object:
+        return None if value == "" else value
+
+    @field_validator("console_name")
+    @classmethod
+    def _check_name(cls, value: str) -> str:
+        if len(value) > MAX_NAME or not value.isprintable():
+            raise ValueError(f"at most {MAX_NAME} printable characters")
+        return value
+
+    @model_validator(mode="after")
+    def _check_board(self) -> Self:
+        if self.board_url:
+            _check_url(self.board_url)
+        return self
+
+    @property
+    def board_url(self) -> str:
+        """With its password: never to be shown. "" without a board."""
+        if self.board_file is not None:
+            return self.board_file.read_text().strip()
+        return self.board.get_secret_value().strip()
+
+
+def board_place(url: str) -> str:
+    """Where the board is, for people and logs: without user and password."""
+    parts = urlsplit(url)
+    return (
+        f"{parts.scheme}://{parts.path}"
+        if parts.scheme == "unix"
+        else f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"
+    )
+
+
+def _check_url(url: str) -> None:
+    """Raises ValueError that does not repeat the address, which may hold a password."""
+    try:
+        parts = urlsplit(url)
+        good = parts.scheme in ("redis", "rediss") and parts.hostname is not None and (parts.port or 1) > 0
+        good = good or (parts.scheme == "unix" and bool(parts.path))
+        query = [key for key, _ in parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query))]
+    except ValueError:
+        good, query = False, []
+    if not good:
+        raise ValueError("the board is not redis://[[user]:password@]host[:port][/number], rediss://… or unix:///path")
+    if not set(query) <= set(QUERY):
+        raise ValueError(f"the board's address may only have {', '.join(QUERY)} behind its question mark")

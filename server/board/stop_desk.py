@@ -1,0 +1,66 @@
+"""STOP for robots of other consoles: who was asked, who has answered. No I/O, no clock."""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import Callable, Collection
+
+from server.board.board import StopAnswer
+from server.board.messages import Outcome, StopReply, StopRequest
+
+__all__ = ["Asked", "StopDesk"]
+
+MAX_REMEMBERED = 256  # requests that were obeyed; a repeat of one is answered, not obeyed again
+KEPT = "no link to the robot; the stop is kept and sent first when the link is back"
+
+
+class Asked:
+    """A request of ours, until all have answered or nobody waits any more."""
+
+    def __init__(self, request: StopRequest) -> None:
+        self.request = request
+        self.answers: dict[str, StopAnswer] = {}
+        self.complete = asyncio.Event()
+
+    def answered(self, reply: StopReply) -> None:
+        """What counts of two answers for one robot is the worse: two consoles claim it."""
+        for each in reply.robots:
+            known = self.answers.get(each.robot)
+            if each.robot in self.request.robots and (known is None or known.delivered):
+                detail = "" if each.delivered else KEPT
+                self.answers[each.robot] = StopAnswer(True, each.delivered, each.event, detail)
+        if len(self.answers) == len(self.request.robots):
+            self.complete.set()
+
+
+class StopDesk:
+    def __init__(self) -> None:
+        self._asked: dict[str, Asked] = {}
+        self._obeyed: OrderedDict[str, tuple[Outcome, ...]] = OrderedDict()
+
+    @property
+    def waiting(self) -> int:
+        return len(self._asked)
+
+    def same(self, robots: Collection[str]) -> Asked | None:
+        """A request for just these robots that is under way."""
+        return next((asked for asked in self._asked.values() if set(asked.request.robots) == set(robots)), None)
+
+    def ask(self, request: StopRequest) -> Asked:
+        asked = self._asked[request.request] = Asked(request)
+        return asked
+
+    def end(self, asked: Asked) -> None:
+        self._asked.pop(asked.request.request, None)
+
+    def replied(self, reply: StopReply) -> None:
+        asked = self._asked.get(reply.request)
+        if asked is not None:
+            asked.answered(reply)
+
+    def obey(self, request: StopRequest, carry_out: Callable[[], tuple[Outcome, ...]]) -> tuple[Outcome, ...]:
+        """What became of it; a request that is repeated is carried out once."""
+        if request.request not in self._obeyed:
+            self._obeyed[request.request] = carry_out()
+            while len(self._obeyed) > MAX_REMEMBERED:
+                self._obeyed.popitem(last=False)
+        return self._obeyed[request.request]

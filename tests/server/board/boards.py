@@ -1,0 +1,94 @@
+"""Boards with a host that only remembers what it was asked for."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+
+from prometheus_client import CollectorRegistry
+
+from server.audit import Actor
+from server.board.board_metrics import BoardMetrics
+from server.board.redis_board import RedisBoard
+from server.board.seal import Seal
+from server.board.tile import Tile
+from server.invitations import Invitation
+
+__all__ = ["KEY", "FakeHost", "FakeLinks", "TestBoard", "eventually", "running_board", "tile"]
+
+KEY = "k" * 32
+PATIENCE = 10.0  # s; a busy machine, never waited for in full
+
+
+def tile(name: str = "left", **more: object) -> Tile:
+    return Tile(**{"name": name, "label": "Planar", "url": f"robots/{name}/", "link": "up", **more})  # type: ignore[arg-type]
+
+
+class FakeHost:
+    """Has robots that can always be told, except those in `away`."""
+
+    def __init__(self) -> None:
+        self.stops: list[tuple[str, str, str]] = []
+        self.away: set[str] = set()
+        self.ended: list[Invitation] = []
+
+    def stop_robot(self, name: str, by: Actor, reason: str) -> tuple[bool, int]:
+        self.stops.append((name, by.name, reason))
+        return name not in self.away, 7
+
+    def links_revoked(self, ended: list[Invitation]) -> None:
+        self.ended += ended
+
+
+class FakeLinks:
+    def __init__(self) -> None:
+        self.on_revoked: Callable[[], None] = lambda: None
+        self.here: dict[str, float] = {}
+        self.elsewhere: dict[str, float] = {}
+
+    def revoke(self, link: str) -> None:
+        self.here[link] = time.time() + 3600
+        self.on_revoked()
+
+    def revoked_links(self) -> dict[str, float]:
+        return {**self.elsewhere, **self.here}
+
+    def revoked_elsewhere(self, links: Mapping[str, float]) -> bool:
+        fresh = {link: expires for link, expires in links.items() if link not in self.elsewhere}
+        self.elsewhere.update(fresh)
+        return bool(fresh)
+
+    def keep_revoked_elsewhere(self) -> list[Invitation]:
+        return []
+
+
+class TestBoard(RedisBoard):
+    """With its host and links at hand."""
+
+    __test__ = False
+
+    def __init__(self, url: str, name: str, key: str) -> None:
+        self.host, self.links, self.registry = FakeHost(), FakeLinks(), CollectorRegistry()
+        metrics = BoardMetrics(self.registry)
+        super().__init__(url, Seal(key), self.host, self.links, metrics, f"https://{name}.example", name)
+
+    def count(self, metric: str, **labels: str) -> float:
+        return self.registry.get_sample_value(metric, labels) or 0.0
+
+
+@asynccontextmanager
+async def running_board(url: str, name: str, *robots: Tile, key: str = KEY) -> AsyncIterator[TestBoard]:
+    board = TestBoard(url, name, key)
+    board.publish(robots)
+    async with asyncio.TaskGroup() as tasks:
+        running = tasks.create_task(board.run())
+        try:
+            yield board
+        finally:
+            running.cancel()
+
+
+async def eventually(true: Callable[[], object], what: str) -> None:
+    async with asyncio.timeout(PATIENCE):
+        while not true():  # noqa: ASYNC110
+            await asyncio.sleep(0.02)
