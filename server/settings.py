@@ -10,6 +10,7 @@ from pydantic_settings import SettingsConfigDict
 
 from robot_bridge.protocol.console import SpeedCapMode
 from robot_bridge.protocol.errors import SecretError
+from server.board.board_settings import BoardSettings
 from server.fleet.fleet_settings import FleetSettings
 from server.limit_settings import LimitSettings
 from server.link_access import link_access
@@ -25,7 +26,7 @@ __all__ = ["Settings"]
 MIN_SECRET_BYTES = 32  # RFC 7518 3.2: an HS256 key is at least as long as the hash
 
 
-class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, FleetSettings):
+class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, FleetSettings, BoardSettings):
     """All that can be set. Times in seconds."""
 
     model_config = SettingsConfigDict(env_prefix="LOCKSTEP_", env_nested_delimiter="__", frozen=True, extra="ignore")

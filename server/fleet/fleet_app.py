@@ -8,6 +8,7 @@ from fastapi import Depends, FastAPI, Request, Response
 from starlette.routing import Mount
 
 from server.app import guard_app, restrict_ice, same_origin
+from server.board import make_board
 from server.error_answers import answer_errors
 from server.errors import NotFound
 from server.fleet import api_fleet
@@ -34,7 +35,15 @@ def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: 
         guard = Guard(settings)
         house = House(opened, guard, fleet.metrics, settings.max_total_peers, settings.reserved_places)
         app.state.house = house
-        async with fleet.running(house, fleet.board):
+        board = make_board(
+            settings,
+            opened.signing_key(settings),
+            fleet,
+            opened.invitations,
+            settings.public_url,
+            fleet.metrics.registry,
+        )
+        async with fleet.running(house, board):
             yield
 
     app = FastAPI(

@@ -44,7 +44,7 @@ export class RecordingsApi {
     const path = `/api/recordings/${encodeURIComponent(id)}/ticket`;
     const found = await this.api.json("POST", path, undefined, limit());
     const link = isRecord(found) ? found["path"] : undefined;
-    if (typeof link !== "string" || !link.startsWith("/api/recordings/"))
+    if (typeof link !== "string" || !link.startsWith(new URL("./api/recordings/", document.baseURI).pathname))
       throw new ConsoleError(200, "malformed", "no path", null);
     return link;
   }
