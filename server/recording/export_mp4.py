@@ -1,4 +1,4 @@
-"""`lockstep export --to mp4`: one file for each camera, with sound. Pictures and sound are copied, not encoded again.
+"""`lockstep export --to mp4`: one file for each camera, with sound. Pictures and Opus are copied, not encoded again.
 
 Only where the size of the pictures changed on the way they are encoded anew, all in the largest size.
 """
@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import av
-from av.audio.stream import AudioStream
 from av.container import OutputContainer
-from av.video.stream import VideoStream
 
 from server.recording.errors import RecordingDamaged
+from server.recording.event_index import TopicEntry
+from server.recording.export_sound import CopiedOpus, EncodedG711
 from server.recording.payload import picture_size
 from server.recording.reader import RecordingReader
 from server.recording.topics import CAMERA
@@ -23,10 +23,8 @@ __all__ = ["export"]
 
 VIDEO_BASE = Fraction(1, 90_000)
 SECOND = 1_000_000_000
-OPUS_RATE = 48_000  # Hz
-SOUND_BASE = Fraction(1, OPUS_RATE)
 MILLISECOND = 1_000_000
-OPUS_STEREO = 0x04  # in the first byte of a packet (RFC 6716 3.1)
+OPUS, G711 = "foxglove.CompressedAudio", "foxglove.RawAudio"  # how sound is recorded
 
 
 class Timed(NamedTuple):
@@ -51,9 +49,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         cameras = [topic for topic in cameras if reader.index.counts.get(topic)]
         if not cameras:
             raise RecordingDamaged("it has no pictures")
-        # MP4 holds Opus, not G.711.
-        sounds = [each.topic for each in reader.index.topics if each.schema == "foxglove.CompressedAudio"]
-        sound = next((topic for topic in sounds if reader.index.counts.get(topic)), "")
+        sound = _first_sound(reader)
         written = []
         for topic in cameras:
             target = _target(path, out, topic.removeprefix(CAMERA), len(cameras) == 1)
@@ -63,28 +59,40 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         return written
 
 
+def _first_sound(reader: RecordingReader) -> TopicEntry | None:
+    """Of the microphones the first one that was heard."""
+    found = (each for each in reader.index.topics if each.schema in (OPUS, G711))
+    return next((each for each in found if reader.index.counts.get(each.topic)), None)
+
+
 def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
     if out is not None and only and out.suffix == ".mp4":
         return out
     return (out or path.parent) / f"{path.stem}-{camera}.mp4"
 
 
-def _write(reader: RecordingReader, topic: str, sound: str, target: Path) -> None:
+def _write(reader: RecordingReader, topic: str, sound: TopicEntry | None, target: Path) -> None:
     sizes = {size for each in _timed(reader, topic) if each.keyframe for size in [picture_size(each.data)] if size}
     first = next(_timed(reader, topic), None)
     if first is None or not sizes:
         raise RecordingDamaged(f"{topic}: there is no picture that can be decoded")
-    packet = next(_timed(reader, sound), None) if sound else None
+    packet = None if sound is None else next(_timed(reader, sound.topic), None)
     began = min(each.captured for each in (first, packet) if each is not None)
     with av.open(str(target), "w", format="mp4", options={"movflags": "+faststart"}) as output:
         pictures = _Copied(output, first.data) if len(sizes) == 1 else _Encoded(output, max(sizes))
-        audio = None if packet is None else _opus_stream(output, packet.data)
-        for each in _timed(reader, topic, sound):
+        audio = None if packet is None or sound is None else _sound_writer(output, sound.schema, packet.data)
+        for each in _timed(reader, topic, *([] if sound is None else [sound.topic])):
             if each.topic == topic:
                 pictures.take(each, began)
             elif audio is not None:
-                _mux(output, audio, each, began, SOUND_BASE)
+                audio.take(each.data, each.captured - began)
         pictures.close()
+        if audio is not None:
+            audio.close()
+
+
+def _sound_writer(output: OutputContainer, schema: str, packet: bytes) -> CopiedOpus | EncodedG711:
+    return CopiedOpus(output, packet) if schema == OPUS else EncodedG711(output)
 
 
 class _Copied:
@@ -98,7 +106,11 @@ class _Copied:
         self._stream.time_base = VIDEO_BASE
 
     def take(self, each: Timed, began: int) -> None:
-        _mux(self._output, self._stream, each, began, VIDEO_BASE)
+        packet = av.Packet(each.data)
+        packet.stream, packet.time_base = self._stream, VIDEO_BASE
+        packet.pts = packet.dts = round((each.captured - began) / SECOND / VIDEO_BASE)
+        packet.is_keyframe = each.keyframe
+        self._output.mux(packet)
 
     def close(self) -> None: ...
 
@@ -122,22 +134,6 @@ class _Encoded:
 
     def close(self) -> None:
         self._output.mux(self._stream.encode(None))
-
-
-def _mux(output: OutputContainer, stream: VideoStream | AudioStream, each: Timed, began: int, base: Fraction) -> None:
-    packet = av.Packet(each.data)
-    packet.stream = stream
-    packet.time_base = base
-    packet.pts = packet.dts = round((each.captured - began) / SECOND / base)
-    packet.is_keyframe = each.keyframe
-    output.mux(packet)
-
-
-def _opus_stream(output: OutputContainer, packet: bytes) -> AudioStream:
-    """Of the encoder only its header is used."""
-    stream = output.add_stream("libopus", rate=OPUS_RATE, layout="stereo" if packet[0] & OPUS_STEREO else "mono")
-    stream.time_base = SOUND_BASE
-    return stream
 
 
 def _timed(reader: RecordingReader, *topics: str) -> Iterator[Timed]:

@@ -7,13 +7,16 @@ import sys
 from pathlib import Path
 
 import av
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from server.recording import export_csv, export_lerobot, export_mp4, export_parquet
 from server.recording.errors import RecordingDamaged
-from server.recording.topics import CAMERA
-from tests.server.recording.makers import Story, rewritten
+from server.recording.foxglove import sound_message
+from server.recording.topics import CAMERA, MICROPHONE
+from server.recording.writer import RecordingWriter
+from tests.server.recording.makers import CODECS, DESCRIPTION, INFO, Story, rewritten
 
 EVENTS = 60
 
@@ -48,6 +51,40 @@ def test_mp4_has_the_same_pictures_and_sound_and_not_encoded_again(file: Path, t
     with av.open(str(target)) as video:
         samples = sum(frame.samples for frame in video.decode(audio=0))
         assert samples >= (2 * (EVENTS - 1) - 2) * 960
+
+
+def test_mp4_has_g711_sound_as_aac_with_silence_where_packets_are_missing(tmp_path: Path) -> None:
+    source, rate, gap = tmp_path / "a.mcap", 8000, range(20, 40)  # 0.8 s
+    tone = (12_000 * np.sin(np.arange(160) * 2 * np.pi * 400 / rate)).astype(np.int16)
+    (packet,) = mulaw(tone)
+    entries = [
+        each._replace(data=sound_message("g711-ulaw", each.captured, packet, rate, 1))
+        if each.topic == MICROPHONE + "ear"
+        else each
+        for each in Story(events=EVENTS, real=True).entries()
+        if each.topic != MICROPHONE + "ear" or each.event not in gap
+    ]
+    writer = RecordingWriter(source, INFO, DESCRIPTION, CODECS | {"ear": "PCMU"})
+    for each in entries:
+        writer.write(each)
+    writer.close()
+    (target,) = export_mp4.export(source, tmp_path / "a.mp4", "")
+    with av.open(str(target)) as video:
+        assert video.streams.audio[0].codec_context.name == "aac"
+        heard = np.concatenate([frame.to_ndarray().ravel() for frame in video.decode(audio=0)])
+    levels = [float(np.abs(heard[at : at + 800]).max()) for at in range(0, len(heard) - 800, 800)]  # tenths of seconds
+    assert len(heard) / rate == pytest.approx((EVENTS - 1) * 0.04, abs=0.2)
+    assert min(levels[2:6]) > 0.3
+    assert max(levels[9:15]) < 0.02
+    assert min(levels[17:-1]) > 0.3
+
+
+def mulaw(samples: np.typing.NDArray[np.int16]) -> list[bytes]:
+    encoder = av.CodecContext.create("pcm_mulaw", "w")
+    encoder.sample_rate, encoder.layout, encoder.format = 8000, "mono", "s16"
+    frame = av.AudioFrame.from_ndarray(samples.reshape(1, -1), format="s16", layout="mono")
+    frame.sample_rate = 8000
+    return [bytes(packet) for packet in encoder.encode(frame)]
 
 
 def test_mp4_of_a_recording_without_pictures_is_refused_by_name(tmp_path: Path) -> None:
