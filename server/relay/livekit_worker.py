@@ -14,7 +14,7 @@ from typing import BinaryIO
 import msgspec
 
 from server.relay.livekit_room import LiveKitRoom
-from server.relay.livekit_wire import Ended, Join, Said, decode_order, encode_message, read_message
+from server.relay.livekit_wire import Join, Said, decode_order, encode_message, read_message
 
 __all__ = ["main"]
 

@@ -63,7 +63,7 @@ class RelaySettings(BaseSettings):
             raise ValueError("livekit: needs relay_key and relay_secret (LOCKSTEP_RELAY_KEY, LOCKSTEP_RELAY_SECRET)")
         if len(self.relay_secret.get_secret_value().encode()) < SHORTEST_SECRET:
             raise ValueError(f"relay_secret has fewer than {SHORTEST_SECRET} bytes (RFC 7518 3.2)")
-        if find_spec("livekit") is None:
+        if not client_is_installed():
             raise ValueError(NO_CLIENT)
 
     @property
@@ -81,3 +81,8 @@ class RelaySettings(BaseSettings):
             if url.engine == "livekit":  # its client asks over HTTP why it was refused
                 found[f"{part.scheme.replace('ws', 'http')}://{part.netloc}"] = None
         return tuple(found)
+
+
+def client_is_installed() -> bool:
+    """LiveKit's client; other packages of theirs live beside it under the same name."""
+    return find_spec("livekit") is not None and find_spec("livekit.rtc") is not None

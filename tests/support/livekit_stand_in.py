@@ -1,7 +1,7 @@
 """What stands in for a LiveKit server in tests: no server of theirs can be had here.
 
-It speaks the signalling of LiveKit's protocol, version 0 (`/rtc`, two peer connections), as far as LiveKit's own clients
-need it to publish and to subscribe, and forwards packets between them as they are: what a real one does to
+It speaks the signalling of LiveKit's protocol, version 0 (`/rtc`, two peer connections), as far as LiveKit's own
+clients need it to publish and to subscribe, and forwards packets between them as they are: what a real one does to
 them (bandwidth, layers, retransmission, trailers) is not shown by it. The clients on both sides are the real ones.
 """
 
@@ -22,6 +22,7 @@ from aiortc.rtp import HeaderExtensionsMap, RtcpPacket, RtcpPsfbPacket, RtpPacke
 from aiortc.sdp import candidate_from_sdp
 from livekit.protocol import models, rtc
 from websockets.asyncio.server import Request, Response, ServerConnection, serve
+from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 
 __all__ = ["KEY", "SECRET", "LiveKitStandIn", "Member", "livekit_stand_in"]
@@ -91,6 +92,7 @@ class LiveKitStandIn:
         self.members: list[Member] = []
         self.claims: list[dict[str, Any]] = []  # of everybody who came in
         self.refused = 0
+        self.accepts = True  # False: as if it were overloaded
         self.payloads: Callable[[str, RtpPacket], None] = lambda _name, _packet: None
         self.data: list[tuple[str, bytes]] = []  # topic and payload, the last ones
         self._changed = asyncio.Event()
@@ -110,13 +112,12 @@ class LiveKitStandIn:
 
     def admit(self, _: ServerConnection, request: Request) -> Response | None:
         """Only who has a good token; and only version 0."""
-        path = urlsplit(request.path)
-        if path.path != "/rtc":
-            return Response(404, "Not Found", request.headers.__class__(), b"")
         if self._claims_of(request) is None:
             self.refused += 1
-            return Response(HTTPStatus.UNAUTHORIZED, "Unauthorized", request.headers.__class__(), b"invalid token")
-        return None
+            return _no(HTTPStatus.UNAUTHORIZED)
+        if not self.accepts:
+            return _no(HTTPStatus.SERVICE_UNAVAILABLE)
+        return None if urlsplit(request.path).path == "/rtc" else _no(HTTPStatus.NOT_FOUND)
 
     @staticmethod
     def _claims_of(request: Request) -> dict[str, Any] | None:
@@ -289,7 +290,6 @@ class LiveKitStandIn:
         if not member.channels:
             member.channels["_lossy"] = pc.createDataChannel("_lossy", ordered=False, maxRetransmits=0)
             member.channels["_reliable"] = pc.createDataChannel("_reliable")
-        names: dict[int, str] = {}
         for other in self._room(member):
             for track in other.tracks:
                 if track.info.sid not in member.outlets:
@@ -299,7 +299,6 @@ class LiveKitStandIn:
                     sender._send_keyframe = self.ask_for_keyframe
                     member.outlets[track.info.sid] = transceiver
         await pc.setLocalDescription(await pc.createOffer())
-        del names
         await member.say(offer=rtc.SessionDescription(type="offer", sdp=pc.localDescription.sdp, id=1))
 
     def _later(self, coroutine: Any) -> None:
@@ -311,6 +310,12 @@ class LiveKitStandIn:
         for task in list(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+
+
+def _no(status: HTTPStatus) -> Response:
+    """Pages of another origin may read it."""
+    headers = Headers({"Access-Control-Allow-Origin": "*", "Content-Length": str(len(status.phrase))})
+    return Response(status.value, status.phrase, headers, status.phrase.encode())
 
 
 async def _nothing(parameters: Any) -> None:
