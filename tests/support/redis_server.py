@@ -27,8 +27,9 @@ def free_port() -> int:
 class RedisServer:
     """Enter it. What it kept is gone after `kill`, as that of a machine that is lost."""
 
-    def __init__(self, directory: Path, *options: str, password: str = "") -> None:
+    def __init__(self, directory: Path, *options: str, password: str = "", encrypted: bool = False) -> None:
         self.port = free_port()
+        self._encrypted = encrypted
         self.password = password
         self._directory = directory
         self._options = options
@@ -37,12 +38,14 @@ class RedisServer:
     @property
     def url(self) -> str:
         secret = f":{self.password}@" if self.password else ""
-        return f"redis://{secret}127.0.0.1:{self.port}/0"
+        return f"{'rediss' if self._encrypted else 'redis'}://{secret}127.0.0.1:{self.port}/0"
 
     async def start(self) -> None:
         program = shutil.which("redis-server")
         assert program is not None, "redis-server is not installed; `make test` installs it"
-        settings = ["--port", str(self.port), "--bind", "127.0.0.1", "--dir", str(self._directory)]
+        settings = ["--bind", "127.0.0.1", "--dir", str(self._directory)]
+        settings += ["--port", "0", "--tls-port"] if self._encrypted else ["--port"]
+        settings += [str(self.port)]
         settings += ["--save", "", "--appendonly", "no", "--daemonize", "no"]
         settings += ["--requirepass", self.password] if self.password else []
         self._process = await asyncio.to_thread(_spawn, [program, *settings, *self._options])

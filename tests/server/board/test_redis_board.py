@@ -1,7 +1,7 @@
 """The board on a real Redis."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -130,5 +130,5 @@ async def test_two_living_consoles_that_claim_one_robot_both_say_so_and_the_log_
             await eventually(lambda: not one.state.conflicts, "the end of it")
 
 
-def _named(logs: list[dict[str, object]]) -> int:
+def _named(logs: Sequence[Mapping[str, object]]) -> int:
     return sum(each.get("error") == "robot_claimed_twice" and each.get("robot") == "left" for each in logs)
