@@ -3,6 +3,7 @@
 import fcntl
 import time
 from collections.abc import Collection
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -111,17 +112,22 @@ class Shelf:
         """Delete recordings that are too old, and the oldest while there are too many bytes; returns their ids."""
         dated = []
         for path in self.files():
-            status = path.stat()
-            dated.append((status.st_mtime, status.st_size, path))
+            with suppress(OSError):  # somebody else deletes too
+                status = path.stat()
+                dated.append((status.st_mtime, status.st_size, path))
         total = sum(size for _, size, _ in dated)
         oldest = time.time() - self._settings.age_days * DAY
         gone = []
         for changed, size, path in sorted(dated):
             if total <= self._settings.total_bytes and changed >= oldest:
                 break
-            if path in keep or _is_locked(path):
+            try:
+                if path in keep or _is_locked(path):
+                    continue
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                log.error("a recording cannot be deleted", file=path.name, reason=error.strerror)
                 continue
-            path.unlink(missing_ok=True)
             total -= size
             gone.append(path.stem)
             log.warning("a recording was deleted to make room", file=path.name)

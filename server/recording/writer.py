@@ -57,7 +57,7 @@ class RecordingWriter:
         self._chunk_since: int | None = None  # ns, arrival of its first record
         try:
             self._file: BinaryIO = path.open("xb")
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # tells others that it is being written
+            fcntl.flock(self._file, fcntl.LOCK_EX)  # being written; one who lists files lets go of it at once
         except OSError as error:
             raise DiskTrouble(_reason(error)) from error
         self._writer = Writer(self._file, chunk_size=NEVER, compression=CompressionType.ZSTD)

@@ -1,0 +1,96 @@
+"""`lockstep recordings`, `verify`, `export`, `report` and `record`, as their users call them."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from server.cli import app
+from tests.server.recording.makers import Story
+
+EVENTS = 60
+
+
+@pytest.fixture
+def directory(tmp_path: Path) -> Path:
+    """Where recordings are; one is there."""
+    found = tmp_path / "recordings"
+    found.mkdir()
+    Story(events=EVENTS, real=True).write(found / "one.mcap")
+    return found
+
+
+def _lockstep(directory: Path, *arguments: str) -> Result:
+    environment = {
+        "LOCKSTEP_STATE_DIR": str(directory.parent / "state"),
+        "LOCKSTEP_RECORDING__DIRECTORY": str(directory),
+        "LOCKSTEP_PUBLIC_URL": "",
+    }
+    return CliRunner().invoke(app, arguments, env=environment)
+
+
+def test_recordings_are_listed_in_words_and_as_json(directory: Path) -> None:
+    words = _lockstep(directory, "recordings")
+    assert words.exit_code == 0, words.output
+    assert words.stdout.startswith("one ")
+    assert f"s=1–{EVENTS}" in words.stdout
+    assert "Planar robot  first" in words.stdout
+    (entry,) = json.loads(_lockstep(directory, "recordings", "--json").stdout)
+    assert (entry["id"], entry["last_event"], entry["interrupted"]) == ("one", EVENTS, False)
+    assert json.loads(_lockstep(directory, "recordings", "--json", "--dir", str(directory.parent)).stdout) == []
+
+
+def test_a_recording_is_verified_by_its_id_or_its_path(directory: Path) -> None:
+    words = _lockstep(directory, "verify", "one")
+    assert words.exit_code == 0, words.output
+    assert words.stdout.startswith(f"{EVENTS - 1} commands, {EVENTS - 1} events")
+    assert "FAIL" not in words.stdout
+    found = json.loads(_lockstep(directory, "verify", str(directory / "one.mcap"), "--json").stdout)
+    assert all(check["count"] == 0 for check in found["checks"].values())
+
+
+def test_a_tampered_recording_ends_with_1_and_what_is_none_with_2(directory: Path) -> None:
+    path = directory / "one.mcap"
+    data = bytearray(path.read_bytes())
+    data[len(data) // 3] ^= 1
+    path.write_bytes(data)
+    verdict = _lockstep(directory, "verify", "one")
+    assert verdict.exit_code == 1
+    assert "FAIL  readable" in verdict.stdout
+    (directory / "text.mcap").write_text("no recording")
+    assert _lockstep(directory, "verify", "text").exit_code == 2
+    missing = _lockstep(directory, "verify", "nowhere")
+    assert missing.exit_code == 2
+    assert "there is no recording nowhere" in missing.stderr
+
+
+@pytest.mark.parametrize(
+    ("kind", "written"), [("mp4", "one-front.mp4"), ("csv", "one.csv"), ("parquet", "one.parquet")]
+)
+def test_an_export_says_what_it_wrote_beside_the_recording(directory: Path, kind: str, written: str) -> None:
+    done = _lockstep(directory, "export", "one", "--to", kind)
+    assert done.exit_code == 0, done.output
+    assert done.stdout.split() == [str(directory / written)]
+    assert (directory / written).stat().st_size > 0
+
+
+def test_a_dataset_goes_where_it_is_told(directory: Path, tmp_path: Path) -> None:
+    out = tmp_path / "dataset"
+    done = _lockstep(directory, "export", "one", "--to", "lerobot", "--out", str(out), "--task", "push")
+    assert done.exit_code == 0, done.output
+    assert (out / "meta" / "info.json").is_file()
+
+
+def test_what_cannot_be_exported_is_said_in_one_line(directory: Path) -> None:
+    (directory / "text.mcap").write_text("no recording")
+    done = _lockstep(directory, "export", "text", "--to", "csv")
+    assert done.exit_code == 2
+    assert "lockstep: text.mcap is no MCAP file" in done.stderr
+    assert "Traceback" not in done.output
+
+
+def test_without_a_console_recording_says_that_none_runs(directory: Path) -> None:
+    done = _lockstep(directory, "record", "start")
+    assert done.exit_code == 2
+    assert "no console has run with this state directory" in done.stderr
