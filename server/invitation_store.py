@@ -57,8 +57,9 @@ class InvitationStore:
         return invitation_id in self._revoked or invitation_id in self._elsewhere
 
     def revoked_links(self) -> dict[str, float]:
-        """Those that were revoked here, and when each would have expired."""
-        return {each.id: each.expires for each in self._known.all if each.revoked_at is not None}
+        """All that is known to be revoked, here and elsewhere, and when each would have expired."""
+        here = {each.id: each.expires for each in self._known.all if each.revoked_at is not None}
+        return {**self._elsewhere, **here}
 
     def revoked_elsewhere(self, links: Mapping[str, float]) -> bool:
         """Other consoles revoked these: `is_revoked` knows it from now on. Whether any of them is new."""
