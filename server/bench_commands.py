@@ -14,6 +14,11 @@ COMMANDS = {
         "experiment_command",
         "Repeat the thesis' experiments on emulated networks.",
     ),
+    "fleet-soak": (
+        "bench.fleet_soak.cli",
+        "fleet_soak_command",
+        "Drive several robots on one console while their bridges are killed in turn.",
+    ),
     "network": (
         "bench.emulator.cli",
         "network_command",

@@ -1,0 +1,93 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from server.fleet.robot_names import BadFleet
+from server.fleet.robots import robot_settings
+from server.settings import Settings
+
+TWO = ("left=tcp://h:1", "right=tcp://h:2")
+
+
+def fleet_file(folder: Path, text: str) -> Path:
+    path = folder / "fleet.toml"
+    path.write_text(text)
+    return path
+
+
+def test_each_robot_has_the_consoles_settings_and_its_own_address() -> None:
+    found = robot_settings(Settings(robots=TWO, seat_timeout=7.0))
+    assert {name: each.robot for name, each in found.items()} == {"left": "tcp://h:1", "right": "tcp://h:2"}
+    assert all(each.seat_timeout == 7.0 and not each.is_fleet for each in found.values())
+
+
+def test_the_environment_counts_for_every_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LOCKSTEP_MAX_PEERS", "17")
+    monkeypatch.setenv("LOCKSTEP_ROBOTS", "left=tcp://h:1, right=tcp://h:2")
+    assert [each.max_peers for each in robot_settings(Settings()).values()] == [17, 17]
+
+
+def test_the_file_gives_a_robot_what_the_others_have_not(tmp_path: Path) -> None:
+    path = fleet_file(
+        tmp_path,
+        """
+        [robots.gate]
+        robot = "tcp://h:3"
+        cameras = "front=rtsp://camera/1"
+        max_peers = 5
+        [robots.gate.media]
+        quality = false
+        """,
+    )
+    found = robot_settings(Settings(robots=TWO, fleet_file=path, max_peers=50))
+    assert list(found) == ["left", "right", "gate"]
+    assert [each.max_peers for each in found.values()] == [50, 50, 5]
+    assert [len(each.sources) for each in found.values()] == [0, 0, 1]
+    assert not found["gate"].media.quality
+
+
+def test_recordings_of_each_robot_go_into_a_directory_of_its_own(tmp_path: Path) -> None:
+    found = robot_settings(Settings(robots=TWO, recording={"directory": tmp_path}))  # type: ignore[arg-type]
+    assert {each.recording.directory for each in found.values()} == {tmp_path / "left", tmp_path / "right"}
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("", "no_robots"),
+        ("robots = 3", "fleet_unreadable"),
+        ("[robots.left", "fleet_unreadable"),
+        ('[robots.left]\nrobot = "tcp://h:1"\n[else]\n', "fleet_unreadable"),
+        ("[robots.left]\n", "robot_without_address"),
+        ('[robots."A b"]\nrobot = "tcp://h:1"', "bad_robot_name"),
+        ('[robots.left]\nrobot = "h:1"', "bad_setting"),
+        ('[robots.left]\nrobot = "tcp://h:1"\nport = 80', "setting_of_the_console"),
+    ],
+)
+def test_a_file_that_cannot_be_meant_is_refused_by_name(tmp_path: Path, text: str, name: str) -> None:
+    with pytest.raises(BadFleet) as refused:
+        robot_settings(Settings(fleet_file=fleet_file(tmp_path, text)))
+    assert refused.value.name == name
+
+
+def test_a_file_that_is_not_there_is_refused() -> None:
+    with pytest.raises(BadFleet, match="fleet_unreadable"):
+        robot_settings(Settings(fleet_file=Path("/nowhere/fleet.toml")))
+
+
+def test_a_robot_of_the_flag_and_of_the_file_is_named_twice(tmp_path: Path) -> None:
+    path = fleet_file(tmp_path, '[robots.left]\nrobot = "tcp://h:1"')
+    with pytest.raises(BadFleet, match="robot_named_twice"):
+        robot_settings(Settings(robots=TWO, fleet_file=path))
+
+
+@pytest.mark.parametrize("shared", [{"cameras": ["rtsp://c/1"]}, {"speaker": "file:/tmp/x.wav"}])
+def test_what_hangs_at_one_robot_is_not_given_to_all(shared: dict[str, Any]) -> None:
+    with pytest.raises(BadFleet, match="setting_of_one_robot"):
+        robot_settings(Settings(robots=TWO, **shared))
+
+
+def test_a_bad_name_is_a_bad_setting() -> None:
+    with pytest.raises(ValueError, match="bad_robot_name"):
+        Settings(robots=("A=tcp://h:1",))
