@@ -15,10 +15,13 @@ from robot_bridge.cli import robot_app
 from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.robots.registry import robot_names
 from server.bench_commands import add_bench_commands
+from server.board import check_board
+from server.board.errors import BoardUnusable
 from server.bridge_process import BridgeFailed, BridgeProcess
 from server.cli_access import StateDirOption, add_access_commands
 from server.cli_options import (
     AllowedHosts,
+    Board,
     Cameras,
     Microphones,
     ObserversDirect,
@@ -52,6 +55,7 @@ DEFAULT_ROBOT = "mobile-manipulator"
 EXIT_USAGE = 2
 EXIT_PORT_TAKEN = 3
 EXIT_BRIDGE = 4
+NO_NAMES = "a board needs robots with names that no other console has: --robot NAME=tcp://…"
 # A worker thread of ours (encoders, the 3D scene) may hold the interpreter this long while a command waits.
 SWITCH_INTERVAL = 0.0005  # s; Python's own is ten times that
 
@@ -114,6 +118,7 @@ def up(
     observers_direct: ObserversDirect = None,
     public_url: PublicUrl = None,
     allowed_host: AllowedHosts = None,
+    board: Board = None,
     tls: Tls = None,
     tls_cert: TlsCert = None,
     tls_key: TlsKey = None,
@@ -126,7 +131,7 @@ def up(
     state_dir: StateDirOption = None,
 ) -> None:
     """Run a simulated robot and the console, and print the links that open it."""
-    network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
+    network = _network(public_url, allowed_host, board, tls, tls_cert, tls_key, stun, turn, turn_secret)
     settings = _settings(
         host=host,
         port=port,
@@ -193,6 +198,7 @@ def serve(
     observers_direct: ObserversDirect = None,
     public_url: PublicUrl = None,
     allowed_host: AllowedHosts = None,
+    board: Board = None,
     tls: Tls = None,
     tls_cert: TlsCert = None,
     tls_key: TlsKey = None,
@@ -205,7 +211,7 @@ def serve(
     state_dir: StateDirOption = None,
 ) -> None:
     """Run the console for a robot bridge that runs elsewhere."""
-    network = _network(public_url, allowed_host, tls, tls_cert, tls_key, stun, turn, turn_secret)
+    network = _network(public_url, allowed_host, board, tls, tls_cert, tls_key, stun, turn, turn_secret)
     settings = _settings(
         **_robots(robot),
         fleet_file=fleet,
@@ -264,6 +270,7 @@ def _recording(directory: Record) -> dict[str, object] | None:
 def _network(
     public_url: PublicUrl,
     allowed_hosts: AllowedHosts,
+    board: Board,
     tls: Tls,
     tls_cert: TlsCert,
     tls_key: TlsKey,
@@ -292,15 +299,18 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         _check_files(settings)
+        check_board(settings, settings.public_url)
         if settings.is_fleet:
             robot_settings(settings)
+        elif settings.has_board:
+            raise BoardUnusable(NO_NAMES)
         listener = bind(settings.host, settings.port)
         state = open_state(settings, fall_back=True)
         uvloop.run(run_console(settings, state, listener, bridges, as_json))
     except PortTaken as error:
         say(f"{error}; choose another with --port")
         raise typer.Exit(EXIT_PORT_TAKEN) from error
-    except (StateDirUnusable, BadFleet) as error:
+    except (StateDirUnusable, BadFleet, BoardUnusable) as error:
         raise _usage(str(error)) from error
     except BridgeFailed as error:
         say(str(error))

@@ -8,6 +8,7 @@ import typer
 
 __all__ = [
     "AllowedHosts",
+    "Board",
     "Cameras",
     "Microphones",
     "ObserversDirect",
@@ -35,6 +36,14 @@ PublicUrl = Annotated[str | None, typer.Option(help="Where people find the conso
 AllowedHosts = Annotated[
     list[str] | None,
     typer.Option("--allowed-host", help="Further name that requests may be for; may be given again."),
+]
+Board = Annotated[
+    str | None,
+    typer.Option(
+        help="Redis that several consoles behind one entry share, redis[s]://:password@host:port/0. With a password "
+        "better in the environment or a file. docs/fleet.md",
+        metavar="URL",
+    ),
 ]
 Tls = Annotated[str | None, typer.Option(help="self-signed: encrypt with a certificate of the console's own making.")]
 TlsCert = Annotated[Path | None, typer.Option(help="Certificate chain for TLS, PEM.")]

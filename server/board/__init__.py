@@ -7,7 +7,7 @@ from prometheus_client import CollectorRegistry
 
 from server.board.board import Board, BoardHost
 from server.board.board_metrics import BoardMetrics
-from server.board.board_settings import MAX_NAME, BoardSettings
+from server.board.board_settings import MAX_NAME, BoardSettings, check_address
 from server.board.errors import BoardUnusable
 from server.board.memory_board import MemoryBoard
 from server.board.revocations import KnownLinks
@@ -16,7 +16,7 @@ from server.board.seal import Seal
 __all__ = ["Board", "BoardHost", "check_board", "make_board"]
 
 NOT_INSTALLED = "a board needs the package redis: pip install 'lockstep[redis]'"
-NO_ADDRESS = "a board needs LOCKSTEP_PUBLIC_URL: other consoles' pages link here"
+NO_ADDRESS = "a board needs --public-url: the pages of other consoles lead here"
 
 
 def make_board(
@@ -32,7 +32,7 @@ def make_board(
     Raises:
         BoardUnusable: there can be none here.
     """
-    if not settings.board_url:
+    if not settings.has_board:
         return MemoryBoard()
     check_board(settings, public_url)
     from server.board.redis_board import RedisBoard  # an optional extra
@@ -44,10 +44,16 @@ def make_board(
 
 
 def check_board(settings: BoardSettings, public_url: str) -> None:
-    """Raises BoardUnusable when there can be no board; called before anything else is started."""
-    if not settings.board_url:
+    """Called before anything else is started. Raises BoardUnusable when there can be no board, with the reason."""
+    if not settings.has_board:
         return
     if not public_url:
         raise BoardUnusable(NO_ADDRESS)
     if importlib.util.find_spec("redis") is None:
         raise BoardUnusable(NOT_INSTALLED)
+    try:
+        check_address(settings.board_url)
+    except OSError as error:
+        raise BoardUnusable(f"{settings.board_file}: {error.strerror}") from error
+    except ValueError as error:
+        raise BoardUnusable(str(error)) from error

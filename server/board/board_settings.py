@@ -1,13 +1,12 @@
 """Settings of the board that several consoles behind one entry share."""
 
 from pathlib import Path
-from typing import Self
 from urllib.parse import parse_qsl, urlsplit
 
-from pydantic import SecretStr, field_validator, model_validator
+from pydantic import SecretStr, field_validator
 from pydantic_settings import BaseSettings
 
-__all__ = ["MAX_NAME", "BoardSettings", "board_place"]
+__all__ = ["MAX_NAME", "BoardSettings", "board_place", "check_address"]
 
 MAX_NAME = 40
 QUERY = ("ssl_ca_certs", "ssl_certfile", "ssl_keyfile", "ssl_check_hostname", "ssl_cert_reqs")
@@ -32,18 +31,23 @@ class BoardSettings(BaseSettings):
             raise ValueError(f"at most {MAX_NAME} printable characters")
         return value
 
-    @model_validator(mode="after")
-    def _check_board(self) -> Self:
-        if self.board_url:
-            _check_url(self.board_url)
-        return self
+    @field_validator("board")
+    @classmethod
+    def _check_board(cls, value: SecretStr) -> SecretStr:
+        if value.get_secret_value():
+            check_address(value.get_secret_value())
+        return value
+
+    @property
+    def has_board(self) -> bool:
+        return self.board_file is not None or bool(self.board.get_secret_value())
 
     @property
     def board_url(self) -> str:
-        """With its password: never to be shown. "" without a board."""
+        """With its password: never to be shown. "" without a board; OSError when the file cannot be read."""
         if self.board_file is not None:
-            return self.board_file.read_text().strip()
-        return self.board.get_secret_value().strip()
+            return self.board_file.read_text(errors="replace").strip()
+        return self.board.get_secret_value()
 
 
 def board_place(url: str) -> str:
@@ -56,7 +60,7 @@ def board_place(url: str) -> str:
     )
 
 
-def _check_url(url: str) -> None:
+def check_address(url: str) -> None:
     """Raises ValueError that does not repeat the address, which may hold a password."""
     try:
         parts = urlsplit(url)

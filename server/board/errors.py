@@ -51,6 +51,9 @@ class BoardError(Exception):
 class BoardUnusable(BoardError):
     name = "unusable"
 
+    def __str__(self) -> str:
+        return f"board: {self.detail}"
+
 
 class BoardTrouble(BoardError):
     name = "trouble"

@@ -50,8 +50,8 @@ BATCH = 256
 STOP_PATIENCE = 2.0  # s for all who have the robots to answer
 STOP_AGAIN = 0.4  # s until it is asked again
 MAX_STOPS = 32  # different ones under way
-NEWS_AT_ONCE = 100  # messages, then a pause: a flood of news takes no more than its share of the loop
-NEWS_PAUSE = 0.25
+NEWS_AT_ONCE = 20  # messages, then a pause: a flood of news takes no more than its share of the loop
+NEWS_PAUSE = 0.01
 FAREWELL_SECONDS = 0.5
 TOO_MANY = StopAnswer(False, False, 0, "not confirmed: too many stops are under way")
 

@@ -11,7 +11,7 @@ from server.app import guard_app, restrict_ice, same_origin
 from server.board import make_board
 from server.error_answers import answer_errors
 from server.errors import NotFound
-from server.fleet import api_fleet
+from server.fleet import api_audit, api_fleet
 from server.fleet.fleet import Fleet, fleet_of
 from server.fleet.fleet_openapi import fleet_openapi
 from server.guard import Guard
@@ -57,6 +57,7 @@ def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: 
     app.state.settings = settings
     app.state.fleet = fleet
     app.include_router(api_fleet.router)
+    app.include_router(api_audit.router)
     app.add_api_route("/openapi.json", _describe, include_in_schema=False)
     for name, session in fleet.sessions.items():
         app.router.routes.append(Mount(f"{ROBOTS}/{name}", app=session.app))

@@ -3,7 +3,8 @@
 from typing import Any
 
 from server.api import StopRequest
-from server.errors import LinkOtherRobot, NotFound, RobotFailed
+from server.errors import BadParameter, LinkOtherRobot, NotAllowed, NotFound, RobotFailed
+from server.fleet.api_audit import MAX_RECORDS, FleetAudit
 from server.fleet.api_fleet import FleetHealth, FleetInfo, FleetReadiness, FleetStop
 from server.fleet.robot_names import NAME_PATTERN
 from server.openapi import OPERATIONS, WITH_JSON, Operation, Parameter, openapi_document
@@ -12,6 +13,7 @@ from server.robot_paths import ROBOTS
 __all__ = ["FLEET_OPERATIONS", "fleet_openapi"]
 
 ROBOT = Parameter("robot", "path", {"type": "string", "pattern": f"^{NAME_PATTERN}$"}, required=True)
+LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS})
 
 FLEET_OPERATIONS: tuple[Operation, ...] = (
     Operation("get", "/api/fleet", "All robots that the link is good for.", 200, FleetInfo),
@@ -19,6 +21,11 @@ FLEET_OPERATIONS: tuple[Operation, ...] = (
         *("post", "/api/fleet/stop", "Stop all of them, latched. From every role.", 200, FleetStop),
         errors=(LinkOtherRobot, *WITH_JSON),
         body=StopRequest,
+    ),
+    Operation(
+        *("get", "/api/fleet/audit", "The newest records of all robots' audits. Supervisors.", 200, FleetAudit),
+        errors=(NotAllowed, BadParameter),
+        parameters=(LIMIT,),
     ),
     Operation("get", "/healthz", "Whether the console runs, and reaches its robots.", 200, FleetHealth, token=False),
     Operation("get", "/readyz", "Whether the console serves.", 200, FleetReadiness, token=False),
