@@ -101,7 +101,7 @@ class LinkSession:
                 events.append(event)
         return events
 
-    def _receive_frame(self, payload: bytes, now: float) -> LinkMessage | BadInput | None:
+    def _receive_frame(self, payload: bytes | bytearray, now: float) -> LinkMessage | BadInput | None:
         try:
             message = decode_message(payload)
         except MessageError as error:

@@ -9,6 +9,7 @@ __all__ = ["MAX_CONTROL_FRAME", "MAX_HELLO_FRAME", "MAX_MEDIA_FRAME", "FrameRead
 HEADER = 4
 MAX_HELLO_FRAME = 8 << 10  # bytes from a client that is not admitted yet
 MAX_CONTROL_FRAME = 1 << 20  # bytes; a description with its kinematic model is the largest
+LARGE_FRAME = 64 << 10  # bytes from which on a frame gets a buffer of its own
 MAX_MEDIA_FRAME = 16 << 20  # bytes; a raw 4:2:0 picture of 3840x2160 is 12.4 MB
 
 
@@ -28,11 +29,19 @@ class FrameReader:
     def __init__(self, max_frame: int) -> None:
         self.max_frame = max_frame
         self._buffer = bytearray()
+        self._large: bytearray | None = None  # a frame that is being filled, so that its bytes are copied once
+        self._filled = 0  # bytes of it
 
     def feed(self, data: bytes) -> None:
-        self._buffer += data
+        if self._large is None:
+            self._buffer += data
+            return
+        taken = min(len(data), len(self._large) - self._filled)
+        self._large[self._filled : self._filled + taken] = data if taken == len(data) else memoryview(data)[:taken]
+        self._filled += taken
+        self._buffer += data[taken:]
 
-    def frames(self) -> Iterator[bytes]:
+    def frames(self) -> Iterator[bytes | bytearray]:
         """The complete frames so far.
 
         Raises:
@@ -40,17 +49,33 @@ class FrameReader:
         """
         position = 0
         try:
-            while len(self._buffer) - position >= HEADER:
-                length = int.from_bytes(self._buffer[position : position + HEADER], "big")
+            while True:
+                if self._large is not None:
+                    if self._filled < len(self._large):
+                        break
+                    whole, self._large = self._large, None
+                    yield whole
+                    continue
+                start = position + HEADER
+                if len(self._buffer) < start:
+                    break
+                length = int.from_bytes(self._buffer[position:start], "big")
                 if not 0 < length <= self.max_frame:
                     raise FramingError(f"a frame of {length} bytes, the bound is 1 to {self.max_frame}")
-                if len(self._buffer) - position - HEADER < length:
+                if len(self._buffer) - start < length:
+                    if length >= LARGE_FRAME:
+                        position = self._begin_large(length, start)
                     break
-                start = position + HEADER
                 position = start + length
                 yield bytes(self._buffer[start:position])
         finally:
             del self._buffer[:position]
+
+    def _begin_large(self, length: int, start: int) -> int:
+        """Move what is there of it; returns how far the buffer was used up."""
+        self._large, self._filled = bytearray(length), len(self._buffer) - start
+        self._large[: self._filled] = memoryview(self._buffer)[start:]
+        return len(self._buffer)
 
     def at_end(self) -> None:
         """Call at end of stream.
@@ -58,5 +83,6 @@ class FrameReader:
         Raises:
             FramingError: the stream ended inside a frame.
         """
-        if self._buffer:
-            raise FramingError(f"the stream ended {len(self._buffer)} bytes into a frame")
+        inside = HEADER + self._filled if self._large is not None else len(self._buffer)
+        if inside:
+            raise FramingError(f"the stream ended {inside} bytes into a frame")

@@ -200,7 +200,7 @@ def encode_message(message: LinkMessage) -> bytes:
     return _encoder.encode(message)
 
 
-def decode_message(data: bytes | memoryview) -> LinkMessage:
+def decode_message(data: bytes | bytearray | memoryview) -> LinkMessage:
     """The message in `data`.
 
     Raises:

@@ -81,7 +81,7 @@ def _from_yuv420p(media: Media) -> av.VideoFrame:
     if len(media.payload) != width * height * 3 // 2:
         raise PayloadError(f"{len(media.payload)} bytes are not a yuv420p picture of {width}x{height}")
     planes = np.frombuffer(media.payload, np.uint8).reshape(height * 3 // 2, width)
-    return av.VideoFrame.from_ndarray(planes, format="yuv420p")
+    return av.VideoFrame.from_numpy_buffer(planes, format="yuv420p")  # without a copy
 
 
 def _check_size(width: int, height: int) -> None:

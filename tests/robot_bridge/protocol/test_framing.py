@@ -5,11 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_bridge.protocol.errors import FramingError
-from robot_bridge.protocol.framing import FrameReader, frame
+from robot_bridge.protocol.framing import LARGE_FRAME, FrameReader, frame
 
 
-def read_all(reader: FrameReader, data: bytes, size: int) -> list[bytes]:
-    frames = []
+def read_all(reader: FrameReader, data: bytes, size: int) -> list[bytes | bytearray]:
+    frames: list[bytes | bytearray] = []
     for start in range(0, len(data), size):
         reader.feed(data[start : start + size])
         frames += list(reader.frames())
@@ -25,6 +25,25 @@ def test_frames_come_out_as_they_went_in_however_the_stream_is_cut(payloads: lis
     reader = FrameReader(50)
     assert read_all(reader, b"".join(map(frame, payloads)), size) == payloads
     reader.at_end()
+
+
+@pytest.mark.parametrize("size", [1 << 20, LARGE_FRAME, LARGE_FRAME + 3, LARGE_FRAME + 4, 40_000, 1009, 7])
+def test_pictures_come_out_as_they_went_in_among_small_frames(size: int) -> None:
+    picture = bytes(range(256)) * (LARGE_FRAME // 256)
+    payloads = [b"small", picture, picture + b"and more", b"another", b"third", picture[:-1]]
+    reader = FrameReader(2 * LARGE_FRAME)
+    assert read_all(reader, b"".join(map(frame, payloads)), size) == payloads
+    reader.at_end()
+
+
+def test_the_end_inside_a_picture_is_an_error() -> None:
+    reader = FrameReader(LARGE_FRAME)
+    reader.feed(frame(bytes(LARGE_FRAME))[:1000])
+    assert list(reader.frames()) == []
+    reader.feed(bytes(500))
+    assert list(reader.frames()) == []
+    with pytest.raises(FramingError, match="1500 bytes into a frame"):
+        reader.at_end()
 
 
 @pytest.mark.parametrize("length", [0, 11, 2**32 - 1])
