@@ -23,15 +23,16 @@ from server.errors import ConsoleError
 from server.invitations import Invitation
 from server.links import console_link
 from server.settings import Settings
-from server.state import ConsoleState, open_state, state_path
+from server.state import ConsoleState, open_state, robot_directory
 from server.state_dir import StateDirUnusable
 
-__all__ = ["StateDirOption", "add_access_commands"]
+__all__ = ["RobotOption", "StateDirOption", "add_access_commands"]
 
 EXIT_USAGE = 2
 FOLLOW_SECONDS = 0.5  # between two looks at the log
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+RobotOption = Annotated[str, typer.Option(help="Of this robot of a fleet.")]
 StateDirOption = Annotated[Path | None, typer.Option(help="The console's state directory.")]
 MakeSettings = Callable[..., Settings]
 
@@ -44,6 +45,10 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         role: Annotated[str, typer.Option(help="observer, operator or supervisor.")] = "observer",
         expires: Annotated[str, typer.Option(help="How long the link is good: 30m, 8h, 2d.")] = "8h",
         name: Annotated[str, typer.Option(help="The name that others see, unless its holder sets another.")] = "",
+        for_robot: Annotated[
+            list[str] | None,
+            typer.Option(help="A robot of a fleet that the link is good for; may be given again. Unset: all."),
+        ] = None,
         url: Annotated[str, typer.Option(help="How the console is reached, https://robot.example.org.")] = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
@@ -55,7 +60,8 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         try:
             wanted = msgspec.convert(role, Role)
             seconds = parse_duration(expires)
-            made = with_state.invitations.update(lambda known: known.invite(None, wanted, name, seconds, now))
+            robots = tuple(for_robot or ())
+            made = with_state.invitations.update(lambda known: known.invite(None, wanted, name, seconds, now, robots))
         except msgspec.ValidationError as error:
             raise _usage("--role is observer, operator or supervisor") from error
         except ValueError as error:
@@ -68,7 +74,8 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             _print_json({**_described(made, now), "link": link})
         else:
             sys.stdout.write(f"{link}\n")
-            _say(f"{made.role} {made.name!r}, good for {expires}; end it with: lockstep revoke {made.id}")
+            where = f" for {', '.join(made.robots)}" if made.robots else ""
+            _say(f"{made.role} {made.name!r}{where}, good for {expires}; end it with: lockstep revoke {made.id}")
 
     @app.command()
     def invitations(state_dir: StateDirOption = None, as_json: Json = False) -> None:
@@ -80,7 +87,8 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             return
         for each in found:
             by = "at start" if each.at_start else f"by {each.by or 'the command line'}"
-            sys.stdout.write(f"{each.id}  {each.role:10}  {_state_words(each, now):14}  {by}  {each.name}\n")
+            robots = f"  for {', '.join(each.robots)}" if each.robots else ""
+            sys.stdout.write(f"{each.id}  {each.role:10}  {_state_words(each, now):14}  {by}  {each.name}{robots}\n")
 
     @app.command()
     def revoke(
@@ -104,11 +112,12 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what happens from now on.")] = False,
         after: Annotated[int, typer.Option(help="Only records behind this number.")] = 0,
         file: Annotated[Path | None, typer.Option(help="Another log than the state directory's audit.jsonl.")] = None,
+        robot: RobotOption = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
         """Show who drove when, stops, refusals, hand-overs, people and notes, with their event references."""
-        path = file or state_path(make_settings(state_dir=state_dir)) / "audit.jsonl"
+        path = file or robot_directory(make_settings(state_dir=state_dir), robot) / "audit.jsonl"
         if not follow and not path.exists():
             raise _usage(f"there is no audit log at {path}")
         last = after
@@ -153,6 +162,7 @@ def _described(invitation: Invitation, now: float) -> dict[str, object]:
         "name": invitation.name,
         "expires": invitation.expires,
         "revoked": invitation.revoked_at is not None,
+        "robots": list(invitation.robots),
         "good": invitation.is_good(now),
     }
 

@@ -15,7 +15,7 @@ import msgspec
 import typer
 
 from server.access import Access
-from server.cli_access import MakeSettings, StateDirOption
+from server.cli_access import MakeSettings, RobotOption, StateDirOption
 from server.console_address import read_address
 from server.recording.errors import RecordingError
 from server.recording.recorder import recordings_directory
@@ -23,9 +23,10 @@ from server.recording.replay_app import create_replay_app
 from server.recording.shelf import RecordingEntry, Shelf
 from server.recording.verify import Verdict
 from server.recording.verify_file import verify_file
+from server.robot_paths import ROBOTS
 from server.serve import PortTaken, bind, running, wait_for_signal
 from server.settings import Settings
-from server.state import ConsoleState, open_state, state_path
+from server.state import ConsoleState, open_state, robot_directory
 from server.state_dir import StateDirUnusable
 
 __all__ = ["add_recording_commands"]
@@ -58,26 +59,32 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     @record.command("start")
     def record_start(
         name: Annotated[str, typer.Option(help="What it is called in the list.")] = "",
+        robot: RobotOption = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
         """Start to record."""
-        _say_state(_ask(make_settings(state_dir=state_dir), "POST", "/api/recordings", {"name": name}), as_json)
+        _say_state(_ask(make_settings(state_dir=state_dir), robot, "POST", "/api/recordings", {"name": name}), as_json)
 
     @record.command("stop")
-    def record_stop(state_dir: StateDirOption = None, as_json: Json = False) -> None:
+    def record_stop(robot: RobotOption = "", state_dir: StateDirOption = None, as_json: Json = False) -> None:
         """End the recording; returns when the file is closed."""
-        _say_state(_ask(make_settings(state_dir=state_dir), "POST", "/api/recordings/stop"), as_json)
+        _say_state(_ask(make_settings(state_dir=state_dir), robot, "POST", "/api/recordings/stop"), as_json)
 
     @record.command("status")
-    def record_status(state_dir: StateDirOption = None, as_json: Json = False) -> None:
+    def record_status(robot: RobotOption = "", state_dir: StateDirOption = None, as_json: Json = False) -> None:
         """Say whether the session is recorded."""
-        _say_state(_ask(make_settings(state_dir=state_dir), "GET", "/api/recordings")["state"], as_json)
+        _say_state(_ask(make_settings(state_dir=state_dir), robot, "GET", "/api/recordings")["state"], as_json)
 
     @app.command()
-    def recordings(directory: DirectoryOption = None, state_dir: StateDirOption = None, as_json: Json = False) -> None:
+    def recordings(
+        directory: DirectoryOption = None,
+        robot: RobotOption = "",
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
         """List the recordings that are complete."""
-        found = _shelf(make_settings(state_dir=state_dir), directory).entries()
+        found = _shelf(make_settings(state_dir=state_dir), robot, directory).entries()
         if as_json:
             sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
             return
@@ -90,11 +97,12 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
         port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes any free one.")] = 0,
         directory: DirectoryOption = None,
+        robot: RobotOption = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
         """Serve the player for one recording, without a robot, and print its link."""
-        path = _found(file, make_settings(state_dir=state_dir), directory)
+        path = _found(file, make_settings(state_dir=state_dir), robot, directory)
         try:
             asyncio.run(_replay(path, host, port, as_json))
         except PortTaken as error:
@@ -103,10 +111,14 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
 
     @app.command()
     def verify(
-        file: File, directory: DirectoryOption = None, state_dir: StateDirOption = None, as_json: Json = False
+        file: File,
+        directory: DirectoryOption = None,
+        robot: RobotOption = "",
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
     ) -> None:
         """Check what is promised against a recording. Exit code 1: it is not kept; 2: it cannot be read."""
-        path = _found(file, make_settings(state_dir=state_dir), directory)
+        path = _found(file, make_settings(state_dir=state_dir), robot, directory)
         verdict = _or_usage(lambda: verify_file(path))
         if as_json:
             sys.stdout.write(msgspec.json.encode({"file": str(path), **msgspec.to_builtins(verdict)}).decode() + "\n")
@@ -124,10 +136,11 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         ] = None,
         task: Annotated[str, typer.Option(help="lerobot: what was done, in words.")] = "",
         directory: DirectoryOption = None,
+        robot: RobotOption = "",
         state_dir: StateDirOption = None,
     ) -> None:
         """Write a recording in another form."""
-        path = _found(file, make_settings(state_dir=state_dir), directory)
+        path = _found(file, make_settings(state_dir=state_dir), robot, directory)
         # Loaded only here: parquet and lerobot need pyarrow, the extra "export".
         exporter: Any = import_module(f"server.recording.export_{to.value}")
         written = _or_usage(lambda: exporter.export(path, out, task))
@@ -155,7 +168,7 @@ async def _replay(path: Path, host: str, port: int, as_json: bool) -> None:
         listener.close()
 
 
-def _ask(settings: Settings, method: str, path: str, body: dict[str, str] | None = None) -> dict[str, Any]:
+def _ask(settings: Settings, robot: str, method: str, path: str, body: dict[str, str] | None = None) -> dict[str, Any]:
     """What the console of this state directory answers."""
     state = _state(settings)
     url = settings.public_url or read_address(state.directory)
@@ -165,7 +178,9 @@ def _ask(settings: Settings, method: str, path: str, body: dict[str, str] | None
     try:
         # Its certificate may be its own; whoever can write the state directory can name any address there anyway.
         with httpx.Client(verify=not settings.tls, trust_env=False, timeout=HTTP_SECONDS) as http:
-            answer = http.request(method, f"{url}{path}", headers=headers, json=body)
+            answer = http.request(
+                method, f"{url}{ROBOTS}/{robot}{path}" if robot else f"{url}{path}", headers=headers, json=body
+            )
     except httpx.HTTPError as error:
         raise _usage(f"the console at {url} does not answer: {error}") from error
     found: dict[str, Any] = answer.json()
@@ -190,15 +205,18 @@ def _state(settings: Settings) -> ConsoleState:
         raise _usage(str(error)) from error
 
 
-def _shelf(settings: Settings, directory: Path | None) -> Shelf:
-    return Shelf(directory or recordings_directory(settings.recording, state_path(settings)), settings.recording)
+def _shelf(settings: Settings, robot: str, directory: Path | None) -> Shelf:
+    own = recordings_directory(settings.recording, robot_directory(settings, robot))
+    if robot and settings.recording.directory is not None:
+        own /= robot  # as the console does
+    return Shelf(directory or own, settings.recording)
 
 
-def _found(file: Path, settings: Settings, directory: Path | None) -> Path:
+def _found(file: Path, settings: Settings, robot: str, directory: Path | None) -> Path:
     """`file` itself, or the recording of that id."""
     if file.is_file():
         return file
-    found = _shelf(settings, directory).path(file.name)
+    found = _shelf(settings, robot, directory).path(file.name)
     if found is None:
         raise _usage(f"there is no recording {file}")
     return found

@@ -16,8 +16,9 @@ from typing import Annotated
 import msgspec
 
 from robot_bridge.protocol.console import Role
-from server.access import Identity
+from server.access import MAX_ROBOTS, Identity
 from server.errors import BadParameter, NotAllowed, NotFound, TooManyInvitations
+from server.fleet.robot_names import BadFleet, check_robot_name
 from server.names import clean_name
 
 __all__ = ["MAX_SECONDS", "Invitation", "Invitations", "may_invite"]
@@ -84,11 +85,12 @@ class Invitations:
 
         Raises:
             NotAllowed: the role of `by` may not invite `role`, or it may not see a robot itself.
-            BadParameter: the time is not within bounds.
+            BadParameter: the time is not within bounds, or there is no such name for a robot.
             TooManyInvitations: revoke some first.
         """
         if by is not None and role not in may_invite(by.role):
             raise NotAllowed(f"{'an' if by.role != 'supervisor' else 'a'} {by.role} may not invite a person as {role}")
+        _check_robots(robots)
         if by is not None and by.robots:
             robots = robots or by.robots
             if not set(robots) <= set(by.robots):
@@ -151,6 +153,16 @@ class Invitations:
     def _add(self, invitation: Invitation) -> Invitation:
         self._known[invitation.id] = invitation
         return invitation
+
+
+def _check_robots(robots: tuple[str, ...]) -> None:
+    if len(robots) > MAX_ROBOTS:
+        raise BadParameter(f"a link names at most {MAX_ROBOTS} robots")
+    try:
+        for each in robots:
+            check_robot_name(each)
+    except BadFleet as error:
+        raise BadParameter(str(error)) from error
 
 
 def _sees(by: Identity, invitation: Invitation) -> bool:

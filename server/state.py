@@ -11,7 +11,7 @@ from server.invitation_store import InvitationStore
 from server.settings import Settings
 from server.state_dir import StateDamaged, StateDir, StateDirUnusable, default_state_dir
 
-__all__ = ["ConsoleState", "open_state", "state_path"]
+__all__ = ["ConsoleState", "open_state", "robot_directory", "robot_place", "state_path"]
 
 log = structlog.get_logger(__name__)
 
@@ -28,6 +28,16 @@ class ConsoleState(NamedTuple):
 
 def state_path(settings: Settings) -> Path:
     return settings.state_dir or default_state_dir()
+
+
+def robot_directory(settings: Settings, robot: str) -> Path:
+    """Where a robot of a fleet keeps what is its own: audit, recordings. "" is the only robot of a console."""
+    return robot_place(state_path(settings), robot)
+
+
+def robot_place(directory: Path, robot: str) -> Path:
+    """As `robot_directory`, within a state directory."""
+    return directory / "robots" / robot if robot else directory
 
 
 def open_state(settings: Settings, *, fall_back: bool = False) -> ConsoleState:

@@ -6,7 +6,7 @@ import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from server.access import Identity, require_role
-from server.board.board import SharedAudit, SharedRecord
+from server.board.board import SharedRecord
 from server.fleet.fleet import Fleet, fleet_of
 
 __all__ = ["MAX_RECORDS", "FleetAudit", "router"]

@@ -21,6 +21,7 @@ from server.fleet.tiles import UNREADABLE, absent_tile, tile_of
 from server.house import House
 from server.invitations import Invitation
 from server.settings import Settings
+from server.state import robot_place
 from server.state_dir import StateDir
 from server.sweeper import sweep_forever
 
@@ -164,7 +165,7 @@ class Fleet:
 
     async def _run_session(self, session: FleetSession, house: House, directory: Path) -> None:
         """Each has a directory of its own for recordings and audit."""
-        own = StateDir(directory / "robots" / session.name)
+        own = StateDir(robot_place(directory, session.name))
         await session.run(house, own, self.metrics, self._recorded)
 
     def _recorded(self, robot: str, record: AuditRecord) -> None:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.access import Access, Identity, require_role
-from server.errors import LinkExpired, LinkRevoked, NotAllowed, TokenInvalid, TokenMissing
+from server.errors import LinkExpired, LinkOtherRobot, LinkRevoked, NotAllowed, TokenInvalid, TokenMissing
 
 SECRET = "a secret of at least thirty-two bytes"
 ACCESS = Access(SECRET, 60, 60)
@@ -125,3 +125,30 @@ def test_a_role_is_required_where_it_is() -> None:
     require_role(ACCESS.verify(ACCESS.issue("operator", "x")), "operator")
     with pytest.raises(NotAllowed):
         require_role(ACCESS.verify(ACCESS.issue("observer", "x")), "operator", "supervisor")
+
+
+def test_a_link_for_some_robots_opens_these_and_no_other() -> None:
+    token = ACCESS.issue("operator", "x", ("left", "right"))
+    assert ACCESS.at("left").verify(token).robots == ("left", "right")
+    assert ACCESS.at(None).verify(token).may_see("right")
+    for other in ("middle", ""):
+        with pytest.raises(LinkOtherRobot):
+            ACCESS.at(other).verify(token)
+
+
+def test_a_link_that_names_no_robot_opens_all_and_is_the_same_token_as_ever() -> None:
+    token = ACCESS.issue("operator", "x")
+    for robot in ("left", "", None):
+        assert ACCESS.at(robot).verify(token).robots == ()
+    assert "robots" not in jwt.decode(token, options={"verify_signature": False})
+
+
+def test_a_ticket_of_one_robot_opens_nothing_of_another() -> None:
+    left, right = ACCESS.at("left"), ACCESS.at("right")
+    assert left.verify_ticket(left.issue_ticket("link")) == "link"
+    left.verify_file_ticket(left.issue_file_ticket("r1", "link"), "r1")
+    for other in (right, ACCESS):
+        with pytest.raises(TokenInvalid):
+            other.verify_ticket(left.issue_ticket("link"))
+        with pytest.raises(TokenInvalid):
+            other.verify_file_ticket(left.issue_file_ticket("r1", "link"), "r1")

@@ -113,3 +113,29 @@ def test_what_expired_long_ago_is_forgotten_and_a_revoked_one_is_kept_until_it_w
     assert known.revoked() == {revoked.id}
     known.prune(NOW + HOUR + SHOWN_AFTER_END)
     assert known.all == []
+
+
+def test_a_link_for_some_robots_invites_for_no_other() -> None:
+    known, by = Invitations([]), _person("operator")._replace(robots=("left", "right"))
+    assert known.invite(by, "observer", "", HOUR, NOW).robots == ("left", "right")
+    assert known.invite(by, "observer", "", HOUR, NOW, ("left",)).robots == ("left",)
+    with pytest.raises(NotAllowed):
+        known.invite(by, "observer", "", HOUR, NOW, ("left", "middle"))
+
+
+@pytest.mark.parametrize("robots", [("A",), ("",), ("a/b",), tuple(f"r{number}" for number in range(33))])
+def test_robots_that_cannot_be_are_refused(robots: tuple[str, ...]) -> None:
+    with pytest.raises(BadParameter):
+        Invitations([]).invite(None, "observer", "", HOUR, NOW, robots)
+
+
+def test_a_supervisor_of_some_robots_sees_and_revokes_only_what_is_good_for_no_other() -> None:
+    known, by = Invitations([]), _person("supervisor")._replace(robots=("left", "right"))
+    inside = known.invite(None, "observer", "", HOUR, NOW, ("left",))
+    partly = known.invite(None, "observer", "", HOUR, NOW, ("left", "middle"))
+    everywhere = known.invite(None, "observer", "", HOUR, NOW)
+    assert known.visible(by) == [inside]
+    for other in (partly, everywhere):
+        with pytest.raises(NotFound):
+            known.revoke(by, other.id, NOW)
+    assert [each.id for each in known.revoke(by, inside.id, NOW)] == [inside.id]
