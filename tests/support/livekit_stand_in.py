@@ -18,12 +18,13 @@ from urllib.parse import parse_qs, urlsplit
 
 import jwt
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
-from aiortc.rtp import HeaderExtensionsMap, RtcpPacket, RtcpPsfbPacket, RtpPacket
+from aiortc.rtp import HeaderExtensionsMap, RtcpPsfbPacket, RtpPacket
 from aiortc.sdp import candidate_from_sdp
 from livekit.protocol import models, rtc
-from websockets.asyncio.server import Request, Response, ServerConnection, serve
+from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
 
 __all__ = ["KEY", "SECRET", "LiveKitStandIn", "Member", "livekit_stand_in"]
 
@@ -339,7 +340,7 @@ async def _send(outlet: Any, packet: RtpPacket) -> None:
         await sender.transport._send_rtp(copy.serialize(HeaderExtensionsMap()))
 
 
-async def _send_control(transport: Any, packet: RtcpPacket) -> None:
+async def _send_control(transport: Any, packet: RtcpPsfbPacket) -> None:
     with suppress(ConnectionError):
         await transport._send_rtp(bytes(packet))
 

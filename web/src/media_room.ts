@@ -4,7 +4,8 @@ import { NewestLog } from "./core/newest_log";
 import type { AudioDesk } from "./media/audio_desk";
 import { SoundStream } from "./media/sound_stream";
 import { VideoStream } from "./media/video_stream";
-import type { Peer, Section } from "./rtc/peer";
+import type { Peer } from "./rtc/peer";
+import type { Section } from "./rtc/section";
 import type { StampReader } from "./rtc/stamp_reader";
 import type { StreamInfo } from "./wire";
 

@@ -3,13 +3,25 @@ import type { StreamInfo } from "../wire";
 import { isRecord } from "./schema_check";
 
 /** Where an observer watches instead of at the console (GET /api/relay). */
-export interface RelayTicket {
+export type RelayTicket = JanusTicket | LiveKitTicket;
+
+interface AnyTicket {
   readonly relay: string;
   readonly url: string; // WebSocket
-  readonly room: number;
-  readonly pin: string;
   readonly feed: number; // another one with every publication
   readonly streams: readonly StreamInfo[]; // `mid` is the publisher's
+}
+
+export interface JanusTicket extends AnyTicket {
+  readonly engine: "janus";
+  readonly room: number;
+  readonly pin: string;
+}
+
+export interface LiveKitTicket extends AnyTicket {
+  readonly engine: "livekit";
+  readonly token: string; // good for a minute, to come in
+  readonly publisher: string; // whose tracks and messages count
 }
 
 /** One message of a Janus. */
@@ -27,11 +39,15 @@ const ENDED = ["hangup", "detached", "timeout"];
 export function parseRelayAnswer(answer: unknown): RelayTicket | null {
   const found = isRecord(answer) ? answer["relay"] : null;
   if (!isRecord(found)) return null;
-  const { engine, relay, url, room, pin, feed, streams } = found;
-  if (engine !== "janus" || typeof relay !== "string" || typeof url !== "string") return null;
-  if (typeof room !== "number" || typeof pin !== "string" || typeof feed !== "number") return null;
-  const named = Array.isArray(streams) ? streams.filter(isStream) : [];
-  return { relay, url, room, pin, feed, streams: named };
+  const { engine, relay, url, feed, streams: listed } = found;
+  if (typeof relay !== "string" || typeof url !== "string" || typeof feed !== "number") return null;
+  const streams = Array.isArray(listed) ? listed.filter(isStream) : [];
+  const { room, pin, token, publisher } = found;
+  if (engine === "janus" && typeof room === "number" && typeof pin === "string")
+    return { engine, relay, url, feed, streams, room, pin };
+  if (engine === "livekit" && typeof token === "string" && typeof publisher === "string")
+    return { engine, relay, url, feed, streams, token, publisher };
+  return null;
 }
 
 function isStream(value: unknown): value is StreamInfo {
@@ -41,7 +57,7 @@ function isStream(value: unknown): value is StreamInfo {
 }
 
 /** The mids that one asks for: pictures and sound as named, and the feedback behind them. */
-export function wantedMids(ticket: RelayTicket): string[] {
+export function wantedMids(ticket: JanusTicket): string[] {
   return [...ticket.streams.map((stream) => stream.mid), String(ticket.streams.length)];
 }
 

@@ -3,7 +3,7 @@ import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../
 import { createSoundBacklog, skipTarget } from "../core/sound_backlog";
 import { createSoundGate, observeSound } from "../core/sound_gate";
 import { findMark } from "../core/stamp_book";
-import type { Section } from "../rtc/peer";
+import type { Section } from "../rtc/section";
 import type { StreamInfo } from "../wire";
 import type { StampReader } from "../rtc/stamp_reader";
 import { RenderLog } from "./render_log";
@@ -24,21 +24,19 @@ export class SoundStream {
     audio: AudioContext,
     private readonly context: () => GateContext,
   ) {
-    this.output = new SoundOutput(audio, section.transceiver.receiver.track);
+    this.output = new SoundOutput(audio, section.source);
     if (section.stamps !== null) section.stamps.onstamp = () => this.arrived();
   }
 
   /** Judges what plays now. Called at every feedback and every few milliseconds. */
   observe(context: GateContext, audible: boolean): void {
-    const source = this.section.transceiver.receiver.getSynchronizationSources()[0];
+    const playing = this.section.playing();
     const { stamps } = this.section;
-    const mark =
-      source === undefined || stamps === null ? UNMARKED : findMark(stamps.book, source.rtpTimestamp);
+    const mark = playing === undefined || stamps === null ? UNMARKED : findMark(stamps.book, playing);
     const before = this.gate.counts.rendered;
-    if (source !== undefined) this.catchUp(source.rtpTimestamp);
+    if (playing !== undefined) this.catchUp(playing);
     const passes =
-      source !== undefined &&
-      observeSound(this.gate, source.rtpTimestamp, mark, context, audible, performance.now());
+      playing !== undefined && observeSound(this.gate, playing, mark, context, audible, performance.now());
     if (this.gate.counts.rendered > before) this.note(mark ?? UNMARKED, context);
     this.isOpen = passes && audible;
     this.output.open(this.isOpen);

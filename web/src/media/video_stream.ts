@@ -2,9 +2,9 @@ import { closePictureGate, createPictureGate, offerPicture, settlePicture } from
 import { UNMARKED, type FrameMark, type GateContext } from "../core/medium_counts";
 import { createRateMeter, noteHappening } from "../core/samples";
 import { findMark } from "../core/stamp_book";
-import type { Section } from "../rtc/peer";
+import type { Section } from "../rtc/section";
 import type { StreamInfo } from "../wire";
-import { openFrames } from "./frame_source";
+import { openFrames, type OnPicture } from "./frame_source";
 import type { Picture } from "./picture";
 import { RenderLog } from "./render_log";
 
@@ -33,10 +33,12 @@ export class VideoStream {
   ) {
     this.drawing = canvas.getContext("2d", { alpha: false });
     if (section.stamps !== null) section.stamps.onstamp = () => this.settle();
-    this.endFrames = openFrames(section.transceiver.receiver.track, (picture, rtpTimestamp) => {
+    const take: OnPicture = (picture, rtpTimestamp) => {
       this.lastGoodMs = performance.now();
       offerPicture(this.gate, picture, rtpTimestamp, this.lookup, events.context(), this.draw);
-    });
+    };
+    const { source } = section;
+    this.endFrames = source instanceof MediaStreamTrack ? openFrames(source, take) : () => undefined;
   }
 
   /** Judges the waiting picture again. */

@@ -5,16 +5,15 @@ import { ConsoleError, type ConsoleApi } from "./console_api";
 import type { RelayTicket } from "../core/relay";
 import type { StreamInfo } from "../wire";
 import { RelayWatch } from "./relay_watch";
+import { preferH264 } from "./codec_preference";
 import { askForCaptureTime } from "./header_extensions";
-import type { ReceiverStamps, StampReader } from "./stamp_reader";
+import { receivedSection, type Section } from "./section";
+import type { StampReader } from "./stamp_reader";
 
 export type ChannelName = "control" | "session" | "stop";
 
-/** One media section and the stamps of its frames. */
-export interface Section {
-  readonly kind: "audio" | "video";
+interface OfferedSection extends Section {
   readonly transceiver: RTCRtpTransceiver;
-  readonly stamps: ReceiverStamps | null; // null where the browser has no transforms
 }
 
 /** What the page's link asks of connections. */
@@ -50,7 +49,7 @@ const REQUEST_LIMIT_MS = 5000;
 
 /** One WebRTC connection to the console. It ends once; connecting again makes a new one. */
 export class Peer {
-  readonly sections: Section[] = [];
+  readonly sections: OfferedSection[] = [];
   isConnected = false; // once it was
   id = ""; // what the console calls it; "" before it has said so
   private relay: RelayWatch | null = null; // null: media come from the console
@@ -188,7 +187,7 @@ export class Peer {
 
   section(mid: string): Section | undefined {
     if (this.relay !== null) return this.relay.section(mid);
-    return this.sections.find((section) => section.transceiver.mid === mid);
+    return this.sections.find(({ transceiver }) => transceiver.mid === mid);
   }
 
   /** What sends this person's voice in the section that the console named; null when it takes none. */
@@ -204,6 +203,7 @@ export class Peer {
   private addSections(cameras: number, microphones: number): boolean {
     const kinds = [...Array<"video">(cameras).fill("video"), ...Array<"audio">(microphones).fill("audio")];
     const transceivers = kinds.map((kind) => this.connection.addTransceiver(kind, { direction: "recvonly" }));
+    for (const transceiver of transceivers.slice(0, cameras)) preferH264(transceiver);
     const offered = transceivers.map((transceiver, index) =>
       askForCaptureTime(transceiver, kinds[index] ?? "video"),
     );
@@ -211,7 +211,7 @@ export class Peer {
     for (const [index, transceiver] of transceivers.entries()) {
       const kind = kinds[index] ?? "video";
       const stamps = this.reader?.attach(transceiver.receiver, kind, trailer) ?? null;
-      this.sections.push({ kind, transceiver, stamps });
+      this.sections.push({ ...receivedSection(kind, transceiver.receiver, stamps), transceiver });
     }
     return trailer;
   }

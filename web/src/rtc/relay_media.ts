@@ -1,32 +1,25 @@
-import { completeOffer, feedMids, wantedMids, type RelayTicket } from "../core/relay";
+import { completeOffer, feedMids, wantedMids, type JanusTicket } from "../core/relay";
 import type { IceServer } from "../core/ice_servers";
 import { askForCaptureTime } from "./header_extensions";
 import { JanusSocket } from "./janus_socket";
-import type { Section } from "./peer";
+import type { RelayEvents, RelayLink } from "./relay_link";
+import { receivedSection, type Section } from "./section";
+import { SilenceWatch } from "./silence_watch";
 import type { StampReader } from "./stamp_reader";
 
-/** The console says something on the feedback channel every 0.4 s, whatever the robot does. */
-const SILENCE_MS = 1300;
-const FIRST_WORD_MS = 5000;
-
-export interface RelayMediaEvents {
-  feedback(data: unknown): void;
-  lost(why: string): void; // once, unless closed from here
-}
-
 /** Pictures, sound and feedback through a Janus. It ends once. */
-export class RelayMedia {
+export class JanusMedia implements RelayLink {
   readonly sections = new Map<string, Section>(); // by the publisher's mid
   private readonly connection: RTCPeerConnection;
   private readonly socket: JanusSocket;
-  private timer: ReturnType<typeof setTimeout> | undefined;
+  private readonly silence = new SilenceWatch(() => this.lose("the relay fell silent"));
   private isOver = false;
 
   constructor(
-    readonly ticket: RelayTicket,
+    readonly ticket: JanusTicket,
     private readonly reader: StampReader | null,
     servers: readonly IceServer[],
-    private readonly events: RelayMediaEvents,
+    private readonly events: RelayEvents,
   ) {
     const iceServers = servers.map((server) => ({ ...server, urls: [...server.urls] }));
     this.connection = new RTCPeerConnection({ bundlePolicy: "max-bundle", iceServers });
@@ -37,7 +30,6 @@ export class RelayMedia {
     // A Janus tells a subscriber of data only when the subscriber has a channel of its own.
     this.listen(this.connection.createDataChannel("feedback", { ordered: false, maxRetransmits: 0 }));
     this.socket = new JanusSocket(ticket.url, (why) => this.lose(why));
-    this.expectWord(FIRST_WORD_MS);
   }
 
   /** Returns when pictures are on their way, and says then what it has; raises Error. */
@@ -57,7 +49,7 @@ export class RelayMedia {
 
   close(): void {
     this.isOver = true;
-    clearTimeout(this.timer);
+    this.silence.close();
     for (const { stamps } of this.sections.values()) if (stamps !== null) this.reader?.detach(stamps);
     this.socket.close();
     this.connection.close();
@@ -71,7 +63,7 @@ export class RelayMedia {
       if (mid === undefined || kind === undefined) continue;
       askForCaptureTime(transceiver, kind); // playout-delay, which a Janus hands on
       const stamps = this.reader?.attach(transceiver.receiver, kind, true) ?? null;
-      this.sections.set(mid, { kind, transceiver, stamps });
+      this.sections.set(mid, receivedSection(kind, transceiver.receiver, stamps));
     }
   }
 
@@ -91,14 +83,9 @@ export class RelayMedia {
 
   private listen(channel: RTCDataChannel): void {
     channel.onmessage = (event: MessageEvent<unknown>) => {
-      this.expectWord(SILENCE_MS);
+      this.silence.heard();
       this.events.feedback(event.data);
     };
-  }
-
-  private expectWord(withinMs: number): void {
-    clearTimeout(this.timer);
-    if (!this.isOver) this.timer = setTimeout(() => this.lose("the relay fell silent"), withinMs);
   }
 
   private lose(why: string): void {

@@ -1,8 +1,8 @@
 import type { IceServer } from "../core/ice_servers";
 import type { RelayTicket } from "../core/relay";
 import type { ConsoleApi } from "./console_api";
-import type { Section } from "./peer";
-import { RelayMedia } from "./relay_media";
+import { relayLink, type RelayLink } from "./relay_link";
+import type { Section } from "./section";
 import type { StampReader } from "./stamp_reader";
 
 const RETRY_MS = 500;
@@ -16,7 +16,7 @@ export interface RelayWatchEvents {
 
 /** Keeps an observer's media coming through one relay or another. The connection to the console lives on meanwhile. */
 export class RelayWatch {
-  private media: RelayMedia | null = null;
+  private media: RelayLink | null = null;
   private isOver = false;
 
   constructor(
@@ -58,19 +58,18 @@ export class RelayWatch {
   private async through(ticket: RelayTicket): Promise<void> {
     const lost = Promise.withResolvers<null>();
     this.wake = () => lost.resolve(null);
-    const media = new RelayMedia(ticket, this.reader, this.servers(), {
-      feedback: (data) => this.events.feedback(data),
-      lost: () => lost.resolve(null),
-    });
-    this.media = media;
     try {
-      await media.open();
+      this.media = await relayLink(ticket, this.reader, this.servers(), {
+        feedback: (data) => this.events.feedback(data),
+        lost: () => lost.resolve(null),
+      });
+      await this.media.open();
       if (!this.isOver) this.events.opened(ticket);
       await lost.promise;
     } catch {
       // The relay cannot be used: the console names another one.
     }
-    media.close();
+    this.media?.close();
   }
 
   private async another(lost: RelayTicket): Promise<RelayTicket | null> {

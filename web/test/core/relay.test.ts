@@ -36,6 +36,14 @@ describe("the console's answer about relays", () => {
       expect(parseRelayAnswer(wrong)).toBeNull();
   });
 
+  it("names a LiveKit with what lets in there", () => {
+    const { relay, url, feed, streams } = TICKET;
+    const ticket = { engine: "livekit", relay, url, feed, streams, token: "a.b.c", publisher: "lockstep" };
+    expect(parseRelayAnswer({ relay: ticket })).toEqual(ticket);
+    expect(parseRelayAnswer({ relay: { ...ticket, token: undefined } })).toBeNull();
+    expect(parseRelayAnswer({ relay: { ...ticket, publisher: 7 } })).toBeNull();
+  });
+
   it("leaves out streams without stamps that survive a relay", () => {
     const answer = { relay: { ...TICKET, streams: [{ ...STREAM, carrier: "native" }, { kind: "video" }] } };
     expect(parseRelayAnswer(answer)?.streams).toEqual([]);
@@ -43,7 +51,7 @@ describe("the console's answer about relays", () => {
 
   it("asks for the feedback behind the media", () => {
     const ticket = parseRelayAnswer({ relay: TICKET });
-    expect(ticket === null ? [] : wantedMids(ticket)).toEqual(["0", "1"]);
+    expect(ticket?.engine === "janus" ? wantedMids(ticket) : []).toEqual(["0", "1"]);
   });
 });
 
