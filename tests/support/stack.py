@@ -101,12 +101,12 @@ async def running_stack(
 
 @asynccontextmanager
 async def running_fleet(
-    directory: Path, robots: Mapping[str, str], *, settings: Mapping[str, str] | None = None
+    directory: Path, robots: Mapping[str, str], *, port: int = 0, settings: Mapping[str, str] | None = None
 ) -> AsyncIterator[Stack]:
     """Start `lockstep up` with several simulated robots, `{"left": "planar"}`; end it on leaving."""
     event_log = directory / "events.jsonl"
     named = [argument for name, kind in robots.items() for argument in ("--robot", f"{name}={kind}")]
-    command = ("up", "--json", *named, "--port", "0", "--robot-port", "0", "--event-log", str(event_log))
+    command = ("up", "--json", *named, "--port", str(port), "--robot-port", "0", "--event-log", str(event_log))
     async with _running(directory, command, event_log, settings) as stack:
         yield stack
 

@@ -8,6 +8,7 @@ import pytest
 from structlog.testing import capture_logs
 
 from server.audit import Actor, AuditRecord
+from server.board import redis_board
 from tests.server.board.boards import eventually, running_board, tile
 from tests.support.redis_server import RedisServer
 
@@ -53,7 +54,10 @@ async def test_a_stop_reaches_the_robot_of_another_console_once_and_is_answered(
         assert "sent first when the link is back" in answers["right"].detail
 
 
-async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(server: RedisServer) -> None:
+async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(
+    server: RedisServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(redis_board, "STOP_PATIENCE", 0.5)
     async with running_board(server.url, "two") as two:
         await eventually(lambda: two.state.unknown_since is None, "the board")
         answers = await two.stop(["left"], ANN, "")
