@@ -6,6 +6,7 @@ Why each is needed:
 - aiortc neither offers nor reads foreign header extensions, and gives no packet to its user;
 - its receiver decodes in a thread that is no daemon, into queues without bound, and gives out a frame only when
   the next one begins;
+- aioice takes data for a STUN message by their length alone, and then raises what its caller does not expect;
 - aioice never gathers loopback, and takes its STUN and TURN servers before anybody could ask the console for them;
 - its SCTP waits at least one second before it repeats a lost message, three while it connects, and then sends one
   packet at a time; it acknowledges every single packet;
@@ -20,6 +21,7 @@ from collections.abc import Callable, Sequence
 from types import MethodType
 from typing import Any, Protocol
 
+import aioice.stun
 import pylibsrtp
 from aioice.ice import TransportPolicy
 from aiortc import RTCIceServer, RTCPeerConnection, RTCRtpReceiver
@@ -42,6 +44,7 @@ __all__ = [
     "send_control",
     "take_packets",
     "take_raw_rtp",
+    "tell_data_from_stun",
     "transport_of",
     "use_ice_servers",
 ]
@@ -72,6 +75,21 @@ def transport_of(pc: RTCPeerConnection) -> RTCDtlsTransport:
     if pc.sctp is None:
         raise RuntimeError("add the transceivers and data channels first")
     return pc.sctp.transport
+
+
+_parse_message = aioice.stun.parse_message  # aioice's own
+
+
+def _parse_or_refuse(data: bytes) -> aioice.stun.Message:
+    try:
+        return _parse_message(data)
+    except struct.error as error:
+        raise ValueError("a STUN attribute of the wrong length") from error
+
+
+def tell_data_from_stun() -> None:
+    """What is no STUN message after all passes for data, process-wide: an RTP packet whose number is its length."""
+    aioice.stun.parse_message = _parse_or_refuse
 
 
 def gather_only_on(pc: RTCPeerConnection, addresses: Sequence[str]) -> None:

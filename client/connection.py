@@ -9,6 +9,7 @@ from pathlib import Path
 from client.command_gate import CommandGate, Pacing
 from client.driving import Driver
 from client.errors import ConnectFailed, ConsoleError, ConsoleLost, SignallingRefused
+from client.finish import finish
 from client.link import ConsoleLink
 from client.media_gate import GateMode
 from client.newest_queue import NewestQueue
@@ -185,7 +186,10 @@ class Connection:
         self._wake_waiters()
 
     async def close(self) -> None:
-        """End everything. Idempotent."""
+        """End everything, even if cancelled meanwhile. Idempotent."""
+        await finish(self._close())
+
+    async def _close(self) -> None:
         await self._peer.close()
         if self._relay is not None:
             await self._relay.close()

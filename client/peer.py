@@ -26,6 +26,7 @@ from client.aiortc_private import (
     send_control,
     take_packets,
     take_raw_rtp,
+    tell_data_from_stun,
     use_ice_servers,
 )
 from client.errors import ConnectFailed, ConsoleError
@@ -95,6 +96,7 @@ class Peer:
         self._whep = Whep(link, tls_ca)
         self._resource = ""
         self._closing = False
+        tell_data_from_stun()
         self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
         self._stepped = asyncio.Event()  # a channel opened, or the connection ended
         for _ in range(video):

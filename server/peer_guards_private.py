@@ -5,13 +5,16 @@ What is used and why:
 - `RTCSctpTransport._receive_data_chunk`, `._receive_forward_tsn_chunk`, `._inbound_streams`, `._sack_misordered`,
   `._advertised_rwnd`: aiortc announces a receive window (RFC 9260 6.2) and does not insist on it; a message that never
   ends, holes in the numbering and 65,536 streams would each be kept without bound
+- `aioice.stun.parse_message`: raises what its caller does not expect, of a datagram that anybody can send
 - `aioice.Connection.check_incoming`, `._remote_candidates`: every address that an authenticated check comes from
   becomes a candidate, and every candidate a check of ours
 """
 
+import struct
 from collections.abc import Callable
 from typing import Any
 
+import aioice.stun
 from aiortc import RTCPeerConnection
 
 __all__ = ["guard_data", "guard_ice"]
@@ -22,6 +25,8 @@ MAX_GAPS = 1024  # chunks that came before an earlier one
 MAX_ADDRESSES = 200  # of one peer; a browser has a few
 
 Refused = Callable[[str], None]
+
+_parse_message = aioice.stun.parse_message  # aioice's own
 
 
 def guard_data(pc: RTCPeerConnection, on_refused: Refused) -> None:
@@ -64,7 +69,12 @@ def _too_much(sctp: Any, chunk: Any) -> str:
 
 
 def guard_ice(connection: Any, on_refused: Refused) -> None:
-    """Ignore checks from further addresses once there are many. `connection` is one of aioice."""
+    """Ignore checks from further addresses once there are many. `connection` is one of aioice.
+
+    aioice takes every datagram for a STUN message whose third and fourth byte are its length, as the sequence number
+    of an RTP packet may be. What is none after all passes for data, process-wide, and raises nothing.
+    """
+    aioice.stun.parse_message = _parse_or_refuse
     check = connection.check_incoming
 
     def check_bounded(message: Any, address: tuple[str, int], protocol: Any) -> None:
@@ -75,3 +85,10 @@ def guard_ice(connection: Any, on_refused: Refused) -> None:
             check(message, address, protocol)
 
     connection.check_incoming = check_bounded
+
+
+def _parse_or_refuse(data: bytes) -> aioice.stun.Message:
+    try:
+        return _parse_message(data)
+    except struct.error as error:
+        raise ValueError("a STUN attribute of the wrong length") from error

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
+import aioice.stun
 import pytest
 from aiortc import (
     RTCBundlePolicy,
@@ -29,6 +30,7 @@ from client.aiortc_private import (
     send_control,
     take_packets,
     take_raw_rtp,
+    tell_data_from_stun,
     transport_of,
 )
 from client.frame_assembler import MediaPacket
@@ -230,6 +232,14 @@ async def test_raw_packets_come_without_threads_or_receivers_and_can_be_reported
         await heard.wait()
     assert all(parse_rtp_header(data) is not None for data in taken)
     assert forged not in taken
+
+
+def test_data_that_looks_like_stun_is_not_taken_for_it() -> None:
+    attribute = bytes([0x00, 0x24, 0x00, 0x02]) + bytes(4)  # PRIORITY has four bytes
+    lookalike = bytes([0x90, 0x60, 0x00, len(attribute)]) + bytes(16) + attribute
+    tell_data_from_stun()
+    with pytest.raises(ValueError, match="wrong length"):
+        aioice.stun.parse_message(lookalike)
 
 
 def test_the_stamp_is_read_beside_the_other_extensions() -> None:

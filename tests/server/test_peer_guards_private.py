@@ -175,3 +175,17 @@ async def test_offers_of_one_link_are_limited() -> None:
             assert [each.status_code for each in answers] == [201, 429]
         finally:
             await peer.close()
+
+
+async def test_data_that_looks_like_stun_passes_for_data() -> None:
+    """An RTP packet whose sequence number is the length of a message, with an attribute that PRIORITY cannot be."""
+    attribute = bytes([0x00, 0x24, 0x00, 0x02]) + bytes(4)
+    lookalike = bytes([0x90, 0x60, 0x00, len(attribute)]) + bytes(16) + attribute
+    async with running_rig() as rig, rig.peer("observer"):
+        sctp: Any = next(iter(rig.services.console.peers)).pc.sctp
+        connection = sctp.transport.transport._connection
+        came: list[Any] = []
+        connection._queue.put_nowait = lambda item: came.append(item)
+        protocol = connection._nominated[1].protocol
+        protocol.datagram_received(lookalike, ("127.0.0.1", 9))
+        assert (lookalike, 1) in came

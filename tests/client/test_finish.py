@@ -1,0 +1,59 @@
+"""What has to come to its end does, and no cancellation is lost."""
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from client import Console
+from client.finish import finish
+from tests.support.stack import Stack
+
+
+async def test_a_cancellation_meanwhile_takes_effect_at_the_end() -> None:
+    go_on = asyncio.Event()
+    ended: list[bool] = []
+
+    async def work() -> None:
+        await go_on.wait()
+        ended.append(True)
+
+    task = asyncio.create_task(finish(work()))
+    await asyncio.sleep(0)
+    task.cancel()
+    await asyncio.sleep(0)
+    task.cancel()
+    await asyncio.sleep(0)
+    assert not task.done()
+    go_on.set()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert ended == [True]
+
+
+async def test_what_it_raises_is_raised() -> None:
+    async def fail() -> None:
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        await finish(fail())
+
+
+@pytest.mark.asyncio(loop_scope="module")
+async def test_somebody_who_is_cancelled_while_a_connection_closes_ends(stack: Stack) -> None:
+    left = asyncio.Event()
+
+    async def attend() -> None:
+        async with Console(stack.observer, video=1, audio=False) as console:
+            sctp: Any = console._live()._peer._pc.sctp
+            consent = sctp.transport.transport._connection._query_consent_task
+            # The worst moment: aioice has cancelled its task, and waits for the end of it.
+            consent.add_done_callback(lambda _: guest.cancel())
+        left.set()
+        await asyncio.Event().wait()
+
+    guest = asyncio.create_task(attend())
+    async with asyncio.timeout(30):
+        with pytest.raises(asyncio.CancelledError):
+            await guest
+    assert not left.is_set()
