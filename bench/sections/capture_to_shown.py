@@ -57,6 +57,7 @@ class Delays(NamedTuple):
     share: float  # of the pictures captured in the spell
     uncertainty: float  # ms, of the clocks
     megabits: float | None = None  # a second, of this camera's pictures; None: not measured
+    codec: str = ""
 
 
 async def run(context: Context) -> list[Result]:
@@ -82,7 +83,8 @@ async def _lockstep(stack: Stack, seconds: float) -> tuple[Delays, Delays]:
         began = time.monotonic()
         idle = await _spell(page, stack.bridge, seconds)
         megabits = (await _sent(stack) - sent) * 8 / (time.monotonic() - began) / 1e6
-        idle = idle._replace(megabits=megabits)
+        codec = (await console.stats())["streams"][CAMERA]["codec"]
+        idle = idle._replace(megabits=megabits, codec=codec)
         async with _driving(console):
             return idle, await _spell(page, stack.bridge, seconds)
 
@@ -170,7 +172,7 @@ def _delays(shown: list[dict[str, Any]], captured: list[float], clock: PageClock
 def _compare(robot: str, idle: Delays, driving: Delays, baselines: dict[str, Delays]) -> list[Result]:
     uncertainty = max(each.uncertainty for each in (idle, driving, *baselines.values()))
     conditions = (
-        "640×480 at 30 Hz, VP8, operator's page 1280×800 in headless Chromium, all cameras and sound on; "
+        f"640×480 at 30 Hz, {idle.codec}, operator's page 1280×800 in headless Chromium, all cameras and sound on; "
         f"{robot}: clocks agree within {uncertainty:.2f} ms"
     )
 
