@@ -64,7 +64,7 @@ def check_address(url: str) -> None:
     """Raises ValueError that does not repeat the address, which may hold a password."""
     try:
         parts = urlsplit(url)
-        good = parts.scheme in ("redis", "rediss") and parts.hostname is not None and (parts.port or 1) > 0
+        good = parts.scheme in ("redis", "rediss") and parts.hostname is not None and parts.port != 0
         good = good or (parts.scheme == "unix" and bool(parts.path))
         query = [key for key, _ in parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query))]
     except ValueError:

@@ -1,0 +1,17 @@
+import asyncio
+
+from server.audit import Actor, AuditRecord
+from server.board.memory_board import MemoryBoard
+from tests.server.board.boards import tile
+
+
+async def test_a_console_that_is_alone_has_no_others_and_misses_nothing() -> None:
+    board = MemoryBoard()
+    running = asyncio.get_running_loop().create_task(board.run())
+    board.publish([tile()])
+    board.record("left", AuditRecord(n=1, time=0.0, kind="start"))
+    assert board.others() == []
+    assert (board.state.shared, board.state.unknown_since, board.state.conflicts) == (False, None, ())
+    assert (await board.audit(10)) == ([], True, "")
+    assert not (await board.stop(["far"], Actor(), ""))["far"].confirmed
+    running.cancel()
