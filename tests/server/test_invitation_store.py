@@ -4,7 +4,8 @@ from pathlib import Path
 import pytest
 import structlog
 
-from server.invitation_store import FILE, InvitationStore
+from server.access import Identity
+from server.invitation_store import ELSEWHERE, FILE, InvitationStore
 from server.invitations import Invitation, Invitations
 from server.state_dir import StateDamaged, StateDir
 
@@ -94,3 +95,47 @@ def test_the_file_holds_no_token_and_is_for_its_owner_only(directory: StateDir) 
     path = directory.path / FILE
     assert b"eyJ" not in path.read_bytes()
     assert path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_link_revoked_at_another_console_is_revoked_here_at_once_and_after_a_restart(directory: StateDir) -> None:
+    store = InvitationStore(directory)
+    end = time.time() + HOUR
+    assert store.revoked_elsewhere({"far": end})
+    assert store.is_revoked("far")
+    assert not store.revoked_elsewhere({"far": end}), "nothing new"
+    assert store.keep_revoked_elsewhere() == []
+    again = InvitationStore(directory)
+    assert again.is_revoked("far")
+    assert again.revoked_links() == {"far": end}, "it is passed on"
+
+
+def test_what_was_invited_here_with_a_link_that_is_revoked_elsewhere_ends_with_it(directory: StateDir) -> None:
+    store = InvitationStore(directory)
+    told: list[None] = []
+    store.on_revoked = lambda: told.append(None)
+    guest = Identity("operator", "Ann", "far", time.time() + HOUR)
+    friend = store.update(lambda known: known.invite(guest, "observer", "Bob", HOUR / 2, time.time()))
+    store.update(_invite)
+    assert not told
+    store.revoked_elsewhere({"far": time.time() + HOUR})
+    assert [each.id for each in store.keep_revoked_elsewhere()] == [friend.id]
+    assert store.is_revoked(friend.id)
+    assert told, "others hear of that"
+    assert store.keep_revoked_elsewhere() == []
+
+
+def test_links_revoked_elsewhere_are_forgotten_when_they_would_have_ended_and_never_too_many(
+    directory: StateDir, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.invitation_store.MAX_ELSEWHERE", 2)
+    store = InvitationStore(directory)
+    now = time.time()
+    store.revoked_elsewhere({"past": now - 1, "soon": now + 10, "later": now + 20})
+    store.keep_revoked_elsewhere()
+    assert InvitationStore(directory).revoked_links().keys() == {"soon", "later"}
+
+
+def test_a_damaged_list_of_links_revoked_elsewhere_stops_the_start(directory: StateDir) -> None:
+    directory.write(ELSEWHERE, b'{"revoked": [')
+    with pytest.raises(StateDamaged):
+        InvitationStore(directory)
