@@ -1,16 +1,18 @@
 """The micromanipulator: stepping drives, a needle that bends, and what the microscope sees of them."""
 
+import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.robots.base import Measurement, MediaSource, Robot
-from robot_bridge.robots.micromanipulator.cameras import MicromanipulatorCamera
-from robot_bridge.robots.micromanipulator.description import DESCRIPTION, MICROSCOPE, SIDE, START
+from robot_bridge.robots.camera_source import CameraSource
+from robot_bridge.robots.micromanipulator.description import DESCRIPTION, MICROPHONE, MICROSCOPE, SIDE, START
 from robot_bridge.robots.micromanipulator.draughtsman import Draughtsman
-from robot_bridge.robots.micromanipulator.microphone import MicromanipulatorMicrophone
 from robot_bridge.robots.micromanipulator.needle import Contact, Needle
+from robot_bridge.robots.micromanipulator.sound import Sound
 from robot_bridge.robots.micromanipulator.stepper import Stepper
+from robot_bridge.robots.microphone_source import MicrophoneSource
 
 __all__ = ["MicromanipulatorState", "Micromanipulator"]
 
@@ -21,7 +23,7 @@ Vector = tuple[float, float, float]
 
 
 class MicromanipulatorState(NamedTuple):
-    """All that pictures and sound need. Lengths in m, x forward, y left, z up from the glass."""
+    """All that pictures need. Lengths in m, x forward, y left, z up from the glass."""
 
     holder: Vector = START  # where the tip would be if the needle were straight
     tip: Vector = START
@@ -29,7 +31,6 @@ class MicromanipulatorState(NamedTuple):
     contact: Contact | None = None
     focus: float = 0.0  # height of the plane that is sharp
     light: float = 100.0  # %
-    step_rate: float = 0.0  # steps per second of all drives together
 
 
 class Micromanipulator(Robot):
@@ -43,10 +44,11 @@ class Micromanipulator(Robot):
         self._light = MicromanipulatorState().light
         self._values: list[float] = [0.0] * len(DESCRIPTION.axes)
         self._draughtsman = Draughtsman()
+        self._sound = Sound()
         self._sources: tuple[MediaSource, ...] = (
-            MicromanipulatorCamera(MICROSCOPE, self._draughtsman.microscope, self.state),
-            MicromanipulatorCamera(SIDE, self._draughtsman.side, self.state),
-            MicromanipulatorMicrophone(self.state),
+            CameraSource(MICROSCOPE, self._draughtsman.microscope, self.state),
+            CameraSource(SIDE, self._draughtsman.side, self.state),
+            MicrophoneSource(MICROPHONE, self._hear),
         )
 
     def describe(self) -> RobotDescription:
@@ -87,7 +89,6 @@ class Micromanipulator(Robot):
             contact=needle.contact,
             focus=self._drives[3].position,
             light=self._light,
-            step_rate=sum(drive.rate for drive in self._drives),
         )
 
     def sources(self) -> Sequence[MediaSource]:
@@ -95,6 +96,9 @@ class Micromanipulator(Robot):
 
     def close(self) -> None:
         self._draughtsman.close()
+
+    def _hear(self) -> bytes:
+        return self._sound.segment(sum(drive.rate for drive in self._drives), math.hypot(*self._needle.force))
 
     def _holder(self) -> Vector:
         x, y, z, _ = self._drives

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from robot_bridge.protocol.description import AxisGain, Body, PositionLimit, RobotDescription
 from robot_bridge.robots.base import Measurement, MediaSource, Robot
+from robot_bridge.robots.camera_source import CameraSource
 from robot_bridge.robots.mjcf.actuators import Kind, actuators_of
 from robot_bridge.robots.mjcf.bodies import DRAWN_GROUPS, bodies_of
 from robot_bridge.robots.mjcf.cameras import cameras_of
@@ -22,7 +23,6 @@ from robot_bridge.robots.mjcf.joints import joints_of
 from robot_bridge.robots.mjcf.model_file import load_model
 from robot_bridge.robots.mjcf.names import label_of
 from robot_bridge.robots.mjcf.senses import range_sense, wrench_sense
-from robot_bridge.robots.mujoco_view.camera import CameraSource
 from robot_bridge.robots.mujoco_view.canvas import Look
 from robot_bridge.robots.mujoco_view.renderer import Renderer
 
@@ -74,7 +74,7 @@ class MjcfRobot(Robot):
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         model.vis.quality.offsamples = model.vis.quality.shadowsize = 0  # on a CPU they cost ten times the rest
         self._renderer = Renderer(model, width, height, look)
-        self._sources = tuple(CameraSource(camera, self._renderer, self.snapshot) for camera in cameras)
+        self._sources = tuple(CameraSource(camera, self._renderer.drawing(camera), self.snapshot) for camera in cameras)
 
     def describe(self) -> RobotDescription:
         return self._description

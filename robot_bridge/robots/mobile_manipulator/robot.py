@@ -7,15 +7,16 @@ import numpy as np
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.robots.base import Measurement, MediaSource, Robot
+from robot_bridge.robots.camera_source import CameraSource
+from robot_bridge.robots.microphone_source import SEGMENT_SECONDS, MicrophoneSource
 from robot_bridge.robots.mobile_manipulator.arm_drive import ArmDrive
 from robot_bridge.robots.mobile_manipulator.base_drive import BaseDrive
 from robot_bridge.robots.mobile_manipulator.contact_sense import ContactSense
 from robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE, describe
 from robot_bridge.robots.mobile_manipulator.hearing import Hearing
-from robot_bridge.robots.mobile_manipulator.microphone import MicrophoneSource
 from robot_bridge.robots.mobile_manipulator.range_ring import RangeSensors
 from robot_bridge.robots.mobile_manipulator.simulation import BASE, Simulation
-from robot_bridge.robots.mujoco_view.camera import CameraSource
+from robot_bridge.robots.mobile_manipulator.sound import Sound
 from robot_bridge.robots.mujoco_view.renderer import Renderer
 
 __all__ = ["MobileManipulator"]
@@ -41,11 +42,12 @@ class MobileManipulator(Robot):
         self._contacts = ContactSense(model)
         self._ranges = RangeSensors(model)
         self._hearing = Hearing(model)
+        self._sound = Sound(MICROPHONE.sample_rate, round(MICROPHONE.sample_rate * SEGMENT_SECONDS))
         self._values = np.zeros(len(self._description.axes))
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)
         self._sources: tuple[MediaSource, ...] = (
-            *(CameraSource(camera, self._renderer, self.simulation.snapshot) for camera in CAMERAS),
-            MicrophoneSource(MICROPHONE, self._hearing.take),
+            *(CameraSource(each, self._renderer.drawing(each), self.simulation.snapshot) for each in CAMERAS),
+            MicrophoneSource(MICROPHONE, self._hear, begin=self._hearing.take),
         )
 
     def describe(self) -> RobotDescription:
@@ -89,6 +91,9 @@ class MobileManipulator(Robot):
 
     def close(self) -> None:
         self._renderer.close()
+
+    def _hear(self) -> bytes:
+        return self._sound.segment(self._hearing.take())
 
     def _faults(self) -> list[str]:
         restarts = self.simulation.restarts

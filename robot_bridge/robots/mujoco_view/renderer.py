@@ -2,6 +2,7 @@
 
 import asyncio
 import concurrent.futures
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import mujoco
@@ -36,6 +37,10 @@ class Renderer:
     async def picture(self, camera: Camera, positions: npt.NDArray[np.float64]) -> bytes:
         """`camera`'s view of the state as yuv420p."""
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._draw, camera, positions)
+
+    def drawing(self, camera: Camera) -> Callable[[npt.NDArray[np.float64], int], Awaitable[bytes]]:
+        """As a source of pictures draws them; the event is not shown."""
+        return lambda positions, event: self.picture(camera, positions)
 
     def close(self) -> None:
         """Waits for the picture being drawn. May be called again."""

@@ -8,10 +8,12 @@ import numpy as np
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.robots.base import Measurement, MediaSource, Robot
-from robot_bridge.robots.planar.cameras import FrontCamera, OverviewCamera
-from robot_bridge.robots.planar.description import DESCRIPTION, RADIUS, RANGES
-from robot_bridge.robots.planar.microphone import PlanarMicrophone
+from robot_bridge.robots.camera_source import CameraSource
+from robot_bridge.robots.microphone_source import MicrophoneSource
+from robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW, RADIUS, RANGES
+from robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
 from robot_bridge.robots.planar.room import contacts, ray_hits
+from robot_bridge.robots.planar.sound import Synthesiser
 
 __all__ = ["PlanarRobot", "PlanarState"]
 
@@ -38,10 +40,11 @@ class PlanarRobot(Robot):
     def __init__(self, state: PlanarState | None = None) -> None:
         self._state = state or PlanarState()
         self._command = (0.0, 0.0, 0.0)
-        self._sources = (
-            OverviewCamera(lambda: self._state),
-            FrontCamera(lambda: self._state),
-            PlanarMicrophone(lambda: self._state),
+        self._sound = Synthesiser()
+        drawings = ((OVERVIEW, OverviewDrawing), (FRONT, FrontDrawing))
+        self._sources: tuple[MediaSource, ...] = (
+            *(CameraSource(each, kind(each.width, each.height).draw, lambda: self._state) for each, kind in drawings),
+            MicrophoneSource(MICROPHONE, self._hear),
         )
 
     @property
@@ -98,3 +101,7 @@ class PlanarRobot(Robot):
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources
+
+    def _hear(self) -> bytes:
+        state = self._state
+        return self._sound.segment(math.hypot(state.vx, state.vy) + 0.3 * abs(state.wz))

@@ -14,12 +14,12 @@ from robot_bridge.link_client import RobotLink
 from robot_bridge.protocol.messages import Media
 from robot_bridge.robots.event_strip import read_event_strip, strip_height
 from robot_bridge.robots.micromanipulator.description import MICROPHONE, MICROSCOPE, SIDE
-from robot_bridge.robots.micromanipulator.microphone import SEGMENT_SAMPLES, Sound
 from robot_bridge.robots.micromanipulator.microscope import Microscope
 from robot_bridge.robots.micromanipulator.needle import Contact
 from robot_bridge.robots.micromanipulator.robot import Micromanipulator, MicromanipulatorState
 from robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES
 from robot_bridge.robots.micromanipulator.side_view import SideView
+from robot_bridge.robots.micromanipulator.sound import SEGMENT_SAMPLES, Sound
 from robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import log_lines, operator
 

@@ -9,11 +9,9 @@ import pytest
 
 from robot_bridge.protocol.messages import Media
 from robot_bridge.robots.base import MediaSource, Stamp
+from robot_bridge.robots.microphone_source import SEGMENT_SECONDS
 from robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE
-from robot_bridge.robots.mobile_manipulator.hearing import Heard
-from robot_bridge.robots.mobile_manipulator.microphone import SEGMENT_SECONDS, MicrophoneSource
 from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
-from robot_bridge.robots.mujoco_view.camera import CameraSource
 from robot_bridge.robots.mujoco_view.renderer import Renderer
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
 from tests.robot_bridge.robots.stamping import Stamping
@@ -82,35 +80,6 @@ async def test_a_picture_shows_the_state_at_its_stamp_and_the_sky_is_up(driver: 
     assert rows[:10].mean() > rows[-10:].mean() + 30  # bright sky above the dark palm
 
 
-async def test_while_a_picture_is_drawn_the_loop_runs_and_no_other_is_begun() -> None:
-    class SlowRenderer(Renderer):
-        def __init__(self) -> None:
-            self.drawing = 0
-            self.largest = 0
-            self.begun = asyncio.Event()
-            self.go_on = asyncio.Event()
-
-        async def picture(self, camera: object, positions: object) -> bytes:
-            self.drawing += 1
-            self.largest = max(self.largest, self.drawing)
-            self.begun.set()
-            await self.go_on.wait()
-            self.drawing -= 1
-            return b""
-
-    renderer, clock = SlowRenderer(), Clock()
-    source = CameraSource(CAMERAS[0], renderer, lambda: np.zeros(1))
-    async with asyncio.timeout(10), asyncio.TaskGroup() as group:
-        collecting = group.create_task(collect(source, clock.stamp, 3))
-        await renderer.begun.wait()
-        stamps_while_drawing = clock.event
-        renderer.go_on.set()
-        media = await collecting
-    assert stamps_while_drawing == 1
-    assert renderer.largest == 1
-    assert [picture.stamp for picture in media] == [1, 2, 3]
-
-
 async def test_a_closed_renderer_draws_no_more(robot: MobileManipulator) -> None:
     renderer = Renderer(robot.simulation.model, 64, 48)
     renderer.close()
@@ -127,17 +96,6 @@ async def test_the_microphone_emits_20_ms_segments_stamped_at_their_start(robot:
         assert len(segment.payload) == 2 * round(48_000 * SEGMENT_SECONDS)
         assert any(segment.payload)
     assert [segment.stamp for segment in media] == [1, 2, 3, 4, 5]  # the one that held before the sound was made
-
-
-async def test_what_was_heard_before_the_microphone_ran_is_not_played() -> None:
-    taken: list[str] = []
-
-    def take() -> Heard:
-        taken.append("take")
-        return Heard()
-
-    await collect(MicrophoneSource(MICROPHONE, take), Clock().stamp, 2)
-    assert len(taken) >= 3
 
 
 async def test_driving_is_louder_than_resting(driver: Driver) -> None:

@@ -8,11 +8,10 @@ import pytest
 from robot_bridge.protocol.messages import Media
 from robot_bridge.robots.base import MediaSource, Stamp
 from robot_bridge.robots.event_strip import read_event_strip
-from robot_bridge.robots.planar.cameras import FrontCamera, OverviewCamera
 from robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW
 from robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
-from robot_bridge.robots.planar.microphone import SEGMENT_SAMPLES, TONE_HZ, PlanarMicrophone, Synthesiser
-from robot_bridge.robots.planar.robot import PlanarState
+from robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
+from robot_bridge.robots.planar.sound import SEGMENT_SAMPLES, TONE_HZ, Synthesiser
 from tests.robot_bridge.robots.stamping import Stamping
 
 EVENT = 123_456_789
@@ -93,10 +92,7 @@ def test_segments_join_without_a_click() -> None:
 
 
 async def test_the_cameras_stamp_at_capture_and_name_themselves() -> None:
-    for camera, source in (
-        (OVERVIEW, OverviewCamera(lambda: PlanarState())),
-        (FRONT, FrontCamera(lambda: PlanarState())),
-    ):
+    for camera, source in zip((OVERVIEW, FRONT), PlanarRobot().sources(), strict=False):
         media = await capture(source, 2)
         assert [medium.stamp for medium in media] == [EVENT, EVENT + 1]
         for medium in media:
@@ -108,7 +104,7 @@ async def test_the_cameras_stamp_at_capture_and_name_themselves() -> None:
 
 async def test_the_microphone_stamps_a_segment_at_its_start() -> None:
     now = asyncio.get_running_loop().time()
-    media = await capture(PlanarMicrophone(lambda: PlanarState()), 3)
+    media = await capture(PlanarRobot().sources()[2], 3)
     assert [medium.stamp for medium in media] == [EVENT, EVENT + 1, EVENT + 2]
     assert media[0].time - now < 0.02
     for medium in media:

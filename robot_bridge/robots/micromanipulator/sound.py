@@ -1,25 +1,16 @@
 """The micromanipulator's sound: a tone that follows the rate of the steps, and another that follows the force."""
 
-import asyncio
 import math
-import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from robot_bridge.metronome import Metronome
-from robot_bridge.protocol.messages import Media
-from robot_bridge.robots.base import MediaSource, Stamp
 from robot_bridge.robots.micromanipulator.description import MICROPHONE
+from robot_bridge.robots.microphone_source import SEGMENT_SECONDS
 
-if TYPE_CHECKING:
-    from robot_bridge.robots.micromanipulator.robot import MicromanipulatorState
+__all__ = ["SEGMENT_SAMPLES", "Sound"]
 
-__all__ = ["SEGMENT_SAMPLES", "MicromanipulatorMicrophone", "Sound"]
-
-SEGMENT_SECONDS: Final = 0.02
 SEGMENT_SAMPLES: Final = round(MICROPHONE.sample_rate * SEGMENT_SECONDS)
 HUM_HZ: Final = 110.0  # the lamp's supply, always there
 HUM_LEVEL: Final = 0.015  # of full scale
@@ -78,28 +69,3 @@ def _strength(force: float) -> float:
     if force <= LIGHTEST:
         return 0.0
     return min(1.0, 0.05 + 0.95 * math.log(force / LIGHTEST) / math.log(LOUDEST / LIGHTEST))
-
-
-class MicromanipulatorMicrophone(MediaSource):
-    """A segment every 20 ms, stamped at its start and emitted at its end, as a real microphone would."""
-
-    def __init__(self, state: "Callable[[], MicromanipulatorState]") -> None:
-        self._state = state
-        self._sound = Sound()
-
-    async def run(self, stamp: Callable[[], Stamp], emit: Callable[[Media], None]) -> None:
-        metronome = Metronome(SEGMENT_SECONDS, time.monotonic(), catch_up=2)
-        while True:
-            now, state = stamp(), self._state()
-            await asyncio.sleep(metronome.wait(time.monotonic()))
-            emit(
-                Media(
-                    stream=MICROPHONE.name,
-                    codec="pcm_s16le",
-                    stamp=now.event,
-                    time=now.time,
-                    payload=self._sound.segment(state.step_rate, math.hypot(*state.force)),
-                    sample_rate=MICROPHONE.sample_rate,
-                    channels=MICROPHONE.channels,
-                )
-            )

@@ -1,33 +1,31 @@
-"""The microscope and the side view as sources of pictures."""
+"""A camera of a simulated robot: pictures at a fixed rate, each of the state at one instant."""
 
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 
 from robot_bridge.metronome import Metronome
 from robot_bridge.protocol.description import Camera
 from robot_bridge.protocol.messages import Media
 from robot_bridge.robots.base import MediaSource, Stamp
 
-if TYPE_CHECKING:
-    from robot_bridge.robots.micromanipulator.robot import MicromanipulatorState
+__all__ = ["CameraSource"]
 
-__all__ = ["MicromanipulatorCamera"]
+State = TypeVar("State")
 
 
-class MicromanipulatorCamera(MediaSource):
-    """Takes stamp and state at one instant on the loop, and has them drawn in a thread.
+class CameraSource(MediaSource, Generic[State]):
+    """Takes stamp and state at one instant on the loop, and has them drawn.
 
-    At most one picture is being drawn: when drawing falls behind, the beats missed meanwhile are skipped.
+    What is drawn within a millisecond is drawn on the loop; what takes longer, in a thread. At most one picture is
+    being drawn: when drawing falls behind, the beats missed meanwhile are skipped.
     """
 
     def __init__(
-        self,
-        camera: Camera,
-        draw: "Callable[[MicromanipulatorState, int], Awaitable[bytes]]",
-        state: "Callable[[], MicromanipulatorState]",
+        self, camera: Camera, draw: Callable[[State, int], bytes | Awaitable[bytes]], state: Callable[[], State]
     ) -> None:
+        """`draw`: the state as yuv420p, and the event where the picture is to show it. `state`: what it is now."""
         self._camera = camera
         self._draw = draw
         self._state = state
@@ -37,14 +35,14 @@ class MicromanipulatorCamera(MediaSource):
         while True:
             await asyncio.sleep(metronome.wait(time.monotonic()))
             now, state = stamp(), self._state()
-            payload = await self._draw(state, now.event)
+            drawn = self._draw(state, now.event)
             emit(
                 Media(
                     stream=self._camera.name,
                     codec="yuv420p",
                     stamp=now.event,
                     time=now.time,
-                    payload=payload,
+                    payload=drawn if isinstance(drawn, bytes) else await drawn,
                     width=self._camera.width,
                     height=self._camera.height,
                 )
