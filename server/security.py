@@ -35,7 +35,7 @@ HEADERS = {
     "X-Permitted-Cross-Domain-Policies": "none",
     "Permissions-Policy": (
         "gamepad=(self), fullscreen=(self), screen-wake-lock=(self), clipboard-write=(self), autoplay=(self), "
-        "microphone=(self), camera=(), geolocation=(), usb=(), serial=(), bluetooth=(), hid=(), midi=(), payment=(), "
+        "microphone=(self), camera=(), geolocation=(), usb=(), serial=(), hid=(), midi=(), payment=(), "
         "display-capture=(), browsing-topics=()"
     ),
 }
