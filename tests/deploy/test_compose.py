@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
-PROFILES = ("public", "monitoring")
+PROFILES = ("public", "monitoring", "redis")
 
 
 def _services() -> dict[str, dict[str, Any]]:

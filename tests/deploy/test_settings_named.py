@@ -12,6 +12,8 @@ OTHERS = {  # not the programs' own
     "LOCKSTEP_SITE",  # Caddy
     "LOCKSTEP_HTTP_PORT",
     "LOCKSTEP_HTTPS_PORT",
+    "LOCKSTEP_ONE",
+    "LOCKSTEP_TWO",
     "LOCKSTEP_EXTERNAL_IP",  # coturn
     "LOCKSTEP_ROBOT_NAME",  # the unit's own
     "LOCKSTEP_NAME",  # stands for any in a sentence

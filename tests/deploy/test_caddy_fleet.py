@@ -1,0 +1,81 @@
+"""A real Caddy with the fleet's Caddyfile in front of two servers that say who they are."""
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.support.redis_server import free_port
+
+CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile.fleet"
+READY_SECONDS = 20.0
+
+
+@asynccontextmanager
+async def _console(name: str) -> AsyncIterator[asyncio.Server]:
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readuntil(b"\r\n\r\n")
+        head = f"HTTP/1.1 200 OK\r\nContent-Length: {len(name)}\r\nConnection: close\r\n\r\n"
+        writer.write(head.encode() + name.encode())
+        await writer.drain()
+        writer.close()
+
+    server = await asyncio.start_server(answer, "127.0.0.1", 0)
+    async with server:
+        yield server
+
+
+def _address(server: asyncio.Server) -> str:
+    return f"127.0.0.1:{server.sockets[0].getsockname()[1]}"
+
+
+@asynccontextmanager
+async def _entry(directory: Path, one: asyncio.Server, two: asyncio.Server) -> AsyncIterator[httpx.AsyncClient]:
+    https = free_port()
+    settings = {"LOCKSTEP_SITE": "localhost", "LOCKSTEP_ONE": _address(one), "LOCKSTEP_TWO": _address(two)}
+    ports = {"LOCKSTEP_HTTPS_PORT": str(https), "LOCKSTEP_HTTP_PORT": str(free_port())}
+    folders = {"HOME": str(directory), "XDG_DATA_HOME": str(directory), "XDG_CONFIG_HOME": str(directory)}
+    process = await asyncio.create_subprocess_exec(
+        *("caddy", "run", "--config", str(CADDYFILE), "--adapter", "caddyfile"),
+        env=os.environ | settings | ports | folders,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    try:
+        async with httpx.AsyncClient(base_url=f"https://localhost:{https}", verify=False, trust_env=False) as http:
+            async with asyncio.timeout(READY_SECONDS):
+                while True:
+                    try:
+                        await http.get("/")
+                    except httpx.TransportError:
+                        await asyncio.sleep(0.05)
+                    else:
+                        break
+            yield http
+    finally:
+        process.terminate()
+        await process.wait()
+
+
+@pytest.mark.timeout(60)
+async def test_robots_lead_to_their_consoles_and_the_overview_to_the_first_that_lives(tmp_path: Path) -> None:
+    async with _console("one") as one, _console("two") as two, _entry(tmp_path, one, two) as http:
+        for path, console in (
+            ("/", "one"),
+            ("/api/fleet", "one"),
+            ("/robots/left/", "one"),
+            ("/robots/right/whep", "one"),
+            ("/robots/crane", "two"),
+            ("/robots/crane/api/session", "two"),
+            ("/robots/cranes/", "one"),
+        ):
+            assert (await http.get(path)).text == console, path
+        for path in ("/metrics", "/robots/crane/metrics"):
+            assert (await http.get(path)).status_code == 404
+        one.close()
+        await one.wait_closed()
+        assert (await http.get("/api/fleet")).text == "two"
+        assert (await http.get("/robots/left/")).status_code == 502
