@@ -115,7 +115,7 @@ async def test_a_robot_that_is_away_says_so_first_and_stop_reaches_the_others(fl
             await expect(answer).to_contain_text("right: not delivered")
             await expect(answer).to_contain_text("emergency stops")
             for name in ("left", "middle"):
-                assert list(fleet.events("stopped", name))
+                assert list(fleet.events("stop", name))
         await _until(page, "s.stop && s.stop.tone === 'done' && s.stop.title === 'All 3 robots are stopped'")
         await page.get_by_role("button", name="Close").click()
         await page.get_by_role("searchbox").fill("")

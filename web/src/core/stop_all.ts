@@ -100,7 +100,7 @@ export function stopAllWords(stop: StopAll): StopWords | null {
       advice:
         all.length === 0
           ? "This link is good for no robot."
-          : "Each is reset on its own page. Nothing moves by that.",
+          : "Each is reset on its own page. A reset moves nothing.",
     };
   const counted = `${stopped.length} of ${robotsWords(all.length)} stopped`;
   const isKept = all.some(([, { fate }]) => fate === "kept");
@@ -112,7 +112,7 @@ export function stopAllWords(stop: StopAll): StopWords | null {
     tone: "bad",
     title: counted,
     ...words,
-    advice: "Stop the others by their own emergency stops. Press again to say it once more.",
+    advice: `${stop.failure === "" ? "" : `${stop.failure} `}Stop the others by their own emergency stops. Press again to say it once more.`,
   };
 }
 

@@ -32,13 +32,11 @@ export interface TileContext {
 }
 
 export function tileState(robot: FleetRobot, context: TileContext): TileState {
-  if (context.unknownSince !== null)
-    return {
-      kind: "unknown",
-      tone: "off",
-      words: `Unknown since ${clockWords(context.unknownSince)}`,
-      more: "",
-    };
+  if (context.unknownSince !== null) {
+    const before = tileState(robot, { ...context, unknownSince: null });
+    const words = `Unknown since ${clockWords(context.unknownSince)}`;
+    return { kind: "unknown", tone: "off", words, more: `Before: ${before.words}` };
+  }
   if (robot.trouble !== "") return { kind: "trouble", tone: "bad", words: robot.trouble, more: "" };
   if (robot.link !== "up") return linkState(robot, context.heardAt);
   if (robot.stopped) return { kind: "stopped", tone: "bad", words: stopWords(robot), more: robot.stopReason };

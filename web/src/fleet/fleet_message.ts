@@ -12,7 +12,7 @@ export interface FleetMessage extends Words {
 export const NO_LINK: FleetMessage = {
   key: "no_link",
   title: "Open the link",
-  text: "This page needs the link that lockstep serve printed, or one that somebody gave you: it ends in #token=… Paste it here.",
+  text: "This page needs the link that lockstep serve printed, or one that somebody gave you: it ends in #token=…",
   action: "paste",
 };
 
@@ -48,7 +48,12 @@ export function messageElement(message: FleetMessage, clear: () => void): HTMLEl
 }
 
 function pasteForm(): HTMLElement {
-  const field = h("input", "field", { type: "password", "aria-label": "Your link", autocomplete: "off" });
+  const field = h("input", "field", {
+    type: "password",
+    "aria-label": "Your link",
+    placeholder: "Paste your link",
+    autocomplete: "off",
+  });
   const trouble = h("p", "library-trouble", { role: "alert" });
   trouble.hidden = true;
   setText(trouble, "This is no link of a console: it has no token behind the #.");

@@ -7,7 +7,7 @@ import {
   tookTrouble,
   type FleetPhase,
 } from "../core/fleet_news";
-import { isFound, sortFleet, summaryWords } from "../core/fleet_order";
+import { isFound, robotsWords, sortFleet, summaryWords } from "../core/fleet_order";
 import type { PageLink } from "../core/fragment";
 import { isTrouble, tileState, type TileState } from "../core/tile_state";
 import { TROUBLE_WORDS } from "../core/trouble";
@@ -69,7 +69,7 @@ export class FleetPage {
     this.stopBar = createStopBar(this.stopping.stop, {
       stop: (reason) => this.stop(reason),
       putAway: () => this.stopping.putAway(),
-      robots: () => this.robots.length,
+      whom: () => this.whomStopReaches(),
     });
   }
 
@@ -111,6 +111,13 @@ export class FleetPage {
     const now = performance.now();
     this.stopping.press(reason, this.robots, now);
     this.draw(now);
+  }
+
+  /** A page that may not stop anything says so before somebody relies on it. */
+  private whomStopReaches(): string {
+    if (this.link.token === null) return "not without a link";
+    if (this.phase(performance.now()) === "shut_out") return "your link is not valid";
+    return this.robots.length === 0 ? "every robot" : robotsWords(this.robots.length);
   }
 
   private watch(): void {
@@ -174,7 +181,7 @@ export class FleetPage {
       tile?.show(robot, tileState(robot, { unknownSince, heardAt: this.news.heardAt }));
       tile?.showPicture(now);
     }
-    this.arrange(false);
+    if (phase !== "unknown") this.arrange(false);
     this.announce(before, phase);
     this.showBanner(phase);
     this.showMessage(phase);
@@ -205,7 +212,9 @@ export class FleetPage {
   /** What a screen reader hears: states that became or ended as trouble. */
   private announce(before: ReadonlyMap<string, TileState | null>, phase: FleetPhase): void {
     const kinds = [...this.tiles.values()].flatMap(({ state }) => (state === null ? [] : [state.kind]));
-    setText(this.summary, kinds.length === 0 ? "" : summaryWords(kinds));
+    const hidden = this.tiles.size - this.shown.length;
+    const shown = hidden === 0 ? "" : ` · ${hidden} hidden by the filter`;
+    setText(this.summary, kinds.length === 0 ? "" : `${summaryWords(kinds)}${shown}`);
     const troubled = kinds.filter(isTrouble).length;
     const title =
       troubled === 0 || phase !== "live" ? "Robots · Lockstep" : `(${troubled}) Robots · Lockstep`;
@@ -264,7 +273,7 @@ function loadingElement(): HTMLElement {
     "div",
     "fleet-loading",
     {},
-    h("p", "unseen", { role: "status" }, "Asking for the robots …"),
+    h("p", "loading-words muted", { role: "status" }, "Asking for the robots …"),
     h("ul", "fleet-grid", { "aria-hidden": "true" }, ...places),
   );
 }

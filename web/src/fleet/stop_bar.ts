@@ -1,11 +1,10 @@
-import { robotsWords } from "../core/fleet_order";
 import { stopAllWords, type StopAll, type StopWords } from "../core/stop_all";
 import { button, h, setData, setHidden, setText, type Panel } from "../ui/dom";
 
 export interface StopBarEvents {
   stop(reason: string): void;
   putAway(): void;
-  robots(): number; // that this page knows; 0 while it knows none
+  whom(): string; // "8 robots"
 }
 
 /** STOP ALL: in every state of the page, for everyone; beside it what became of the last one. */
@@ -33,15 +32,14 @@ export function createStopBar(stop: StopAll, events: StopBarEvents): Panel {
     update() {
       const said = stopAllWords(stop);
       setData(press, "state", said?.tone === "pending" ? "pending" : "ready");
-      setText(words, said?.tone === "pending" ? "telling the robots…" : hint(events.robots()));
+      setText(words, said?.tone === "pending" ? "telling the robots…" : hint(events.whom()));
       answer.show(said);
     },
   };
 }
 
-function hint(count: number): string {
-  const key = document.documentElement.dataset["touch"] === "true" ? "" : " · Esc";
-  return `${count === 0 ? "every robot" : robotsWords(count)}${key}`;
+function hint(whom: string): string {
+  return document.documentElement.dataset["touch"] === "true" ? whom : `${whom} · Esc`;
 }
 
 interface Answer {

@@ -29,8 +29,8 @@ export class Tile {
     rate: createFigure("Events/s"),
     people: createFigure("People"),
   };
-  private readonly openWords = h("span");
-  private readonly link = h("a", "tile-open", {}, this.openWords);
+  private readonly openHow = h("span", "tile-open-how");
+  private readonly link = h("a", "tile-open", {}, "Open", this.openHow);
   private isPointedAt = false;
 
   constructor(readonly name: string) {
@@ -38,7 +38,6 @@ export class Tile {
     const title = h("h2", "tile-name", { id }, name);
     this.veil.append(h("div", "veil-plate", {}, this.veilWords));
     this.canvas.setAttribute("aria-label", `Live picture of ${name}`);
-    this.link.append(h("span", "unseen", {}, `: ${name}`));
     this.recording.setAttribute("title", "This robot’s session is recorded");
     const body = h(
       "article",
@@ -79,6 +78,7 @@ export class Tile {
     setText(this.stateWords, state.words);
     setText(this.stateMore, state.more);
     setHidden(this.stateMore, state.more === "");
+    if (this.stateMore.title !== state.more) this.stateMore.title = state.more;
     this.showFigures(robot);
     this.showLink(robot);
   }
@@ -107,7 +107,10 @@ export class Tile {
 
   private showLink(robot: FleetRobot): void {
     const href = robotPage(robot.url, location.hash, document.baseURI);
-    setText(this.openWords, robot.mayDrive ? "Open to drive" : "Open to watch");
+    const how = robot.mayDrive ? " to drive" : " to watch";
+    setText(this.openHow, how);
+    if (this.link.ariaLabel !== `Open${how}: ${robot.name}`)
+      this.link.ariaLabel = `Open${how}: ${robot.name}`;
     if (href === null) this.link.removeAttribute("href");
     else if (this.link.getAttribute("href") !== href) this.link.setAttribute("href", href);
   }

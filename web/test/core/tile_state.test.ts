@@ -84,6 +84,9 @@ describe("a robot's state in the overview", () => {
         kind: "unknown",
         words: `Unknown since ${clockWords(HEARD)}`,
       });
+    expect(tileState(robotOf("a", { stopped: true, stop_by: "Cy" }), lost).more).toBe(
+      "Before: Stopped by Cy",
+    );
   });
 
   it("tells first what is wrong with its place in the fleet", () => {
