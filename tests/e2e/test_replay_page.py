@@ -11,6 +11,7 @@ from playwright.async_api import Browser, Page
 
 from bench.browsers.chromium import open_page
 from bench.browsers.console_page import READ_STRIP, ConsolePage, open_console
+from bench.emulator import Network
 from server.recording.reader import Record, RecordingReader
 from tests.support.stack import Stack
 
@@ -38,15 +39,19 @@ async def _ask(stack: Stack, method: str, path: str) -> dict[str, Any]:
 
 
 async def _record_a_drive(stack: Stack, chromium: Browser) -> tuple[str, int, int]:
-    """Its id, its first and its last event of driving."""
-    async with open_console(chromium, stack.operator) as console:
+    """Over the emulated way to Hong Kong. Its id, its first and its last event of driving."""
+    async with (
+        Network("hong-kong", console_url=stack.console, seed=4) as network,
+        open_console(chromium, network.link(stack.operator)) as console,
+    ):
         await console.until_live()
-        await console.until("s.streams.microphone.rendered > 5")
+        await console.until("s.streams.microphone.rendered > 5", 60)
         await _ask(stack, "POST", "/api/recordings")
         await console.arm()
         first = (await console.stats())["event"]
         await console.drive_forward()
-        await console.until(f"s.event > {first + EVENTS}")
+        await console.until(f"s.event > {first + EVENTS}", 60)
+        assert {each["codec"] for each in (await console.stats())["streams"].values()} == {"H264", "opus"}
         last = (await console.stats())["event"]
         await _ask(stack, "POST", "/api/recordings/stop")
     (recording,) = (await _ask(stack, "GET", "/api/recordings"))["recordings"]
@@ -92,10 +97,17 @@ async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_
                 strip = await page.evaluate(READ_STRIP, camera)
                 assert strip["event"] == strip["stamp"] == _newest(records, f"/camera/{camera}", event)[-1].event
                 assert (camera, strip["event"]) in captured
+                newest = _newest(records, f"/camera/{camera}", event)[-1]
+                assert await page.evaluate("(name) => window.lockstep.picture(name)", camera) == newest.payload.hex()
             packets = _newest(records, "/microphone/microphone", event)
             sound = shown["sounds"]["microphone"]
             assert sound["stamps"] == [each.event for each in packets]
-            assert sound["sizes"] == [len(each.payload) for each in packets]
+            heard = await page.evaluate("() => window.lockstep.sound('microphone')")
+            assert heard == [each.payload.hex() for each in packets]
+            assert ("microphone", sound["stamps"][0]) in captured
+            await replay.until(f"s.scene.event === {event}")
+            x, y, _ = (await replay.stats())["scene"]["bodies"]["base"]
+            assert [x, y] == pytest.approx([feedback["joints"][0], feedback["joints"][1]], abs=1e-9)
 
 
 async def test_a_recording_is_watched_while_it_is_made_then_listed_and_deleted_by_role(

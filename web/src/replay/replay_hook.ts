@@ -1,4 +1,5 @@
 import { CAMERA, MICROPHONE } from "../core/replay_chunk";
+import type { ReplayMoment } from "../core/replay_moment";
 import type { PlayerView } from "./player_view";
 
 /** What the page says of itself to tests: `window.lockstep`, as on the console's page. */
@@ -6,9 +7,23 @@ export function installReplayHook(view: PlayerView | null): void {
   Object.assign(window, {
     lockstep: {
       rendered: (name: string) => view?.rendered.get(name) ?? [],
+      picture: (name: string) => hex(momentOf(view)?.pictures.get(CAMERA + name)?.record.payload),
+      sound: (name: string) =>
+        momentOf(view)
+          ?.sounds.get(MICROPHONE + name)
+          ?.packets.map((each) => hex(each.payload)) ?? [],
       stats: () => (view === null ? null : statsOf(view)),
     },
   });
+}
+
+function momentOf(view: PlayerView | null): ReplayMoment | undefined {
+  return view?.player.shown?.moment;
+}
+
+/** As it was recorded, before it is decoded. */
+function hex(payload: Uint8Array | undefined): string {
+  return Array.from(payload ?? [], (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 function statsOf({ player, sounds, scene }: PlayerView): object {
