@@ -1,6 +1,7 @@
 """A Redis that is away, hung, full, locked or full of rubbish disturbs nobody, and is named."""
 
 import asyncio
+import re
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from tests.support.redis_server import RedisServer
 
 ANN = Actor("Ann", "operator")
 NOTE = AuditRecord(n=1, time=1.0, kind="note")
+GUIDE = Path(__file__).parents[3] / "docs" / "fleet.md"
 PASSWORD = "correct-horse-battery-staple"
 STRANGER = "0123456789abcdef"
 
@@ -196,3 +198,22 @@ async def test_encrypted_and_with_a_password(tmp_path: Path) -> None:
         async with running_board(server.url, "three") as three:
             await eventually(lambda: "CERTIFICATE_VERIFY_FAILED" in three.state.detail, "a certificate of nobody's")
             assert PASSWORD not in three.state.detail
+
+
+async def test_a_user_who_may_do_no_more_than_the_guide_says_suffices(server: RedisServer) -> None:
+    (rules,) = re.findall(r"An ACL may grant `(.*)` and the commands\n`(.*)`", GUIDE.read_text())
+    commands = [f"+{command.lower()}" for command in rules[1].split()]
+    async with server.client() as client:
+        await client.execute_command("ACL", "SETUSER", "ann", "on", f">{PASSWORD}", *rules[0].split(), *commands)
+    url = f"redis://ann:{PASSWORD}@127.0.0.1:{server.port}/0"
+    async with running_board(url, "one", tile("left")) as one, running_board(url, "two", tile("far")) as two:
+        await eventually(lambda: one.others() and two.others(), "the robots")
+        one.record("left", NOTE)
+        one.links.revoke("abc")
+        await eventually(lambda: "abc" in two.links.elsewhere, "the revocation")
+        assert (await two.stop(["left"], ANN, ""))["left"].delivered
+        async with asyncio.timeout(10):
+            while not (await two.audit(10)).records:  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+    for board in (one, two):
+        assert board.count("lockstep_board_failures_total", reason="refused") == 0
