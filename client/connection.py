@@ -218,12 +218,13 @@ class Connection:
                 self._peer.lose(f"nothing was heard from the console for {self.options.silence_seconds:g} s")
             if self._pings.lost(now):
                 self.driver.loss()
-            self._peer.send("control", Ping(id=self._pings.send(now)))
+            ping = self._pings.send(now)
             if early_pings:
                 early_pings -= 1
+                self._peer.send("control", Ping(id=ping))
                 await asyncio.sleep(EARLY_PING)
                 continue
-            self._peer.send("control", self._report())
+            self._peer.send("control", self._report(ping))
             self.media.reported()
             await asyncio.sleep(self._beat())
 
@@ -356,7 +357,7 @@ class Connection:
             echoes=pilot.echoes,
         )
 
-    def _report(self) -> Report:
+    def _report(self, ping: int) -> Report:
         pilot, round_trip = self.driver.pilot, self._pings.round_trip
         delay = self.driver.picture_delay.known(asyncio.get_running_loop().time())
         return Report(
@@ -365,6 +366,7 @@ class Connection:
             streams=[stream.report() for stream in self.media.statistics()],
             picture_delay_ms=delay * 1000 if delay is not None else None,
             round_trip_ms=round_trip * 1000 if round_trip is not None else None,
+            ping=ping,
         )
 
     # What is asked of the console

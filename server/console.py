@@ -224,6 +224,8 @@ class Console:
             case Rename():
                 self.people.rename(peer, message.name)
             case Report():  # the peer keeps it
+                if message.ping is not None:
+                    peer.send("control", Pong(id=message.ping))
                 self._report_speed(peer, message)
 
     def input_refused(self, peer: Peer, channel: str, error: ChannelError) -> None:

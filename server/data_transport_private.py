@@ -6,6 +6,8 @@ What is used and why:
   least one second before it repeats a lost message, three while it connects, and then sends one packet at a time
 - `RTCSctpTransport._transmit`: runs in tasks that nobody awaits, and raises there when the connection has ended
 - `RTCSctpTransport._data_channel_flush`: each message is sent by a task of its own
+- `RTCSctpTransport._send_sack`, `._sack_needed`, `._sack_misordered`, `._sack_duplicates`: every single packet is
+  acknowledged
 - `RTCSctpTransport._handle_data`, `RTCDtlsTransport._ssl`: one record is taken from OpenSSL for each datagram that
   comes in. A record that waits there, as one that overtook the end of the handshake does, is never caught up with:
   from then on every message is one datagram late
@@ -27,6 +29,7 @@ RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 
 RETRANSMISSION_CEILING = 1.5  # s; above every round trip that one drives over, satellites' included
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
 CONNECT_CEILING = 3.0  # s, to which the interval grows while nobody answers; aiortc gives up after eight
+ACKNOWLEDGEMENT_DELAY = 0.15  # s; RFC 9260 6.2 allows 0.5 and recommends 0.2
 RECORD = 1500  # bytes, the most that a DTLS record carries here
 WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
 
@@ -40,6 +43,7 @@ def tune_data_transport(pc: RTCPeerConnection) -> None:
         _drain_dtls(pc.sctp)
         _hasten_sctp(pc.sctp)
         _send_at_once(pc.sctp)
+        _acknowledge_later(pc.sctp)
 
 
 def _drain_dtls(sctp: Any) -> None:
@@ -124,3 +128,32 @@ def _send_at_once(sctp: Any) -> None:
         return flushed
 
     sctp._data_channel_flush = flush_now
+
+
+def _acknowledge_later(sctp: Any) -> None:
+    """Acknowledge every second packet, or after a while (RFC 9260 6.2), as browsers do.
+
+    At once when something is missing or came twice: the sender is to find out soon.
+    """
+    acknowledge = sctp._send_sack
+    timer: asyncio.TimerHandle | None = None
+
+    def late() -> None:
+        nonlocal timer
+        timer = None
+        if sctp.state == "connected":
+            with contextlib.suppress(ConnectionError, SSL.Error):  # the connection ends meanwhile
+                run_now(acknowledge())
+
+    async def acknowledge_soon() -> None:
+        nonlocal timer
+        if timer is None and not sctp._sack_misordered and not sctp._sack_duplicates:
+            sctp._sack_needed = False
+            timer = asyncio.get_running_loop().call_later(ACKNOWLEDGEMENT_DELAY, late)
+            return
+        if timer is not None:
+            timer.cancel()
+            timer = None
+        await acknowledge()
+
+    sctp._send_sack = acknowledge_soon

@@ -105,6 +105,7 @@ class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="r
     picture_delay_ms: float | None = None  # command to picture, on the client's own clock; None: not known now
     round_trip_ms: float | None = None
     speed_cap: bool = False  # whether the operator wants the speed capped by the delay
+    ping: int | None = None  # id of a ping that travels with it; answered as a ping is
 
 
 class SeatRequest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_request"):

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSctpTransport, RTCSessionDescription
 from aiortc.rtcdtlstransport import RTCDtlsTransport, State
+from aiortc.rtcsctptransport import SackChunk
 
 from server.data_transport_private import (
     RETRANSMISSION_CEILING,
@@ -111,6 +112,8 @@ async def test_sctp_has(name: str) -> None:
         (RTCSctpTransport._data_channel_send, "asyncio.ensure_future(self._data_channel_flush())"),
         (RTCSctpTransport._set_state, "asyncio.ensure_future(self._data_channel_flush())"),
         (RTCSctpTransport._receive_sack_chunk, "await self._data_channel_flush()"),
+        (RTCSctpTransport._handle_data, "if self._sack_needed:\n            await self._send_sack()"),
+        (RTCSctpTransport._send_sack, "self._sack_needed = False"),
     ],
 )
 def test_aiortc_calls_what_is_replaced(caller: Callable[..., Any], call: str) -> None:
@@ -181,6 +184,37 @@ async def test_what_a_listener_sends_in_answer_leaves_in_order(ends: Ends) -> No
     async with asyncio.timeout(PATIENCE):
         ends.server.send("begin")
         assert [await ends.at_client.get() for _ in range(1001)] == ["begin", *map(str, range(1000))]
+
+
+async def test_every_second_packet_is_acknowledged_and_a_single_one_after_a_while(ends: Ends) -> None:
+    await ends.exchange()
+    server: Any = ends.server.transport
+    client: Any = ends.client.transport
+    sent: list[int] = []
+    send = server._send_chunk
+
+    async def watch(chunk: Any) -> None:
+        if isinstance(chunk, SackChunk):
+            sent.append(chunk.cumulative_tsn)
+        await send(chunk)
+
+    server._send_chunk = watch
+    for number in range(10):
+        ends.client.send(str(number))
+        assert await ends.at_server.get() == str(number)
+    assert 4 <= len(sent) <= 6
+    acknowledged = asyncio.Event()
+    receive = client._receive_sack_chunk
+
+    async def heard(chunk: Any) -> None:
+        await receive(chunk)
+        if not client._sent_queue:
+            acknowledged.set()
+
+    client._receive_sack_chunk = heard
+    async with asyncio.timeout(SOON):
+        ends.client.send("single")
+        await acknowledged.wait()
 
 
 async def test_what_is_sent_after_the_end_raises_nothing(ends: Ends) -> None:

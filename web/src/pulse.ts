@@ -36,8 +36,7 @@ export class Pulse {
   step(now: number): void {
     if (now >= this.beatMs) {
       this.beatMs = now + (this.isSlow ? SLOW_BEAT_MS : this.observes ? OBSERVER_BEAT_MS : BEAT_MS);
-      this.ping(now);
-      this.events.tell(this.events.report());
+      this.ping(now, this.events.report());
     } else if (this.early > 0 && now >= this.earlyMs) {
       this.earlyMs = now + EARLY_PING_MS;
       this.early -= 1;
@@ -50,9 +49,11 @@ export class Pulse {
     return pingAnswered(this.pings, id, now);
   }
 
-  private ping(now: number): void {
+  /** With a report, in the same message; or alone. */
+  private ping(now: number, report?: Report): void {
     if (lostPings(this.pings, now) > 0) this.events.lost(now);
     const id = sendPing(this.pings, now);
-    if (!this.events.tell({ type: "ping", id })) this.pings.out.delete(id); // did not leave: is not lost
+    const message: ClientMessage = report === undefined ? { type: "ping", id } : { ...report, ping: id };
+    if (!this.events.tell(message)) this.pings.out.delete(id); // did not leave: is not lost
   }
 }

@@ -260,6 +260,7 @@ export interface Report {
   readonly picture_delay_ms?: number | null;
   readonly round_trip_ms?: number | null;
   readonly speed_cap?: boolean;
+  readonly ping?: number | null;
 }
 
 /** Release the latched stop. Moves nothing. */
