@@ -26,7 +26,9 @@ def fleet_soak_command(
         float, typer.Option(min=1, max=600, help="Seconds from one bridge's death to the next.")
     ] = 10,
     rate: Annotated[float, typer.Option(min=1, max=50, help="Events a second of each operator.")] = 20,
-    pictures: Annotated[bool, typer.Option(help="Whether each operator gets the pictures of its robot.")] = True,
+    pictures: Annotated[
+        bool, typer.Option(help="Whether the robots have cameras, and operators get their pictures.")
+    ] = True,
     seed: Annotated[int, typer.Option(help="Of the order in which they die.")] = 1,
     json_file: Annotated[
         str | None, typer.Option("--json", help="Write the verdict here; - is standard output.")

@@ -58,8 +58,6 @@ class FleetDriver:
                 ) as console:
                     await console.take_seat()
                     await self._drive(console)
-            except CommandRefused as error:
-                self._notice("seat" if error.reason in ("no_seat", "seat_taken") else error.reason)
             except (ConsoleError, TimeoutError) as error:
                 self._notice(type(error).__name__)
             await asyncio.sleep(AGAIN_SECONDS)
@@ -72,10 +70,17 @@ class FleetDriver:
         values = round_and_round(console.description)
         while True:
             sent = time.monotonic()
-            async with asyncio.timeout(STUCK_SECONDS):
-                await console.drive(values(sent))
-            self._answered(console.epoch, sent, time.monotonic())
-            await asyncio.sleep(max(0.0, sent + 1 / self._rate - time.monotonic()))
+            try:
+                async with asyncio.timeout(STUCK_SECONDS):
+                    await console.drive(values(sent))
+            except CommandRefused as error:
+                self._notice(error.reason)
+                await asyncio.sleep(AGAIN_SECONDS)
+                if console.seat.holder != console.peer:
+                    await console.take_seat()
+            else:
+                self._answered(console.epoch, sent, time.monotonic())
+                await asyncio.sleep(max(0.0, sent + 1 / self._rate - time.monotonic()))
 
     def _answered(self, epoch: str, sent: float, now: float) -> None:
         if self._died_at is not None:

@@ -15,6 +15,7 @@ from bench.fleet_soak.world import FleetWorld
 __all__ = ["FleetPlan", "fleet_soak"]
 
 CALM_SHARE = 0.25  # of the time, at the beginning, in which nobody dies
+LOOK_SECONDS = 0.05
 START_SECONDS = 60.0  # for all to drive
 RETURN_SECONDS = 30.0  # for a robot whose bridge was killed to be driven again
 
@@ -25,7 +26,7 @@ class FleetPlan(NamedTuple):
     kill_every: float  # s
     seed: int
     rate: float  # events a second of each driver
-    pictures: bool  # whether drivers get pictures
+    pictures: bool  # whether the robots have cameras, and each driver gets their pictures
 
 
 async def fleet_soak(plan: FleetPlan, say: Callable[[str], None]) -> dict[str, Any]:
@@ -36,7 +37,7 @@ async def fleet_soak(plan: FleetPlan, say: Callable[[str], None]) -> dict[str, A
         TimeoutError: somebody could not drive at the beginning.
     """
     with TemporaryDirectory(prefix="lockstep-fleet-") as folder:
-        async with FleetWorld(Path(folder), plan.robots) as world:
+        async with FleetWorld(Path(folder), plan.robots, pictures=plan.pictures) as world:
             return await _Soak(plan, world, say).run()
 
 
@@ -50,10 +51,12 @@ class _Soak:
         }
         self._kills: list[Span] = []
         self._never_back: list[str] = []
+        self._held_up = 0.0  # s, longest time that this process did not run although it wanted to
 
     async def run(self) -> dict[str, Any]:
         plan = self._plan
         async with asyncio.TaskGroup() as tasks:
+            watching = tasks.create_task(self._watch_machine())
             driving = [tasks.create_task(each.run(), name=each.name) for each in self._drivers.values()]
             async with asyncio.timeout(START_SECONDS):
                 for driver in self._drivers.values():
@@ -65,7 +68,7 @@ class _Soak:
             await self._kill_until(began + plan.seconds)
             spent, lasted = self._world.console.cpu_seconds() - cpu, time.monotonic() - began
             memory = self._world.console.resident_bytes()
-            for task in driving:
+            for task in (*driving, watching):
                 task.cancel()
         robots = {name: robot_verdict(driver, self._world.records(name)) for name, driver in self._drivers.items()}
         return {
@@ -74,6 +77,7 @@ class _Soak:
             "seconds": round(lasted, 1),
             "seed": plan.seed,
             "console_processor_share": round(spent / lasted, 3),
+            "machine_held_up_ms": round(self._held_up * 1000, 1),
             "console_megabytes": round(memory / 1e6, 1),
         }
 
@@ -86,6 +90,13 @@ class _Soak:
             await asyncio.sleep(max(0.0, due - time.monotonic()))
             await self._kill(name)
             due = max(due + self._plan.kill_every, time.monotonic())
+
+    async def _watch_machine(self) -> None:
+        """A machine that has no time for its processes breaks links by itself; the verdict is not the console's then."""
+        while True:
+            due = time.monotonic() + LOOK_SECONDS
+            await asyncio.sleep(LOOK_SECONDS)
+            self._held_up = max(self._held_up, time.monotonic() - due)
 
     def _order(self) -> Iterator[str]:
         """All in turn, every round in another order."""

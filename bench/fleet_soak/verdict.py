@@ -27,7 +27,7 @@ def robot_verdict(driver: FleetDriver, records: Sequence[Record]) -> dict[str, A
     judge, progress = Judge(MAX_EVENT_AGE, HOLD), Progress()
     judge.read(records)
     progress.read(records)
-    seats, lost = driver.noticed["seat"], driver.noticed["ConsoleLost"]
+    seats, lost = driver.noticed["no_seat"] + driver.noticed["SeatRefused"], driver.noticed["ConsoleLost"]
     return {
         "events": judge.verdict["executed"],
         "lives": judge.verdict["epochs"],
@@ -38,6 +38,7 @@ def robot_verdict(driver: FleetDriver, records: Sequence[Record]) -> dict[str, A
         "seats_lost": seats,
         "connections_lost": lost,
         "other_troubles": driver.noticed.total() - seats - lost,
+        "noticed": dict(driver.noticed),
         "slowest_return_seconds": round(driver.slowest_return, 1),
     }
 

@@ -18,20 +18,21 @@ DOWN_SECONDS = 1.0  # between a bridge's death and its next life
 class _Bridge:
     """Keeps its port over its lives, so that the console finds it again."""
 
-    def __init__(self, name: str, kind: str, folder: Path) -> None:
+    def __init__(self, name: str, folder: Path, *, pictures: bool) -> None:
         self.name = name
         self.event_log = folder / f"{name}.jsonl"
         self.port = 0
-        self._kind = kind
+        self._pictures = pictures
         self._life = AsyncExitStack()
         self._process: Running | None = None
 
     async def start(self) -> None:
-        command = (sys.executable, "-m", "robot_bridge", self._kind, "--port", str(self.port), "--json")
+        port, log = str(self.port), str(self.event_log)
+        command = ["robot_bridge", "planar", "--port", port, "--event-log", log, "--json"]
+        if not self._pictures:
+            command = ["bench.fleet_soak.blind_planar", port, log]
         life = AsyncExitStack()
-        self._process, ready = await life.enter_async_context(
-            running_process(*command, "--event-log", str(self.event_log))
-        )
+        self._process, ready = await life.enter_async_context(running_process(sys.executable, "-m", *command))
         self._life = life
         self.port = int(ready["robot"].rsplit(":", 1)[1])
 
@@ -52,11 +53,12 @@ class FleetWorld:
         console: the console's process
     """
 
-    def __init__(self, folder: Path, robots: int, kind: str = "planar") -> None:
+    def __init__(self, folder: Path, robots: int, *, pictures: bool) -> None:
+        """`pictures`: whether the robots have cameras and microphones."""
         self.names = [f"robot-{number}" for number in range(1, robots + 1)]
         self.operator = ""
         self._folder = folder
-        self._bridges = {name: _Bridge(name, kind, folder) for name in self.names}
+        self._bridges = {name: _Bridge(name, folder, pictures=pictures) for name in self.names}
         self._stack = AsyncExitStack()
         self._console: Running | None = None
 

@@ -90,7 +90,7 @@ class TestPeer:
         self.answer_headers = httpx.Headers()
         self._news = asyncio.Event()
 
-    async def join(self, rig: Rig, headers: dict[str, str], labels: tuple[str, ...]) -> None:
+    async def join(self, rig: Rig, headers: dict[str, str], labels: tuple[str, ...], path: str = "/whep") -> None:
         opened = []
         for label in labels:
             lossy = label == "control"
@@ -100,7 +100,7 @@ class TestPeer:
             opened.append(self._until_open(channel))
             self.channels[label] = channel
         offer = await self.offer()
-        answer = await rig.http.post("/whep", content=offer, headers={**headers, "Content-Type": "application/sdp"})
+        answer = await rig.http.post(path, content=offer, headers={**headers, "Content-Type": "application/sdp"})
         assert answer.status_code == 201, answer.text
         self.answer_headers = answer.headers
         self.headers, self.location, self.tag = headers, answer.headers["location"], answer.headers["etag"]

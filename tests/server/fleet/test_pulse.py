@@ -28,11 +28,8 @@ def test_another_epoch_begins_anew() -> None:
 
 
 def test_a_link_is_as_it_is_since_it_changed() -> None:
-    pulse = Pulse()
-    pulse.look(1.0, up=False, epoch="", event=1)
-    assert pulse.link_since is None
-    pulse.look(2.0, up=True, epoch="e", event=1)
-    pulse.look(3.0, up=True, epoch="e", event=1)
-    assert pulse.link_since == 2.0
-    pulse.look(4.0, up=False, epoch="e", event=1)
-    assert pulse.link_since == 4.0
+    pulse, since = Pulse(), []
+    for now, up in ((1.0, False), (2.0, True), (3.0, True), (4.0, False)):
+        pulse.look(now, up=up, epoch="e", event=1)
+        since.append(pulse.link_since)
+    assert since == [None, 2.0, 2.0, 4.0]
