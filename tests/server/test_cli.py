@@ -92,6 +92,8 @@ async def test_a_port_in_use_is_said_clearly() -> None:
         (("up", "--ros2", "none.yaml", "--port", "0", "--robot-port", "0"), 4, "none.yaml: No such file"),
         (("up", "--robot-python", "/none/python", "--port", "0", "--robot-port", "0"), 4, "/none/python"),
         (("serve", "--port", "70000"), 2, "65535"),
+        (("serve", "--board", "redis://:a-password@h:port"), 2, "board: Value error, the board is not redis://"),
+        (("serve", "--board", "redis://h", "--public-url", "http://h"), 2, "--robot NAME=tcp://"),
     ],
 )
 async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], code: int, words: str) -> None:
@@ -99,3 +101,4 @@ async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], 
     assert (result, out) == (code, "")
     assert words in err
     assert "Traceback" not in err
+    assert "a-password" not in err
