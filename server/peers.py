@@ -70,8 +70,8 @@ class Peers:
 
     @property
     def taken(self) -> int:
-        """Places that are taken, those of peers that are being negotiated included."""
-        return len(self._sessions) + self._reserved.total()
+        """Places that are taken by peers that get media from here, and by those that are being negotiated."""
+        return sum(not peer.relay for peer in self._sessions) + self._reserved.total()
 
     @property
     def thumbnails(self) -> int:
@@ -119,7 +119,7 @@ class Peers:
         here = sum((bool(peer.relay), peer.thumbnail) == (relayed, thumbnail) for peer in self._sessions)
         if here + self._reserved.total() >= bound:
             raise TooManyPeers(f"all {bound} places are taken")
-        for check in self.further_bounds:
+        for check in () if relayed else self.further_bounds:
             check(identity)
         waiting = sum(peer.identity.token_id == token_id and not peer.connected for peer in self._sessions)
         if waiting + self._reserved[token_id] >= limits.max_unconnected:

@@ -92,7 +92,7 @@ class _Soak:
             due = max(due + self._plan.kill_every, time.monotonic())
 
     async def _watch_machine(self) -> None:
-        """A machine that has no time for its processes breaks links by itself; the verdict is not the console's then."""
+        """A machine that has no time for its processes breaks links by itself; that is not the console's fault."""
         while True:
             due = time.monotonic() + LOOK_SECONDS
             await asyncio.sleep(LOOK_SECONDS)

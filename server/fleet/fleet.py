@@ -22,7 +22,6 @@ from server.house import House
 from server.invitations import Invitation
 from server.settings import Settings
 from server.state import robot_place
-from server.state_dir import StateDir
 from server.sweeper import sweep_forever
 
 __all__ = ["Fleet", "Stopped", "fleet_of"]
@@ -165,8 +164,7 @@ class Fleet:
 
     async def _run_session(self, session: FleetSession, house: House, directory: Path) -> None:
         """Each has a directory of its own for recordings and audit."""
-        own = StateDir(robot_place(directory, session.name))
-        await session.run(house, own, self.metrics, self._recorded)
+        await session.run(house, robot_place(directory, session.name), self.metrics, self._recorded)
 
     def _recorded(self, robot: str, record: AuditRecord) -> None:
         try:

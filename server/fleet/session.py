@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from pathlib import Path
 
 import structlog
 
@@ -73,7 +74,7 @@ class FleetSession:
         return here.console.stop(by, where, reason), here.console.clock.event
 
     async def run(
-        self, house: House, directory: StateDir, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
+        self, house: House, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
     ) -> None:
         """Until cancelled. `told` hears every record of its audit."""
         self.app.state.house = house
@@ -92,10 +93,10 @@ class FleetSession:
             await asyncio.sleep(self._backoff.next())
 
     async def _live(
-        self, house: House, directory: StateDir, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
+        self, house: House, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
     ) -> None:
         own = Metrics(process=False)
-        async with running_session(self.settings, house, own, directory, self.name) as made:
+        async with running_session(self.settings, house, own, StateDir(directory), self.name) as made:
             made.audit.on_record = lambda record: told(self.name, record)
             attach_session(self.app, made)
             if self._kept_stop is not None:

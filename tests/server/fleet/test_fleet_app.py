@@ -1,8 +1,11 @@
 """A console with several robots, over HTTP and with peers."""
 
 import asyncio
+import contextlib
 import json
 import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
@@ -304,3 +307,79 @@ async def test_every_path_that_a_fleet_describes_is_there() -> None:
             for method in methods:
                 answer = await rig.http.request(method, path.replace("{robot}", "left"))
                 assert answer.status_code not in (404, 405, 500), (method, path)
+
+
+async def _garbage(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """What is no message, for ever."""
+    with contextlib.suppress(ConnectionError):
+        while not writer.is_closing():
+            writer.write(b"\x00\x00\x00\x05\xc1\xff\x00ab" * 100)
+            await writer.drain()
+            await asyncio.sleep(0)
+
+
+async def _endless(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """A message that says it is huge."""
+    with contextlib.suppress(ConnectionError):
+        while not writer.is_closing():
+            writer.write(b"\x7f\xff\xff\xff" + bytes(60_000))
+            await writer.drain()
+            await asyncio.sleep(0)
+
+
+async def _hung(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Takes the connection and never says a word."""
+    await reader.read()
+
+
+async def _gone(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Closes at once."""
+
+
+@pytest.mark.parametrize("behaviour", [_garbage, _endless, _hung, _gone])
+async def test_a_bridge_that_misbehaves_disturbs_no_other_robot(
+    behaviour: Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]],
+) -> None:
+    seen = asyncio.Event()
+
+    async def bad_bridge(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        seen.set()
+        try:
+            await behaviour(reader, writer)
+        finally:
+            writer.close()
+
+    bad = await asyncio.start_server(bad_bridge, "127.0.0.1", 0)
+    try:
+        async with (
+            running_bridge() as good,
+            running_fleet({"bad": bad.sockets[0].getsockname()[1], "good": good.address[1]}) as rig,
+        ):
+            async with asyncio.timeout(PATIENCE):
+                await seen.wait()
+                await rig.session("good").console.robot.reached.wait()
+            async with rig.peer("good", "operator") as peer:
+                event = await _drive_once(peer)
+                for _ in range(5):
+                    now, event = peer.newest_feedback(), event_after(event)
+                    peer.send("control", Command(event=event, issue=now.issue, values=[0.0] * len(now.axes)))
+                    await peer.feedback(lambda each, wanted=event: each.event == wanted)  # type: ignore[misc]
+                assert not peer.closed.is_set()
+            tiles = await rig.tiles()
+            assert (tiles["bad"]["link"], tiles["good"]["link"]) == ("down", "up")
+            assert rig.fleet.sessions["bad"].services is not None
+    finally:
+        bad.close()
+        await bad.wait_closed()
+
+
+async def test_a_robot_whose_directory_cannot_be_made_is_without_a_session_and_the_others_run(tmp_path: Path) -> None:
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "left").write_text("in the way")
+    async with running_bridge() as left, running_bridge() as right:
+        ports = {"left": left.address[1], "right": right.address[1]}
+        async with running_fleet(ports, state_dir=tmp_path) as rig:
+            async with asyncio.timeout(PATIENCE):
+                await rig.session("right").console.robot.reached.wait()
+            tiles = await rig.tiles()
+            assert (tiles["left"]["trouble"], tiles["right"]["link"]) == (FAILED, "up")
