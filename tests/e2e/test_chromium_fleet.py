@@ -1,15 +1,18 @@
 """The overview of a fleet in Chromium: three simulated robots of one console."""
 
+import asyncio
 import re
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.async_api import Browser, BrowserContext, Page, expect
+from playwright.async_api import Browser, Page, expect
 
-from bench.browsers.chromium import PAD, open_page
+from bench.browsers.chromium import open_page
 from bench.browsers.console_page import ConsolePage
+from client import Console
 from tests.support.stack import Stack, running_fleet
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
@@ -20,6 +23,13 @@ NAMES = ("left", "middle", "right")
 @pytest.fixture
 async def fleet(tmp_path: Path) -> AsyncIterator[Stack]:
     async with running_fleet(tmp_path, dict.fromkeys(NAMES, "planar")) as running:
+        yield running
+
+
+@pytest.fixture
+async def lone(tmp_path: Path) -> AsyncIterator[Stack]:
+    """A fleet of one."""
+    async with running_fleet(tmp_path, {"left": "planar"}) as running:
         yield running
 
 
@@ -62,33 +72,37 @@ async def _in_view(page: Page, name: str) -> bool:
     return box["x"] >= 0 and box["x"] + box["width"] <= size["width"] and box["y"] + box["height"] <= size["height"]
 
 
-async def _drive(context: BrowserContext, link: str) -> ConsolePage:
-    """A page of its own in which somebody drives until it is closed."""
-    page = await context.new_page()
-    await page.goto(link)
-    console = ConsolePage(page)
-    await console.until_live()
-    await console.arm()
-    await console.drive_forward()
-    return console
+@asynccontextmanager
+async def _driving(fleet: Stack, robot: str) -> AsyncIterator[None]:
+    """Somebody turns this robot on the spot inside the block."""
+
+    async def turn(console: Console) -> None:
+        while True:
+            await console.drive({"base.wz": 0.3})
+
+    link = fleet.operator.replace("/#", f"/robots/{robot}/#")
+    async with Console(link, video=False, audio=False, name="Ann") as console:
+        await console.take_seat()
+        turning = asyncio.create_task(turn(console))
+        try:
+            yield
+        finally:
+            turning.cancel()
+            await asyncio.gather(turning, return_exceptions=True)
 
 
 async def test_every_robot_has_a_live_tile_behind_its_gate_that_leads_to_its_page_and_back(
     fleet: Stack, chromium: Browser
 ) -> None:
-    async with open_page(chromium, fleet.operator, pad=True) as page:
+    async with open_page(chromium, fleet.operator) as page:
         await _until(page, f"s.robots.length === {len(NAMES)} && s.robots.every((x) => x.picture === 'live')")
         await expect(page.get_by_role("heading", level=2)).to_have_text(list(NAMES))
         await expect(page.get_by_role("article", name="middle")).to_contain_text("Free")
-        await page.context.add_init_script(path=PAD)
-        driver = await _drive(page.context, fleet.operator.replace("/#", "/robots/middle/#"))
-        await page.bring_to_front()
-        await _until(page, "r.middle.state === 'driven' && r.middle.words.startsWith('Driven by ')")
-        await expect(page.get_by_role("article", name="left")).to_contain_text("Free")
-        before = (await _stats(page))["robots"][1]["rendered"]
-        await _until(page, f"r.middle.rendered > {before + 20}")
+        async with _driving(fleet, "middle"):
+            await _until(page, "r.middle.state === 'driven' && r.middle.words === 'Driven by Ann'")
+            await expect(page.get_by_role("article", name="left")).to_contain_text("Free")
+            await _until(page, "r.middle.stamp > 30 && r.left.stamp === 1")
         assert {robot["violations"] for robot in (await _stats(page))["robots"]} == {0}
-        await driver.page.close()
         await page.get_by_role("link", name="Open to drive: middle").click()
         await ConsolePage(page).until_live()
         assert "/robots/middle/#token=" in page.url
@@ -122,11 +136,11 @@ async def test_a_robot_that_is_away_says_so_first_and_stop_reaches_the_others(fl
         await expect(page.get_by_role("article", name="left")).to_contain_text("Stopped by")
 
 
-async def test_a_lost_console_leaves_no_picture_that_looks_live(fleet: Stack, chromium: Browser) -> None:
-    async with open_page(chromium, fleet.observer, width=390, height=844, touch=True) as page:
-        await _until(page, "s.robots.length === 3 && s.robots.some((x) => x.picture === 'live')")
+async def test_a_lost_console_leaves_no_picture_that_looks_live(lone: Stack, chromium: Browser) -> None:
+    async with open_page(chromium, lone.observer, width=390, height=844, touch=True) as page:
+        await _until(page, "s.robots.length === 1 && s.robots.some((x) => x.picture === 'live')")
         assert (await page.evaluate("document.documentElement.scrollWidth")) <= 390
-        with fleet.frozen_console():
+        with lone.frozen_console():
             await _until(page, "s.phase === 'unknown' && s.robots.every((x) => x.picture !== 'live')")
             await expect(page.get_by_role("article").first).to_contain_text("Unknown since")
             await expect(page.locator(".banner")).to_contain_text("What stands here was so at")
@@ -136,16 +150,16 @@ async def test_a_lost_console_leaves_no_picture_that_looks_live(fleet: Stack, ch
         await _until(page, "s.phase === 'live' && s.stop && s.stop.tone === 'done'")
 
 
-async def test_a_link_that_is_no_good_says_what_to_do_and_can_be_replaced(fleet: Stack, chromium: Browser) -> None:
-    bad = re.sub("token=.*", "token=not-a-token", fleet.observer)
+async def test_a_link_that_is_no_good_says_what_to_do_and_can_be_replaced(lone: Stack, chromium: Browser) -> None:
+    bad = re.sub("token=.*", "token=not-a-token", lone.observer)
     async with open_page(chromium, bad) as page:
         await expect(page.get_by_role("heading", name="This link is not valid")).to_be_visible()
         assert await _in_view(page, "Stop all robots")
         await page.get_by_label("Your link").fill("hello")
         await page.get_by_role("button", name="Open").click()
         await expect(page.get_by_role("alert").first).to_contain_text("no link of a console")
-        await page.get_by_label("Your link").fill(fleet.observer)
+        await page.get_by_label("Your link").fill(lone.observer)
         await page.get_by_role("button", name="Open").click()
-        await _until(page, "s.robots.length === 3")
-        await page.goto(fleet.console)
+        await _until(page, "s.robots.length === 1")
+        await page.goto(lone.console)
         await expect(page.get_by_role("heading", name="Open the link")).to_be_visible()
