@@ -13,6 +13,7 @@ import msgspec
 
 from robot_bridge.protocol.console import ClientMessage, ServerMessage
 from robot_bridge.protocol.messages import LinkMessage
+from server.fleet.fleet_openapi import fleet_openapi
 from server.openapi import openapi_document
 from server.recording.records import OWN_RECORDS
 
@@ -64,6 +65,7 @@ def generated() -> dict[Path, str]:
     return {
         SCHEMAS / "console.schema.json": _schema("Lockstep console messages", console, received),
         SCHEMAS / "console-openapi.json": json.dumps(openapi_document(), indent=2) + "\n",
+        SCHEMAS / "fleet-openapi.json": json.dumps(fleet_openapi(), indent=2) + "\n",
         SCHEMAS / "robot-link.schema.json": _schema("Lockstep robot link messages", {"LinkMessage": LinkMessage}),
         SCHEMAS / "recording.schema.json": _recording_schema(),
     }

@@ -12,6 +12,7 @@ from robot_bridge.protocol.console import SpeedCapMode
 from robot_bridge.protocol.errors import SecretError
 from server.board.board_settings import BoardSettings
 from server.fleet.fleet_settings import FleetSettings
+from server.fleet.robot_names import is_named
 from server.limit_settings import LimitSettings
 from server.link_access import link_access
 from server.logs import LogFormat
@@ -68,6 +69,16 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
 
     media: MediaSettings = MediaSettings()
     recording: RecordingSettings = RecordingSettings()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _robot_with_a_name(cls, given: dict[str, object]) -> dict[str, object]:
+        """LOCKSTEP_ROBOT takes what the flag --robot takes: NAME=address is a robot of a fleet."""
+        robot = given.get("robot")
+        if isinstance(robot, str) and is_named(robot):
+            rest = {name: value for name, value in given.items() if name != "robot"}
+            return {"robots": robot, **rest}
+        return given
 
     @field_validator("ice_hosts", "allowed_origins", mode="before")
     @classmethod

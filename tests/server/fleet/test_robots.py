@@ -91,3 +91,14 @@ def test_what_hangs_at_one_robot_is_not_given_to_all(shared: dict[str, Any]) -> 
 def test_a_bad_name_is_a_bad_setting() -> None:
     with pytest.raises(ValueError, match="bad_robot_name"):
         Settings(robots=("A=tcp://h:1",))
+
+
+def test_the_variable_of_one_robot_takes_a_name_as_the_flag_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LOCKSTEP_ROBOT", "left=tcp://h:1,right=tcp://h:2")
+    assert Settings().is_fleet
+    assert {name: each.robot for name, each in robot_settings(Settings()).items()} == {
+        "left": "tcp://h:1",
+        "right": "tcp://h:2",
+    }
+    assert list(robot_settings(Settings(robots=("third=tcp://h:3",)))) == ["third"]
+    assert not Settings(robot="tcp://h:4").is_fleet
