@@ -5,7 +5,7 @@ What is used and why:
 - `RTCSctpTransport._rto`, `._srtt`, `._rttvar`, `._update_rto`, `._t1_expired`, `._t3_expired`, `._cwnd`: it waits at
   least one second before it repeats a lost message, three while it connects, and then sends one packet at a time
 - `RTCSctpTransport._transmit`: runs in tasks that nobody awaits, and raises there when the connection has ended
-- `RTCSctpTransport._data_channel_flush`: each message is sent by a task of its own
+- `RTCSctpTransport._data_channel_flush`, `._data_channel_send`: each message is sent by a task of its own
 - `RTCSctpTransport._send_sack`, `._sack_needed`, `._sack_misordered`, `._sack_duplicates`: every single packet is
   acknowledged
 - `RTCSctpTransport._handle_data`, `RTCDtlsTransport._ssl`: one record is taken from OpenSSL for each datagram that
@@ -17,10 +17,11 @@ import asyncio
 import contextlib
 from typing import Any
 
-from aiortc import RTCPeerConnection
+from aiortc import RTCDataChannel, RTCPeerConnection
 from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH
 from OpenSSL import SSL
 
+from server.data_short_cuts_private import ShortCuts
 from server.run_now import run_now
 
 __all__ = ["tune_data_transport"]
@@ -40,20 +41,23 @@ def tune_data_transport(pc: RTCPeerConnection) -> None:
     Call after setRemoteDescription(offer), before setLocalDescription. Once per connection.
     """
     if pc.sctp is not None:
-        _drain_dtls(pc.sctp)
+        short_cuts = ShortCuts(pc.sctp)
+        _drain_dtls(pc.sctp, short_cuts)
         _hasten_sctp(pc.sctp)
-        _send_at_once(pc.sctp)
+        _send_at_once(pc.sctp, short_cuts)
         _acknowledge_later(pc.sctp)
 
 
-def _drain_dtls(sctp: Any) -> None:
+def _drain_dtls(sctp: Any, short_cuts: ShortCuts) -> None:
     """With every datagram, take all records that OpenSSL has, not only the first."""
     handle = sctp._handle_data
 
     async def handle_all(data: bytes) -> None:
-        await handle(data)
-        while (more := _next_record(sctp.transport)) is not None:
-            await handle(more)
+        record: bytes | None = data
+        while record is not None:
+            if not short_cuts.take(record):
+                await handle(record)
+            record = _next_record(sctp.transport)
 
     sctp._handle_data = handle_all
 
@@ -105,12 +109,12 @@ def _hasten_sctp(sctp: Any) -> None:
     sctp._transmit = transmit_or_not
 
 
-def _send_at_once(sctp: Any) -> None:
+def _send_at_once(sctp: Any, short_cuts: ShortCuts) -> None:
     """Send a message in the turn of the loop that it was given in: a task would cost more than the sending.
 
     aiortc passes what `_data_channel_flush` returns to `asyncio.ensure_future`, which takes a future for what it is.
     """
-    flush = sctp._data_channel_flush
+    flush, send = sctp._data_channel_flush, sctp._data_channel_send
     flushed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
     flushed.set_result(None)
     is_flushing = False
@@ -127,7 +131,25 @@ def _send_at_once(sctp: Any) -> None:
                 is_flushing = False
         return flushed
 
+    def send_now(channel: RTCDataChannel, data: bytes | str) -> None:
+        nonlocal is_flushing
+        if is_flushing or not isinstance(data, str):
+            send(channel, data)
+            return
+        is_flushing = True
+        try:
+            sent = short_cuts.send(channel, data)
+        except (ConnectionError, SSL.Error):
+            sent = True  # to nobody: the connection has ended
+        finally:
+            is_flushing = False
+        if not sent:
+            send(channel, data)
+        elif sctp._data_channel_queue:  # a listener has sent another message
+            flush_now()
+
     sctp._data_channel_flush = flush_now
+    sctp._data_channel_send = send_now
 
 
 def _acknowledge_later(sctp: Any) -> None:

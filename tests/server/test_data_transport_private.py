@@ -2,6 +2,7 @@
 
 import asyncio
 import inspect
+import random
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSctpTransport, RTCSessionDescription
 from aiortc.rtcdtlstransport import RTCDtlsTransport, State
-from aiortc.rtcsctptransport import SackChunk
+from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH, SackChunk, serialize_packet
 
 from server.data_transport_private import (
     RETRANSMISSION_CEILING,
@@ -114,6 +115,15 @@ async def test_sctp_has(name: str) -> None:
         (RTCSctpTransport._receive_sack_chunk, "await self._data_channel_flush()"),
         (RTCSctpTransport._handle_data, "if self._sack_needed:\n            await self._send_sack()"),
         (RTCSctpTransport._send_sack, "self._sack_needed = False"),
+        # what the short cuts do in their place
+        (RTCSctpTransport._send, "self._local_tsn = tsn_plus_one(self._local_tsn)"),
+        (RTCSctpTransport._send, "self._outbound_stream_seq[stream_id] = uint16_add(stream_seq, 1)"),
+        (RTCSctpTransport._send, "chunk._sent_time = None\n\n            pos"),
+        (RTCSctpTransport._transmit, "chunk._sent_time = time.time()\n\n            await self._send_chunk(chunk)"),
+        (RTCSctpTransport._receive_sack_chunk, "cwnd_fully_utilized = self._flight_size >= self._cwnd"),
+        (RTCSctpTransport._receive_sack_chunk, "if uint32_gt(self._last_sacked_tsn, chunk.cumulative_tsn):"),
+        (RTCSctpTransport._receive_sack_chunk, "if done == 1 and schunk._sent_count == 1:"),
+        (RTCSctpTransport._update_advanced_peer_ack_point, "self._advanced_peer_ack_tsn = self._last_sacked_tsn"),
     ],
 )
 def test_aiortc_calls_what_is_replaced(caller: Callable[..., Any], call: str) -> None:
@@ -155,7 +165,10 @@ async def test_every_record_that_waits_is_delivered_at_once(ends: Ends) -> None:
         assert [await ends.at_server.get(), await ends.at_server.get()] == ["first", "second"]
 
 
-async def test_a_message_leaves_in_the_turn_that_it_is_sent_in(ends: Ends, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("length", "packets"), [(1, 1), (USERDATA_MAX_LENGTH, 1), (USERDATA_MAX_LENGTH + 1, 2)])
+async def test_a_message_leaves_in_the_turn_that_it_is_sent_in(
+    ends: Ends, monkeypatch: pytest.MonkeyPatch, length: int, packets: int
+) -> None:
     await ends.exchange()
     left: list[bytes] = []
     dtls: Any = ends.server.transport.transport
@@ -166,10 +179,11 @@ async def test_a_message_leaves_in_the_turn_that_it_is_sent_in(ends: Ends, monke
         await send(data)
 
     monkeypatch.setattr(dtls, "_send_data", watch)
-    ends.server.send("now")
-    assert len(left) == 1
+    text = "n" * length
+    ends.server.send(text)
+    assert len(left) == packets
     assert ends.server.bufferedAmount == 0
-    assert await ends.at_client.get() == "now"
+    assert await ends.at_client.get() == text
 
 
 async def test_what_a_listener_sends_in_answer_leaves_in_order(ends: Ends) -> None:
@@ -215,6 +229,47 @@ async def test_every_second_packet_is_acknowledged_and_a_single_one_after_a_whil
     async with asyncio.timeout(SOON):
         ends.client.send("single")
         await acknowledged.wait()
+
+
+async def test_everything_arrives_once_and_in_order_whatever_is_lost(ends: Ends) -> None:
+    await ends.exchange()
+    chance = random.Random(5)
+
+    def lossy(dtls: Any) -> None:
+        send = dtls._send_data
+
+        async def send_or_not(data: bytes) -> None:
+            if chance.random() > 0.2:
+                await send(data)
+
+        dtls._send_data = send_or_not
+
+    lossy(ends.server.transport.transport)
+    lossy(ends.client.transport.transport)
+    expected = [f"{number} {'x' * chance.choice((0, 10, 3000))}" for number in range(60)]
+    async with asyncio.timeout(PATIENCE):
+        for text in expected:
+            ends.server.send(text)
+        assert [await ends.at_client.get() for _ in expected] == expected
+
+
+async def test_an_acknowledgement_that_is_not_the_peers_is_not_believed(ends: Ends) -> None:
+    await ends.exchange()
+    sctp: Any = ends.server.transport
+    lose(sctp, 1000)
+    ends.server.send("unacknowledged")
+    (waiting,) = sctp._sent_queue
+    sack = SackChunk()
+    sack.cumulative_tsn = waiting.tsn
+    genuine = serialize_packet(5000, 5000, sctp._local_verification_tag, sack)
+    other_tag = serialize_packet(5000, 5000, sctp._local_verification_tag ^ 1, sack)
+    damaged = genuine[:-1] + bytes([genuine[-1] ^ 1])
+    for packet in (other_tag, damaged):
+        await sctp._handle_data(packet)
+        assert list(sctp._sent_queue) == [waiting]
+    await sctp._handle_data(genuine)
+    assert not sctp._sent_queue
+    assert sctp._flight_size == 0
 
 
 async def test_what_is_sent_after_the_end_raises_nothing(ends: Ends) -> None:
