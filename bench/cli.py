@@ -30,6 +30,7 @@ SECTIONS = (
     "observers",
     "relay",
     "robot_cost",
+    "scene",
     "memory",
     "recording",
 )

@@ -9,7 +9,7 @@ from bench.cli import SECTIONS, measure
 from bench.context import Context
 from bench.driving import console_trips, link_trips
 from bench.event_log import robot_times
-from bench.sections import command_to_feedback
+from bench.sections import command_to_feedback, scene
 from bench.stack import running_bridge, running_stack
 from client import Console
 from robot_bridge.link_client import RobotLink
@@ -44,6 +44,19 @@ async def test_command_to_feedback_reports_each_figure_with_its_baseline(monkeyp
     assert own.value is not None
     assert total.value is not None
     assert own.value < total.value
+
+
+async def test_the_scene_section_drives_with_and_without_viewers_who_get_the_scene(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(scene, "QUICK_EVENTS", 10)
+    monkeypatch.setattr(scene, "SETTLE", 0.0)
+    with_viewers, _, ratio = await scene.run(Context(quick=True, robots=["planar"], say=lambda _: None))
+    assert with_viewers.value is not None
+    assert with_viewers.baseline is not None
+    assert ratio.value == pytest.approx(with_viewers.value / with_viewers.baseline)
+    assert ratio.target == 1.1
+    assert "10 events with 3 viewers" in ratio.conditions
 
 
 async def test_a_section_that_fails_is_named_and_the_others_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
