@@ -26,6 +26,8 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
+from server.media.publishing_private import offer_section
+
 __all__ = ["KEY", "SECRET", "LiveKitStandIn", "Member", "livekit_stand_in"]
 
 KEY, SECRET = "test-key", "only for tests: a secret of 32 bytes or more"
@@ -39,7 +41,7 @@ class Track:
     info: Any
     cid: str  # its id in the publisher's descriptions
     ssrc: int = 0
-    packets: int = 0
+    codec: str = ""  # "H264", "VP8"
 
 
 @dataclass(eq=False)
@@ -54,7 +56,9 @@ class Member:
     tracks: list[Track] = field(default_factory=list)
     channels: dict[str, RTCDataChannel] = field(default_factory=dict)  # towards it
     outlets: dict[str, Any] = field(default_factory=dict)  # transceivers, by sid of the track
-    asks: set[str] = field(default_factory=set)
+    offered: bool = False  # and not answered yet
+    outdated: bool = False  # what was offered
+    wanted: set[str] = field(default_factory=set)  # sids of tracks that it asked for
 
     @property
     def identity(self) -> str:
@@ -179,13 +183,18 @@ class LiveKitStandIn:
 
     async def _heed(self, member: Member, asked: Any) -> None:
         kind = asked.WhichOneof("message")
-        member.asks.add(kind)
         if kind == "offer":
             await self._answer(member, asked.offer)
         elif kind == "answer":
             await member.subscribing.setRemoteDescription(RTCSessionDescription(asked.answer.sdp, "answer"))
+            member.offered = False
+            if member.outdated:
+                await self._offer(member)
         elif kind == "trickle":
             await self._trickle(member, asked.trickle)
+        elif kind == "subscription":
+            member.wanted |= set(asked.subscription.track_sids) if asked.subscription.subscribe else set()
+            await self._offer(member)
         elif kind == "add_track":
             await self._add_track(member, asked.add_track)
         elif kind == "ping_req":
@@ -266,7 +275,6 @@ class LiveKitStandIn:
         track = next((each for each in member.tracks if each.ssrc == packet.ssrc), None)
         if track is None:
             return
-        track.packets += 1
         self.payloads(track.info.name, packet)
         for other in self._room(member):
             outlet = other.outlets.get(track.info.sid)
@@ -288,13 +296,17 @@ class LiveKitStandIn:
 
     async def _offer(self, member: Member) -> None:
         pc = member.subscribing
+        member.outdated = member.offered
+        if member.offered:
+            return
+        member.offered = True
         if not member.channels:
             member.channels["_lossy"] = pc.createDataChannel("_lossy", ordered=False, maxRetransmits=0)
             member.channels["_reliable"] = pc.createDataChannel("_reliable")
         for other in self._room(member):
             for track in other.tracks:
-                if track.info.sid not in member.outlets:
-                    transceiver = pc.addTransceiver("video", direction="sendonly")
+                if track.codec and track.info.sid in member.wanted - set(member.outlets):
+                    transceiver = offer_section(pc, "video", track.codec)
                     sender: Any = transceiver.sender
                     sender._stream_id, sender._track_id = f"{other.sid}|{track.info.sid}", track.info.sid
                     sender._send_keyframe = self.ask_for_keyframe
@@ -325,11 +337,10 @@ async def _nothing(parameters: Any) -> None:
 
 async def _send(outlet: Any, packet: RtpPacket) -> None:
     sender = outlet.sender
-    codec = next((each for each in outlet._codecs if not each.name.lower().startswith("rtx")), None)
-    if sender.transport is None or sender.transport.state != "connected" or codec is None:
+    if sender.transport is None or sender.transport.state != "connected":
         return
     copy = RtpPacket(
-        payload_type=codec.payloadType,
+        payload_type=outlet._codecs[0].payloadType,
         marker=packet.marker,
         sequence_number=packet.sequence_number,
         timestamp=packet.timestamp,
@@ -346,14 +357,15 @@ async def _send_control(transport: Any, packet: RtcpPsfbPacket) -> None:
 
 
 def _find_ssrcs(sdp: str, tracks: list[Track]) -> None:
-    """Each section of the offer names the track's id and its first source."""
+    """Each section of the offer names the track's id, its codec and its first source."""
     for section in sdp.split("\r\nm=")[1:]:
         named = re.search(r"a=msid:\S+ (\S+)", section)
         source = re.search(r"a=ssrc:(\d+) ", section)
-        if named is not None and source is not None:
+        codec = re.search(r"a=rtpmap:\d+ (\w+)/", section)
+        if named is not None and source is not None and codec is not None:
             for track in tracks:
                 if track.cid == named[1]:
-                    track.ssrc = int(source[1])
+                    track.ssrc, track.codec = int(source[1]), codec[1]
 
 
 @asynccontextmanager

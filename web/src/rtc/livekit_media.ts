@@ -1,4 +1,12 @@
-import { LogLevel, Room, RoomEvent, Track, setLogLevel, type RemoteTrack } from "livekit-client";
+import {
+  LogLevel,
+  Room,
+  RoomEvent,
+  Track,
+  setLogLevel,
+  type RemoteTrack,
+  type RemoteTrackPublication,
+} from "livekit-client";
 import type { IceServer } from "../core/ice_servers";
 import type { LiveKitTicket } from "../core/relay";
 import { PacketSound } from "./packet_sound";
@@ -30,6 +38,7 @@ export class LiveKitMedia implements RelayLink {
       disconnectOnPageLeave: true,
       reconnectPolicy: { nextRetryDelayInMs: () => null }, // the console knows where to go next
     });
+    this.room.on(RoomEvent.TrackPublished, (publication, { identity }) => this.want(publication, identity));
     this.room.on(RoomEvent.TrackSubscribed, (track, publication, { identity }) => {
       if (identity === ticket.publisher && track.kind === Track.Kind.Video)
         this.received(track, publication.trackName);
@@ -68,7 +77,18 @@ export class LiveKitMedia implements RelayLink {
     const { url, token } = this.ticket;
     const iceServers = this.servers.map((server) => ({ ...server, urls: [...server.urls] }));
     const rtcConfig = iceServers.length > 0 ? { iceServers } : {};
-    await this.room.connect(url, token, { autoSubscribe: true, maxRetries: 0, rtcConfig });
+    await this.room.connect(url, token, { autoSubscribe: false, maxRetries: 0, rtcConfig });
+    for (const participant of this.room.remoteParticipants.values())
+      for (const publication of participant.trackPublications.values())
+        this.want(publication, participant.identity);
+  }
+
+  /**
+   * Asked for one by one, a track is told of in the very moment it is there. What the client subscribes to by itself
+   * is told of later, and a transform that comes after the first frame is passed by.
+   */
+  private want(publication: RemoteTrackPublication, identity: string): void {
+    if (identity === this.ticket.publisher) publication.setSubscribed(true);
   }
 
   /** Its own transform, as for every peer: LiveKit's would take the trailer off and keep what it said. */

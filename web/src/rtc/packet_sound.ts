@@ -9,7 +9,7 @@ import type { ReceiverStamps } from "./stamp_reader";
 const OPUS_RATE = 48_000;
 const US_PER_TICK = 1_000_000 / OPUS_RATE;
 const MU_LAW_RATE = 8000; // RFC 3551 4.5.14
-const LEAD_S = 0.06; // that a packet may come late
+const LEAD_S = 0.02; // that a packet may come late
 const MOST_AHEAD_S = 0.3; // more than that waits for nothing
 const BOOK_LIMIT = 512; // packets
 
