@@ -21,6 +21,11 @@ export function overviewPage(hash: string, page: string): string | null {
   return found.href;
 }
 
+/** What a fleet calls the robot of this page; "" on the page of a console's only robot. */
+export function robotName(page: string): string {
+  return /\/robots\/([^/]+)\/$/.exec(new URL(page).pathname)?.[1] ?? "";
+}
+
 /** Whether this page may ask there: another console's pictures are shown by its own pages. */
 export function isOwnOrigin(url: string, base: string): boolean {
   return URL.canParse(url, base) && new URL(url, base).origin === new URL(base).origin;

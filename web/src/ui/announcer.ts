@@ -1,3 +1,4 @@
+import { robotName } from "../core/fleet_link";
 import { DISARM_WORDS } from "../core/words";
 import type { ConsoleApp } from "../console_app";
 import { h, setText, type Panel } from "./dom";
@@ -6,6 +7,7 @@ import { overlayWords } from "./overlay";
 /** Tells screen readers, and the window's title, what changed. */
 export function createAnnouncer(app: ConsoleApp): Panel {
   const polite = h("div", "", { "aria-live": "polite" });
+  const page = robotName(location.href) === "" ? "Lockstep" : `${robotName(location.href)} · Lockstep`;
   const urgent = h("div", "", { "aria-live": "assertive" });
   return {
     element: h("div", "unseen", {}, polite, urgent),
@@ -16,7 +18,7 @@ export function createAnnouncer(app: ConsoleApp): Panel {
       setText(polite, overlay?.tone === "stopped" ? "" : (overlay?.title ?? armed));
       setText(urgent, overlay?.tone === "stopped" ? `${overlay.title}. ${overlay.text}` : "");
       const title = overlay === null ? (app.isArmed() ? "Armed" : "") : overlay.title;
-      const name = title === "" ? "Lockstep" : `${title} · Lockstep`;
+      const name = title === "" ? page : `${title} · ${page}`;
       if (document.title !== name) document.title = name;
     },
   };

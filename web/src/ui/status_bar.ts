@@ -1,5 +1,5 @@
 import { robotIsUp } from "../core/console_state";
-import { overviewPage } from "../core/fleet_link";
+import { overviewPage, robotName as nameInFleet } from "../core/fleet_link";
 import type { ConsoleApp } from "../console_app";
 import { button, h, setData, setHidden, setPressed, setText, type Panel } from "./dom";
 
@@ -22,12 +22,14 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
   const details = button("chip-button details-button", "Details", toggleDetails);
   const badge = h("span", "tab-badge calls", {}, "");
   details.append(badge);
+  const name = nameInFleet(location.href);
   const element = h(
     "header",
     "bar",
     {},
     ...wayBack(),
     h("span", "bar-brand", {}, "Lockstep"),
+    ...(name === "" ? [] : [h("strong", "bar-name", {}, name)]),
     robotName,
     h("div", "bar-chips", {}, consoleChip.element, robotChip.element),
     h("div", "bar-tools", {}, sound, details),
@@ -53,7 +55,7 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
 /** To the overview, on a page that was opened from there. */
 function wayBack(): HTMLElement[] {
   const href = overviewPage(location.hash, location.href);
-  return href === null ? [] : [h("a", "bar-back", { href }, "All robots")];
+  return href === null ? [] : [h("a", "bar-back", { href }, h("span", "bar-back-words", {}, "All robots"))];
 }
 
 /** Browsers let a page make sound only after the user touched it. */

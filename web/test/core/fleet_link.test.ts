@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { isOwnOrigin, overviewPage, robotPage } from "../../src/core/fleet_link";
+import { isOwnOrigin, overviewPage, robotName, robotPage } from "../../src/core/fleet_link";
 
 const BASE = "https://hall.example/a/";
 
@@ -22,6 +22,11 @@ describe("links between overview and robots", () => {
     );
     for (const url of ["javascript:alert(1)", "data:text/html,x", "https://", "file:///etc/passwd"])
       expect(robotPage(url, "#token=x", BASE)).toBeNull();
+  });
+
+  it("tell what the fleet calls the robot of a page", () => {
+    expect(robotName("https://hall.example/a/robots/arm-2/#token=x")).toBe("arm-2");
+    expect(robotName("https://hall.example/#token=robots/x/")).toBe("");
   });
 
   it("show pictures only of this page's own origin", () => {
