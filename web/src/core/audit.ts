@@ -58,7 +58,7 @@ function entriesOf(answer: unknown): AuditEntry[] {
   return Array.isArray(found)
     ? found
         .filter(isRecord)
-        .map(entryOf)
+        .map(auditEntry)
         .filter((entry) => entry.n > 0)
     : [];
 }
@@ -77,7 +77,7 @@ export function auditGroup(kind: string): AuditGroup {
   return KINDS.get(kind) ?? "robot";
 }
 
-export function filterAudit(entries: readonly AuditEntry[], group: AuditGroup): AuditEntry[] {
+export function filterAudit<Entry extends AuditEntry>(entries: readonly Entry[], group: AuditGroup): Entry[] {
   return entries.filter((entry) => group === "all" || auditGroup(entry.kind) === group);
 }
 
@@ -91,7 +91,8 @@ export function auditWords(entry: AuditEntry): string {
   return entry.count > 1 ? `${words} ×${entry.count}` : words;
 }
 
-function entryOf(record: Record<string, unknown>): AuditEntry {
+/** A record as the console writes it; what is missing is empty. */
+export function auditEntry(record: Record<string, unknown>): AuditEntry {
   const number = (name: string): number => (typeof record[name] === "number" ? record[name] : 0);
   const text = (name: string): string => (typeof record[name] === "string" ? record[name] : "");
   return {

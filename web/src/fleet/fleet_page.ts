@@ -15,7 +15,9 @@ import { Disposal } from "../input/disposal";
 import { isStopKey } from "../input/keyboard";
 import { watchPage } from "../input/page_watch";
 import type { ConsoleApi } from "../rtc/console_api";
-import { h, setData, setHidden, setText, type Panel } from "../ui/dom";
+import { button, h, setData, setHidden, setText, type Panel } from "../ui/dom";
+import { Sheets } from "../ui/sheet";
+import { createFleetAudit } from "./fleet_audit";
 import { messageElement, NO_LINK, NO_ROBOTS, notFound, shutOut, type FleetMessage } from "./fleet_message";
 import { FleetPoll } from "./fleet_poll";
 import { FleetStop } from "./fleet_stop";
@@ -43,6 +45,11 @@ export class FleetPage {
   private readonly place = h("div", "fleet-place");
   private readonly polite = h("div", "unseen", { "aria-live": "polite" });
   private readonly tools = createFleetTools(() => this.arrange(true));
+  private readonly sheets = new Sheets(
+    () => this.root.querySelectorAll<HTMLElement>(".fleet-bar, .fleet-main"),
+    "Esc stops every robot",
+  );
+  private readonly auditing: HTMLButtonElement; // for supervisors
   private readonly stopBar: Panel;
   private readonly root = h("div", "fleet");
   private messageKey = "";
@@ -53,6 +60,8 @@ export class FleetPage {
     api: ConsoleApi,
     private readonly link: PageLink,
   ) {
+    const audit = createFleetAudit(api);
+    this.auditing = button("quiet-button fleet-audit", "Audit trail", () => this.sheets.open(audit));
     this.thumbnails = new Thumbnails(link.token ?? "", link);
     this.stopping = new FleetStop(api, (reason) => this.thumbnails.stop(reason));
     this.poll = new FleetPoll(api, {
@@ -91,6 +100,7 @@ export class FleetPage {
       h("span", "bar-brand", {}, "Lockstep"),
       title,
       this.summary,
+      this.auditing,
       this.tools.element,
     );
     this.place.append(this.grid);
@@ -98,6 +108,7 @@ export class FleetPage {
       bar,
       this.banner,
       h("main", "fleet-main", {}, this.place),
+      this.sheets.element,
       this.stopBar.element,
       this.polite,
     );
@@ -182,6 +193,7 @@ export class FleetPage {
       tile?.showPicture(now);
     }
     if (phase !== "unknown") this.arrange(false);
+    setHidden(this.auditing, this.news.answer?.role !== "supervisor");
     this.announce(before, phase);
     this.showBanner(phase);
     this.showMessage(phase);

@@ -30,7 +30,13 @@ class AuditSheet {
   readonly element: HTMLElement;
   private readonly state = h("p", "audit-state", { role: "status" });
   private readonly rows = h("tbody");
-  private readonly table = h("table", "audit-table", {}, headRow(), this.rows);
+  private readonly table = h(
+    "table",
+    "audit-table",
+    {},
+    auditHead(["Time", "Event", "Kind", "Who", "What"]),
+    this.rows,
+  );
   private readonly more = button("quiet-button", "Show older", () => void this.showOlder());
   private readonly scroll: HTMLElement;
   private readonly chips: ReadonlyMap<AuditGroup, HTMLButtonElement>;
@@ -111,7 +117,7 @@ class AuditSheet {
     this.state.dataset["tone"] = this.trouble === "" ? "calm" : "bad";
     setHidden(this.table, found.length === 0);
     setHidden(this.more, found.length <= this.limit && (this.entries.at(-1)?.n ?? 1) <= 1);
-    this.rows.replaceChildren(...found.slice(0, this.limit).map(rowOf));
+    this.rows.replaceChildren(...found.slice(0, this.limit).map((entry) => auditRow(entry)));
   }
 
   private emptyWords(count: number): string {
@@ -130,12 +136,13 @@ class AuditSheet {
   }
 }
 
-function headRow(): HTMLElement {
-  const cells = ["Time", "Event", "Kind", "Who", "What"].map((name) => h("th", "", { scope: "col" }, name));
+export function auditHead(names: readonly string[]): HTMLElement {
+  const cells = names.map((name) => h("th", "", { scope: "col" }, name));
   return h("thead", "", {}, h("tr", "", {}, ...cells));
 }
 
-function rowOf(entry: AuditEntry): HTMLElement {
+/** A line of the table; `second` are cells behind the time. */
+export function auditRow(entry: AuditEntry, ...second: HTMLElement[]): HTMLElement {
   const when = new Date(entry.time * 1000);
   const day = when.toDateString() === new Date().toDateString() ? "" : `${when.toISOString().slice(5, 10)} `;
   const time = h("time", "", { datetime: when.toISOString(), title: when.toString() });
@@ -145,6 +152,7 @@ function rowOf(entry: AuditEntry): HTMLElement {
     "audit-row",
     { "data-kind": entry.kind },
     h("td", "audit-time", {}, time),
+    ...second,
     h("td", "audit-event", {}, entry.event === 0 ? "–" : grouped(entry.event)),
     h("td", "audit-kind", {}, entry.kind.replace("_", " ")),
     h("td", "audit-who", {}, ...whoOf(entry)),

@@ -17,8 +17,11 @@ export class Sheets {
   readonly element = h("div", "sheet-layer");
   private current: { content: SheetContent; dialog: HTMLDialogElement; opener: Element | null } | null = null;
 
-  /** `behind`: what is inert while a dialogue is open. */
-  constructor(private readonly behind: () => Iterable<HTMLElement>) {
+  /** `behind`: what is inert while a dialogue is open; `hint`: what Escape does meanwhile. */
+  constructor(
+    private readonly behind: () => Iterable<HTMLElement>,
+    private readonly hint = "Esc stops the robot",
+  ) {
     this.element.hidden = true;
     this.element.addEventListener("click", (event) => {
       if (event.target === this.element) this.close();
@@ -33,14 +36,7 @@ export class Sheets {
     this.close();
     const heading = h("h2", "sheet-title", { id: "sheet-title" }, content.title);
     const close = button("sheet-close", "Close", () => this.close());
-    const head = h(
-      "header",
-      "sheet-head",
-      {},
-      heading,
-      h("span", "sheet-hint", {}, "Esc stops the robot"),
-      close,
-    );
+    const head = h("header", "sheet-head", {}, heading, h("span", "sheet-hint", {}, this.hint), close);
     const dialog = h("dialog", `sheet ${content.name}`, { "aria-labelledby": "sheet-title" });
     dialog.append(head, content.element);
     this.current = { content, dialog, opener: document.activeElement };
