@@ -1,6 +1,7 @@
 """The HTTP API of recordings (docs/recording.md). Files are read in threads, never on the loop."""
 
 import asyncio
+import gzip
 from collections.abc import Callable, Iterator
 from typing import Annotated, TypeVar
 
@@ -13,7 +14,7 @@ from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.serial import MAX_EVENT, event_gap
 from server.access import Identity, require_role
 from server.body import read_json
-from server.errors import BadParameter, NotFound, RecordingFailed, RobotFailed
+from server.errors import BadParameter, ConsoleError, NotFound, RecordingFailed, RecordingUnreadable, RobotFailed
 from server.recording.errors import RecordingError
 from server.recording.event_index import EventIndex
 from server.recording.reader import Record, RecordingReader
@@ -33,6 +34,7 @@ router = APIRouter()
 
 MAX_EVENTS = 10_000  # in one answer of `records`
 MAX_BYTES = 64 * 1024 * 1024
+EVENT_SPACING = 1_000_000  # µs between events of the index that is sent
 
 Result = TypeVar("Result")
 Event = Annotated[int, Query(ge=1, le=MAX_EVENT)]
@@ -108,11 +110,19 @@ async def details(
 ) -> Response:
     """`after`: only what the index has from that chunk on, for one who follows a running recording."""
 
-    def read(reader: RecordingReader, entry: RecordingEntry) -> RecordingDetails:
-        description = reader.description() if reader.index.chunks else None
-        return RecordingDetails(info=entry, description=description, index=reader.index.after(after))
+    packed = "gzip" in request.headers.get("accept-encoding", "")
 
-    return _json(await _with_reader(request, recording_id, read))
+    def read(reader: RecordingReader, entry: RecordingEntry) -> bytes:
+        description = reader.description() if reader.index.chunks else None
+        index = reader.index.after(after).sparse(EVENT_SPACING)
+        body = msgspec.json.encode(RecordingDetails(info=entry, description=description, index=index))
+        return gzip.compress(body, compresslevel=1) if packed else body
+
+    body = await _with_reader(request, recording_id, read)
+    headers = {"Cache-Control": "no-store", "Vary": "Accept-Encoding"} | (
+        {"Content-Encoding": "gzip"} if packed else {}
+    )
+    return Response(body, media_type="application/json", headers=headers)
 
 
 @router.get("/api/recordings/{recording_id}/chunks/{number}")
@@ -190,7 +200,7 @@ async def _open(request: Request, recording_id: str) -> tuple[RecordingReader, R
     try:
         return await asyncio.to_thread(_service(request).library.open, recording_id)
     except (RecordingError, OSError) as error:
-        raise RecordingFailed(f"it cannot be read: {error}") from error
+        raise _told(error) from error
 
 
 async def _with_reader(
@@ -204,7 +214,16 @@ async def _with_reader(
     try:
         return await asyncio.to_thread(work)
     except (RecordingError, OSError) as error:
-        raise RecordingFailed(f"it cannot be read: {error}") from error
+        raise _told(error) from error
+
+
+def _told(error: RecordingError | OSError) -> ConsoleError:
+    """What is damaged stays so; another reason may pass."""
+    if isinstance(error, FileNotFoundError):
+        return NotFound("it was deleted")
+    if isinstance(error, RecordingError):
+        return RecordingUnreadable(str(error))
+    return RecordingFailed(f"it cannot be read: {error.strerror or error}")
 
 
 def _bounded(

@@ -23,6 +23,7 @@ ConsoleError
 │   ├── PreconditionFailed
 │   ├── TooManyInvitations
 │   ├── PreconditionRequired
+│   ├── RecordingUnreadable  what is asked for is damaged, and stays so
 │   ├── TooManyRequests
 │   └── WrongMediaType
 ├── ChannelError            a data channel message that is not understood
@@ -77,6 +78,7 @@ __all__ = [
     "PreconditionFailed",
     "PreconditionRequired",
     "RecordingFailed",
+    "RecordingUnreadable",
     "RequestError",
     "RobotFailed",
     "RobotUnreachable",
@@ -178,6 +180,10 @@ class HostRefused(RequestError):
 
 
 class NotConnected(RequestError):
+    pass
+
+
+class RecordingUnreadable(RequestError):
     pass
 
 
@@ -305,6 +311,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     BadSdp: HttpError(400, "bad_sdp"),
     BadSdpFragment: HttpError(400, "bad_sdp_fragment"),
     NotFound: HttpError(404, "not_found"),
+    RecordingUnreadable: HttpError(422, "recording_damaged"),
     BodyTooLarge: HttpError(413, "too_large"),
     WrongMediaType: HttpError(415, "wrong_media_type"),
     BodyTooSlow: HttpError(408, "too_slow", {"Connection": "close"}),

@@ -2,13 +2,16 @@
 
 import json
 from collections.abc import AsyncIterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from server.recording.reader import RecordingReader
 from server.recording.settings import RecordingSettings
 from server.settings import Settings
+from tests.server.recording.makers import Story
 from tests.server.rig import Rig, eventually, running_rig
 
 
@@ -93,3 +96,26 @@ async def test_a_range_that_is_none_is_refused(rig: Rig) -> None:
 def test_the_settings_of_recordings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LOCKSTEP_RECORDING__FILE_BYTES", "5000000")
     assert Settings().recording.file_bytes == 5_000_000
+
+
+async def test_a_damaged_part_and_a_deleted_file_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "recordings" / "one.mcap"
+    path.parent.mkdir()
+    Story(events=200).write(path)
+    with RecordingReader(path) as reader:
+        offset = reader.index.chunks[1].offset
+    async with running_rig(recording=RecordingSettings(directory=path.parent, free_bytes=0)) as rig:
+        observer = rig.token("observer")
+        details = await rig.http.get("/api/recordings/one", headers=observer)
+        assert details.headers["content-encoding"] == "gzip"
+        times = [arrived for _, arrived, _ in details.json()["index"]["events"]]
+        assert len(times) == 8
+        assert all(later - earlier >= 1_000_000 for earlier, later in pairwise(times))
+        data = bytearray(path.read_bytes())
+        data[offset + 500] ^= 1
+        path.write_bytes(data)
+        broken = await rig.http.get("/api/recordings/one/chunks/1", headers=observer)
+        assert (broken.status_code, broken.json()["error"]) == (422, "recording_damaged")
+        assert (await rig.http.get("/api/recordings/one/chunks/2", headers=observer)).status_code == 200
+        path.unlink()
+        assert (await rig.http.get("/api/recordings/one/chunks/2", headers=observer)).status_code == 404
