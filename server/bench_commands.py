@@ -17,7 +17,7 @@ COMMANDS = {
     "fleet-soak": (
         "bench.fleet_soak.cli",
         "fleet_soak_command",
-        "Drive several robots on one console while their bridges are killed in turn.",
+        "Drive several robots while their bridges die in turn.",
     ),
     "network": (
         "bench.emulator.cli",
