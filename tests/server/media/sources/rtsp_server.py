@@ -11,7 +11,7 @@ from server.media.h264 import START_CODE, inspect
 from server.media.packetise import packetise_h264, split_nal_units
 from tests.server.media.camera_h264 import access_units
 
-__all__ = ["RtspCamera", "running_camera"]
+__all__ = ["RtspCamera", "running_camera", "slices_of"]
 
 RATE = 30
 USER, PASSWORD = "viewer", "geheim"
@@ -24,6 +24,7 @@ class RtspCamera:
         self._units = access_units(30, gop=15, profile="main")
         self.port = 0
         self.requests: list[str] = []
+        self.captured: dict[bytes, float] = {}  # when a picture was last sent, by its slices; monotonic
         self._players: set[asyncio.Task[None]] = set()
 
     @property
@@ -87,6 +88,7 @@ class RtspCamera:
                 unit = b"".join(
                     START_CODE + nal for nal in split_nal_units(self._units[number % 30]) if nal[0] & 0x1F not in (7, 8)
                 )
+                self.captured[slices_of(unit)] = time.monotonic()
                 payloads = packetise_h264(unit)
                 for i, payload in enumerate(payloads):
                     marker = 0x80 if i == len(payloads) - 1 else 0
@@ -100,6 +102,11 @@ class RtspCamera:
             pass
         finally:
             writer.close()
+
+
+def slices_of(unit: bytes) -> bytes:
+    """A picture without what may be put in front of it on its way (H.264 table 7-1)."""
+    return b"".join(nal for nal in split_nal_units(unit) if 1 <= nal[0] & 0x1F <= 5)
 
 
 @asynccontextmanager
