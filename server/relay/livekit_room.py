@@ -1,6 +1,7 @@
 """A room of LiveKit as a publisher, by its client for Python (the wheel `livekit`). Lives in a process of its own."""
 
 import asyncio
+import struct
 import time
 from collections import deque
 from collections.abc import Callable
@@ -28,6 +29,8 @@ POLL_SECONDS = 0.05  # between two looks at what an encoder would be told
 ROOM_SECONDS = 1.0  # between two words about the path
 RECONNECT_SECONDS = 3.0  # that the client may try by itself; then the console does, with a new room
 MOST_SOUNDS = 10  # packets that wait
+MOST_MESSAGE = 1200  # bytes: one datagram
+SOUND_HEAD = struct.Struct("!BIH")  # the track's number, RTP timestamp, bytes that follow
 ADRIFT = 0.5  # s between a picture's time and its arrival; more is another clock
 CODECS = {"H264": rtc.VideoCodec.H264, "VP8": rtc.VideoCodec.VP8}
 REFUSALS = ("401", "403", "unauthorized", "invalid token", "permission")
@@ -79,8 +82,7 @@ class LiveKitRoom:
             if (source := self._sources.get(order.track)) is not None:
                 source.capture(order)
         elif isinstance(order, Sound):
-            head = bytes((order.track & 0xFF,)) + order.time.to_bytes(4, "big")
-            self._sounds.append(head + order.data)
+            self._sounds.append(SOUND_HEAD.pack(order.track & 0xFF, order.time, len(order.data)) + order.data)
             self._filled.set()
         elif isinstance(order, Feedback):
             self._feedback = order.text
@@ -126,8 +128,17 @@ class LiveKitRoom:
             if self._feedback is not None:
                 text, self._feedback = self._feedback, None
                 await self._publish_data(text.encode(), "feedback")
-            while self._sounds:
-                await self._publish_data(self._sounds.popleft(), "sound")
+            if self._sounds:
+                await self._publish_data(self._waiting_sounds(), "sound")
+                if self._sounds:
+                    self._filled.set()
+
+    def _waiting_sounds(self) -> bytes:
+        """What waits goes together, as far as one message holds it: each takes a while to be taken."""
+        found = self._sounds.popleft()
+        while self._sounds and len(found) + len(self._sounds[0]) <= MOST_MESSAGE:
+            found += self._sounds.popleft()
+        return found
 
     async def _publish_data(self, data: bytes, topic: str) -> None:
         try:

@@ -28,7 +28,7 @@ async def test_pictures_and_sound_pass_the_gate_and_when_the_relay_dies_the_cons
             await _through_the_relay(page, server)
             await page.until("s.streams.overview?.rendered > 10", 60)
             shown = await page.strip("overview")  # noqa: B005  # not of a string
-            await page.until("s.streams.microphone?.rendered > 20", 30)
+            await page.until("s.streams.microphone?.rendered > 20", 60)
             heard = await sound_card.hears(TONE, 0.02)
             statistics = await page.stats()
             server.accepts = False

@@ -297,7 +297,7 @@ class LiveKitStandIn:
     async def _offer(self, member: Member) -> None:
         pc = member.subscribing
         member.outdated = member.offered
-        if member.offered:
+        if member.offered or pc.connectionState == "closed":
             return
         member.offered = True
         if not member.channels:

@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import struct
 from typing import Any
 
 import msgspec
@@ -63,6 +64,13 @@ async def test_every_encoded_picture_carries_its_event_and_feedback_and_sound_ar
         await server.until(lambda: any(topic == "feedback" for topic, _ in server.data))
         heard = [msgspec.json.decode(data) for topic, data in server.data if topic == "feedback"]
         assert all(isinstance(each, dict) and "type" in each for each in heard)
+        await server.until(lambda: any(topic == "sound" for topic, _ in server.data))
+        sound = next(data for topic, data in server.data if topic == "sound")
+        track, _, length = struct.unpack("!BIH", sound[:7])
+        assert ticket["streams"][track]["kind"] == "audio"
+        trailer = split_trailer(sound[7 : 7 + length])[1]
+        assert trailer is not None
+        assert trailer.event
 
 
 async def test_a_ticket_lets_in_to_watch_one_publication_and_the_next_one_has_another_room() -> None:

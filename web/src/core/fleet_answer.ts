@@ -72,6 +72,14 @@ export function parseStopReplies(value: unknown): readonly StopReply[] | null {
   );
 }
 
+/** Robots of other consoles that are reached under the page's own address, as behind one entry. */
+export function robotsNearby(robots: readonly FleetRobot[], page: string): FleetRobot[] {
+  const { origin } = new URL(page);
+  return robots.filter(
+    ({ console, url }) => console !== "" && URL.canParse(url, page) && new URL(url, page).origin === origin,
+  );
+}
+
 function parseRobot(value: unknown): FleetRobot | null {
   if (!isRecord(value) || text(value["name"]) === "" || text(value["url"]) === "") return null;
   const people = list(value["participants"]).map(personName);

@@ -45,6 +45,7 @@ export interface ReplayChunkContent {
   readonly feedback: readonly ReplayFeedback[];
   readonly commands: readonly ReplayCommand[];
   readonly seats: readonly { readonly arrived: number; readonly name: string }[];
+  readonly broken: boolean; // it is damaged, and holds nothing that could be trusted
 }
 
 export const CAMERA = "/camera/";
@@ -72,7 +73,17 @@ export function parseChunkBody(number: number, body: ArrayBuffer): ReplayChunkCo
       if (isRecord(seat)) seats.push({ arrived, name: text(seat["name"]) });
     }
   }
-  return { number, bytes: body.byteLength, media, feedback, commands, seats };
+  return { number, bytes: body.byteLength, media, feedback, commands, seats, broken: false };
+}
+
+/** What stands for a chunk that is damaged. */
+export function brokenChunk(number: number): ReplayChunkContent {
+  return { number, bytes: 0, media: new Map(), feedback: [], commands: [], seats: [], broken: true };
+}
+
+/** In which chunk a record stands. */
+export function chunkOfRecord(record: ReplayRecord): number {
+  return Math.floor(record.id / MOST_RECORDS);
 }
 
 function* recordsOf(number: number, body: ArrayBuffer): Generator<ReplayRecord> {

@@ -1,5 +1,6 @@
 import {
   CAMERA,
+  chunkOfRecord,
   MICROPHONE,
   type ReplayChunkContent,
   type ReplayCommand,
@@ -34,6 +35,7 @@ export interface ReplayMoment {
   readonly driver: string | null; // who held the seat; null: not known from what is loaded
   readonly pictures: ReadonlyMap<string, ReplayPicture>; // by topic; none where none can be decoded
   readonly sounds: ReadonlyMap<string, ReplaySegment>; // by topic; the packets of its newest stamp
+  readonly damaged: boolean; // a part that belongs to it cannot be read: what is missing may have been there
 }
 
 const MOST_PACKETS = 100; // of sound: two seconds
@@ -50,12 +52,18 @@ export function momentOf(chunks: readonly ReplayChunkContent[], place: ReplayPla
   const seats = chunks.flatMap((chunk) => chunk.seats.filter((each) => each.arrived <= latest));
   const pictures = new Map<string, ReplayPicture>();
   const sounds = new Map<string, ReplaySegment>();
+  const lastBroken = chunks.findLast((chunk) => chunk.broken)?.number ?? -1;
+  const isWhole = (first: ReplayRecord | undefined): boolean =>
+    first !== undefined && chunkOfRecord(first) > lastBroken;
   for (const topic of topicsOf(chunks)) {
     const records = chunks.flatMap((chunk) => chunk.media.get(topic) ?? []);
     if (topic.startsWith(CAMERA)) {
       const picture = pictureAt(records, place.event, until);
-      if (picture !== null) pictures.set(topic, picture);
-    } else if (topic.startsWith(MICROPHONE)) sounds.set(topic, segmentAt(records, place.event, until));
+      if (picture !== null && isWhole(picture.sequence[0])) pictures.set(topic, picture);
+    } else if (topic.startsWith(MICROPHONE)) {
+      const segment = segmentAt(records, place.event, until);
+      if (isWhole(segment.packets[0])) sounds.set(topic, segment);
+    }
   }
   return {
     place,
@@ -65,6 +73,7 @@ export function momentOf(chunks: readonly ReplayChunkContent[], place: ReplayPla
     driver: seats.at(-1)?.name ?? null,
     pictures,
     sounds,
+    damaged: lastBroken !== -1,
   };
 }
 

@@ -43,13 +43,14 @@ export function stepStopAll(stop: StopAll, now: number): boolean {
   return true;
 }
 
-/** The console's answer to one try. What a robot reported since stays. */
+/** An answer to one try, by whatever way. What a robot reported since stays; what one way delivered is delivered. */
 export function tookStopReplies(stop: StopAll, replies: readonly StopReply[]): void {
   if (stop.pressedMs === null) return;
   stop.answered = true;
   stop.failure = "";
   for (const { name, delivered, detail } of replies) {
-    if (stop.fates.get(name)?.fate === "stopped") continue;
+    const known = stop.fates.get(name)?.fate;
+    if (known === "stopped" || (known === "told" && !delivered)) continue;
     stop.fates.set(name, { fate: delivered ? "told" : "kept", detail });
   }
 }

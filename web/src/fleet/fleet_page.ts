@@ -9,6 +9,7 @@ import {
 } from "../core/fleet_news";
 import { isFound, robotsWords, sortFleet, summaryWords } from "../core/fleet_order";
 import type { PageLink } from "../core/fragment";
+import { tookStopReplies } from "../core/stop_all";
 import { isTrouble, tileState, type TileState } from "../core/tile_state";
 import { TROUBLE_WORDS } from "../core/trouble";
 import { Disposal } from "../input/disposal";
@@ -17,6 +18,7 @@ import { watchPage } from "../input/page_watch";
 import type { ConsoleApi } from "../rtc/console_api";
 import { button, h, setData, setHidden, setText, type Panel } from "../ui/dom";
 import { Sheets } from "../ui/sheet";
+import { DirectStop } from "./direct_stop";
 import { createFleetAudit } from "./fleet_audit";
 import { messageElement, NO_LINK, NO_ROBOTS, notFound, shutOut, type FleetMessage } from "./fleet_message";
 import { FleetPoll } from "./fleet_poll";
@@ -63,7 +65,11 @@ export class FleetPage {
     const audit = createFleetAudit(api);
     this.auditing = button("quiet-button fleet-audit", "Audit trail", () => this.sheets.open(audit));
     this.thumbnails = new Thumbnails(link.token ?? "", link);
-    this.stopping = new FleetStop(api, (reason) => this.thumbnails.stop(reason));
+    const direct = new DirectStop(link.token ?? "", (reply) => tookStopReplies(this.stopping.stop, [reply]));
+    this.stopping = new FleetStop(api, (reason) => {
+      this.thumbnails.stop(reason);
+      direct.say(this.robots, reason);
+    });
     this.poll = new FleetPoll(api, {
       answer: (answer, askedMs) => {
         tookAnswer(this.news, answer, askedMs, performance.now(), Date.now());

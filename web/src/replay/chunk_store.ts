@@ -1,10 +1,16 @@
-import type { ReplayChunkContent } from "../core/replay_chunk";
+import { brokenChunk, ChunkBroken, type ReplayChunkContent } from "../core/replay_chunk";
+import { ConsoleError } from "../rtc/console_api";
 
 const MOST_BYTES = 96 * 1024 * 1024;
 const AT_ONCE = 6;
 
-/** Chunks as they were asked for; the one that was used longest ago goes first. */
+/**
+ * Chunks as they were asked for; the one that was used longest ago goes first. A damaged one is asked for once, and is
+ * empty from then on.
+ */
 export class ChunkStore {
+  readonly damaged = new Set<number>();
+  failed = 0; // requests that brought nothing, and may bring it another time
   private readonly kept = new Map<number, ReplayChunkContent>();
   private readonly coming = new Map<number, Promise<ReplayChunkContent>>();
   private readonly closing = new AbortController();
@@ -45,7 +51,7 @@ export class ChunkStore {
 
   private async fetch(number: number): Promise<ReplayChunkContent> {
     try {
-      const content = await this.load(number, this.closing.signal);
+      const content = await this.loaded(number);
       this.kept.set(number, content);
       this.bytes += content.bytes;
       for (const [oldest, { bytes }] of this.kept) {
@@ -58,4 +64,23 @@ export class ChunkStore {
       this.coming.delete(number);
     }
   }
+
+  private async loaded(number: number): Promise<ReplayChunkContent> {
+    try {
+      return await this.load(number, this.closing.signal);
+    } catch (error) {
+      if (!isDamage(error)) {
+        this.failed++;
+        throw error;
+      }
+      this.damaged.add(number);
+      return brokenChunk(number);
+    }
+  }
+}
+
+function isDamage(error: unknown): boolean {
+  return (
+    error instanceof ChunkBroken || (error instanceof ConsoleError && error.error === "recording_damaged")
+  );
 }

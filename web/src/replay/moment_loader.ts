@@ -19,7 +19,7 @@ export class MomentLoader {
       place.until === null
         ? range.last
         : Math.max(range.first, Math.min(range.last, chunkAt(index, place.until)));
-    const wanted = new Set([last, ...this.commandChunks(index, place.event, range.first)]);
+    const wanted = new Set([last, ...this.commandChunks(index, place.event, range)]);
     for (const number of pictureChunks(index, place, last)) wanted.add(number);
     const loading = this.store.all(wanted);
     this.store.prefetch(upTo(last + 1, Math.min(last + AHEAD, index.chunks.length - 1)));
@@ -42,10 +42,14 @@ export class MomentLoader {
   }
 
   /** Commands come before the first feedback of their event. */
-  private commandChunks(index: ReplayIndex, event: number, first: number): number[] {
+  private commandChunks(
+    index: ReplayIndex,
+    event: number,
+    range: { readonly first: number; readonly last: number },
+  ): number[] {
     const next = index.events.find((entry) => !isNewer(event, entry[0]));
-    const last = Math.max(first, next?.[2] ?? index.chunks.length - 1);
-    return upTo(Math.max(first, last - COMMAND_CHUNKS), last);
+    const last = Math.max(range.first, Math.min(range.last, next?.[2] ?? range.last));
+    return upTo(Math.max(range.first, last - COMMAND_CHUNKS), last);
   }
 
   private async feedbackChunk(place: ReplayPlace, first: number, last: number): Promise<ReplayChunkContent> {

@@ -2,6 +2,7 @@ import { CAMERA } from "../core/replay_chunk";
 import { clampedEvent, grownIndex, timeOf, type ReplayIndex, type ReplayMark } from "../core/replay_index";
 import type { ReplayMoment, ReplayPlace } from "../core/replay_moment";
 import { eventAfter, isNewer, MAX_EVENT } from "../core/serial";
+import { ConsoleError } from "../rtc/console_api";
 import type { RobotDescription } from "../wire";
 import { ChunkStore } from "./chunk_store";
 import { MomentLoader } from "./moment_loader";
@@ -10,6 +11,8 @@ import type { RecordingDetails, RecordingsApi } from "./recordings_api";
 import { microphonesOf, SoundPlayer } from "./sound_player";
 
 const FOLLOW_MS = 2000;
+const MOST_FOLLOW_MS = 30_000; // between two tries while the console does not answer
+const DAMAGED = "This part of the recording is damaged";
 const US = 1e6;
 
 /** What stands on screen: one moment with its pictures. */
@@ -38,6 +41,8 @@ export class Player {
   place: ReplayPlace;
   shown: ShownMoment | null = null;
   trouble: unknown = null; // of the last request
+  isGone = false; // it was deleted meanwhile: what is loaded can still be looked at
+  private followMs = FOLLOW_MS;
   private readonly store: ChunkStore;
   private readonly loader: MomentLoader;
   private readonly sound: SoundPlayer;
@@ -110,6 +115,11 @@ export class Player {
     this.events.changed();
   }
 
+  /** What could not be read: parts that are damaged, and requests that failed. */
+  get troubles(): { readonly damaged: number; readonly failed: number } {
+    return { damaged: this.store.damaged.size, failed: this.store.failed };
+  }
+
   private isOpen(): boolean {
     return !this.closed;
   }
@@ -179,7 +189,7 @@ export class Player {
     try {
       return await this.loader.eventAt(this.index, time);
     } catch (error) {
-      this.trouble = error;
+      this.fail(error);
       this.isPlaying = false;
       return null;
     }
@@ -204,7 +214,7 @@ export class Player {
         this.shown = shown;
         this.events.shown(shown);
       } catch (error) {
-        if (this.isOpen()) this.trouble = error;
+        if (this.isOpen()) this.fail(error);
         this.isPlaying = false;
       }
     }
@@ -220,7 +230,7 @@ export class Player {
       this.cameras.map(async (topic) => {
         const picture = moment.pictures.get(topic);
         if (picture === undefined) {
-          troubles.set(topic, "No picture had come yet");
+          troubles.set(topic, moment.damaged ? DAMAGED : "No picture had come yet");
           return;
         }
         try {
@@ -234,6 +244,14 @@ export class Player {
     return { moment, pictures, troubles };
   }
 
+  /** A file that was deleted comes no more; everything else is asked for again when it is needed. */
+  private fail(error: unknown): void {
+    this.trouble = error;
+    if (!(error instanceof ConsoleError) || error.status !== 404) return;
+    this.isGone = true;
+    this.isRunning = this.follows = false;
+  }
+
   private decoder(topic: string): PictureDecoder {
     const found = this.decoders.get(topic) ?? new PictureDecoder();
     this.decoders.set(topic, found);
@@ -241,7 +259,8 @@ export class Player {
   }
 
   private followLater(): void {
-    if (!this.closed && this.isRunning) this.followTimer = setTimeout(() => void this.follow(), FOLLOW_MS);
+    if (!this.closed && this.isRunning)
+      this.followTimer = setTimeout(() => void this.follow(), this.followMs);
   }
 
   /** What was recorded meanwhile. */
@@ -253,9 +272,11 @@ export class Player {
       this.description ??= more.description;
       this.isRunning = more.entry.running;
       this.trouble = null;
+      this.followMs = FOLLOW_MS;
       if (this.follows && !this.isPlaying) await this.show({ event: this.index.lastEvent, until: null });
     } catch (error) {
-      this.trouble = error;
+      this.fail(error);
+      this.followMs = Math.min(MOST_FOLLOW_MS, 2 * this.followMs);
     }
     this.events.changed();
     this.followLater();

@@ -2,7 +2,7 @@ import { forceOf } from "../core/contact";
 import { createForceTrace, noteForce } from "../core/force_trace";
 import { elapsed } from "../core/recording_words";
 import { dayWords } from "../core/recording_list";
-import { CAMERA, ChunkBroken, MICROPHONE, type ReplayFeedback } from "../core/replay_chunk";
+import { CAMERA, MICROPHONE, type ReplayFeedback } from "../core/replay_chunk";
 import { clampedEvent, timeOf } from "../core/replay_index";
 import { replayHash, type ReplayLink } from "../core/replay_link";
 import { roleOf } from "../core/fragment";
@@ -39,6 +39,7 @@ export class PlayerView {
   private readonly when = h("span", "event-rate");
   private readonly state = h("p", "replay-state");
   private readonly trouble = h("p", "library-trouble", { role: "alert" });
+  private readonly damage = h("span", "tag bad");
   readonly scene: SceneCard | null; // null: the robot does not describe its shape
   private readonly axes: AxisRows | null;
   private readonly gauge: { element: HTMLElement; update(now: number): void } | null;
@@ -145,6 +146,7 @@ export class PlayerView {
         {},
         [entry.name === "" ? "" : entry.robot, dayWords(entry.started)].filter(Boolean).join(" · "),
       ),
+      this.damage,
       tools,
     );
   }
@@ -188,14 +190,19 @@ export class PlayerView {
     this.transport.update();
     this.gauge?.update(performance.now());
     setData(this.element, "loading", String(player.isLoading));
-    const { trouble } = player;
-    setHidden(this.trouble, trouble === null && index.lastEvent !== 0);
-    if (trouble === null) setText(this.trouble, index.lastEvent === 0 ? "Nothing of it is on disk yet." : "");
-    else
-      setText(
-        this.trouble,
-        trouble instanceof ChunkBroken ? "This part of the recording is damaged." : troubleWords(trouble),
-      );
+    const words = this.troubleNow();
+    setHidden(this.trouble, words === "");
+    setText(this.trouble, words);
+    const { damaged } = player.troubles;
+    setHidden(this.damage, damaged === 0);
+    setText(this.damage, `${damaged} damaged part${damaged === 1 ? "" : "s"}`);
+  }
+
+  private troubleNow(): string {
+    const { trouble, index, isGone } = this.player;
+    if (isGone) return "This recording was deleted. What the page has loaded can still be looked at.";
+    if (trouble !== null) return troubleWords(trouble);
+    return index.lastEvent === 0 ? "Nothing of it is on disk yet." : "";
   }
 
   private hash(): string {
@@ -235,7 +242,10 @@ export class PlayerView {
 /** What the robot and its people were doing. */
 function stateWords({ moment }: ShownMoment): string {
   const { feedback, command, driver } = moment;
-  if (feedback === null) return "No feedback of this event was recorded";
+  if (feedback === null)
+    return moment.damaged
+      ? "This part of the recording is damaged"
+      : "No feedback of this event was recorded";
   const parts = [];
   if (feedback.stopped) parts.push(`Stopped${feedback.stopBy === "" ? "" : ` by ${feedback.stopBy}`}`);
   else parts.push(feedback.atRest ? "At rest" : "Moving");

@@ -41,6 +41,8 @@ function statsOf({ player, sounds, scene }: PlayerView): object {
     command: moment?.command ?? null,
     feedback: moment?.feedback ?? null,
     scene: scene?.statistics() ?? null,
+    unreadable: player.troubles,
+    deleted: player.isGone,
     troubles: Object.fromEntries(shown?.troubles ?? []),
     pictures: Object.fromEntries(
       [...(moment?.pictures ?? [])].map(([topic, { record }]) => [topic.slice(CAMERA.length), record.event]),

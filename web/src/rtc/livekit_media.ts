@@ -9,6 +9,7 @@ import {
 } from "livekit-client";
 import type { IceServer } from "../core/ice_servers";
 import type { LiveKitTicket } from "../core/relay";
+import { splitSounds } from "../core/sound_packets";
 import { PacketSound } from "./packet_sound";
 import type { RelayEvents, RelayLink } from "./relay_link";
 import { receivedSection, type Section } from "./section";
@@ -16,7 +17,6 @@ import { SilenceWatch } from "./silence_watch";
 import type { StampReader } from "./stamp_reader";
 
 const OPEN_MS = 6000;
-const SOUND_HEAD = 5; // bytes: the stream's number, and its RTP timestamp
 
 /** Pictures, sound and feedback through a LiveKit. It ends once; trying again is not its client's business. */
 export class LiveKitMedia implements RelayLink {
@@ -106,9 +106,8 @@ export class LiveKitMedia implements RelayLink {
     if (topic === "feedback") {
       this.silence.heard();
       this.events.feedback(new TextDecoder().decode(payload));
-    } else if (topic === "sound" && payload.length > SOUND_HEAD) {
-      const view = new DataView(payload.buffer, payload.byteOffset, SOUND_HEAD);
-      this.sounds.get(view.getUint8(0))?.take(view.getUint32(1), payload.subarray(SOUND_HEAD));
+    } else if (topic === "sound") {
+      for (const { stream, time, data } of splitSounds(payload)) this.sounds.get(stream)?.take(time, data);
     }
   }
 

@@ -27,7 +27,7 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
     "header",
     "bar",
     {},
-    ...wayBack(),
+    ...wayBack(name),
     h("span", "bar-brand", {}, "Lockstep"),
     ...(name === "" ? [] : [h("strong", "bar-name", {}, name)]),
     robotName,
@@ -53,9 +53,11 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
 }
 
 /** To the overview, on a page that was opened from there. */
-function wayBack(): HTMLElement[] {
+function wayBack(name: string): HTMLElement[] {
   const href = overviewPage(location.hash, location.href);
-  return href === null ? [] : [h("a", "bar-back", { href }, h("span", "bar-back-words", {}, "All robots"))];
+  if (href === null) return [];
+  const words = h("span", "bar-back-words", {}, "All robots");
+  return [h("a", "bar-back", { href }, words, h("span", "bar-back-name", {}, name))];
 }
 
 /** Browsers let a page make sound only after the user touched it. */
