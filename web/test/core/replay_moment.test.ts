@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { ChunkBroken, parseChunkBody } from "../../src/core/replay_chunk";
+import { brokenChunk, ChunkBroken, parseChunkBody } from "../../src/core/replay_chunk";
 import {
   chunksOf,
   grownIndex,
@@ -155,5 +155,24 @@ describe("an index", () => {
 
   it("of another version is none", () => {
     expect(parseIndex({ version: 2 })).toBeNull();
+  });
+});
+
+describe("a damaged chunk", () => {
+  const place = { event: 4, until: null };
+  const first = parseChunkBody(0, bodyOf([picture(1, 1, true), feedback(1, 1, 1)]));
+  const last = parseChunkBody(2, bodyOf([picture(4, 4, false), feedback(4, 1, 4)]));
+
+  it("takes with it the pictures that build on it, and nothing that says its own event", () => {
+    const moment = momentOf([first, brokenChunk(1), last], place);
+    expect(moment.damaged).toBe(true);
+    expect(moment.pictures.size).toBe(0);
+    expect(moment.feedback?.event).toBe(4);
+  });
+
+  it("does not matter before the keyframe", () => {
+    const key = parseChunkBody(2, bodyOf([picture(4, 4, true), feedback(4, 1, 4)]));
+    const moment = momentOf([first, brokenChunk(1), key], place);
+    expect(moment.pictures.get("/camera/front")?.record.event).toBe(4);
   });
 });
