@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { parseFleet, parseStopReplies } from "../../src/core/fleet_answer";
+import { parseFleet, parseStopReplies, robotsNearby } from "../../src/core/fleet_answer";
 import { robotOf } from "./fleets";
 
 describe("the fleet's answer", () => {
@@ -60,6 +60,17 @@ describe("the fleet's answer", () => {
   it("leaves out a robot without a name or address", () => {
     const robots = [{ name: "", url: "robots/a/" }, { name: "b" }, 7, null, { name: "c", url: "robots/c/" }];
     expect(parseFleet({ robots })?.robots.map(({ name }) => name)).toEqual(["c"]);
+  });
+
+  it("tells which robots of other consoles are reached under the page's own address", () => {
+    const robots = [
+      robotOf("own"),
+      robotOf("near", { console: "yard", url: "https://entry:8443/robots/near/" }),
+      robotOf("far", { console: "yard", url: "https://yard.example/robots/far/" }),
+      robotOf("odd", { console: "yard", url: "https://:/" }),
+    ];
+    const nearby = robotsNearby(robots, "https://entry:8443/#token=x");
+    expect(nearby.map(({ name }) => name)).toEqual(["near"]);
   });
 
   it("is none when it has no list of robots", () => {

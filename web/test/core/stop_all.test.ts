@@ -51,6 +51,15 @@ describe("STOP ALL", () => {
     });
   });
 
+  it("stays delivered when another way did not deliver it", () => {
+    const stop = pressed("a");
+    tookStopReplies(stop, replies("a"));
+    tookStopReplies(stop, [{ name: "a", delivered: false, detail: "not confirmed: the board is silent" }]);
+    expect(stopAllWords(stop)?.missing).toEqual([
+      { name: "a", detail: "delivered, not confirmed by the robot" },
+    ]);
+  });
+
   it("is not confirmed by a robot whose link is down", () => {
     const stop = pressed("a");
     tookFleet(stop, [robotOf("a", { ...STOPPED, link: "down" })], 1100);
