@@ -23,11 +23,13 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
   const badge = h("span", "tab-badge calls", {}, "");
   details.append(badge);
   const name = nameInFleet(location.href);
+  // Small screens write it over the large view: the bar has no room for it.
+  if (name !== "") document.documentElement.style.setProperty("--robot-name", JSON.stringify(name));
   const element = h(
     "header",
     "bar",
     {},
-    ...wayBack(name),
+    ...wayBack(),
     h("span", "bar-brand", {}, "Lockstep"),
     ...(name === "" ? [] : [h("strong", "bar-name", {}, name)]),
     robotName,
@@ -53,11 +55,10 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
 }
 
 /** To the overview, on a page that was opened from there. */
-function wayBack(name: string): HTMLElement[] {
+function wayBack(): HTMLElement[] {
   const href = overviewPage(location.hash, location.href);
   if (href === null) return [];
-  const words = h("span", "bar-back-words", {}, "All robots");
-  return [h("a", "bar-back", { href }, words, h("span", "bar-back-name", {}, name))];
+  return [h("a", "bar-back", { href }, h("span", "bar-back-words", {}, "All robots"))];
 }
 
 /** Browsers let a page make sound only after the user touched it. */
