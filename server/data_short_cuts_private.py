@@ -10,6 +10,7 @@ What is used of aiortc, pinned by tests: what `RTCSctpTransport._send`, `._trans
 """
 
 import time
+from collections.abc import Callable
 from struct import Struct
 from typing import Any
 
@@ -33,7 +34,8 @@ __all__ = ["ShortCuts"]
 
 ESTABLISHED = RTCSctpTransport.State.ESTABLISHED
 TSN_MODULO = 1 << 32
-SACK_LENGTH = 28  # bytes of a packet that is a SACK without gaps and duplicates, and nothing else (RFC 9260 3.3.4)
+SACK_CHUNK = 16  # bytes of one without gaps and duplicates (RFC 9260 3.3.4)
+SACK_LENGTH = 12 + SACK_CHUNK  # of a packet that is such a one and nothing else
 
 _common_header = Struct("!HHL")  # ports, verification tag; the checksum follows
 _checksum = Struct("<L")
@@ -42,10 +44,11 @@ _sack = Struct("!BBHLLHH")
 
 
 class ShortCuts:
-    """Of one association."""
+    """Of one association. `acknowledgement` takes the SACK chunk that is due, to travel with a message; or empty."""
 
-    def __init__(self, sctp: Any) -> None:
+    def __init__(self, sctp: Any, acknowledgement: Callable[[], bytes]) -> None:
         self._sctp = sctp
+        self._acknowledgement = acknowledgement
 
     def send(self, channel: RTCDataChannel, text: str) -> bool:
         """Send a message as `RTCSctpTransport._send` does. False, and nothing done, when it is not the plain case.
@@ -69,7 +72,8 @@ class ShortCuts:
         channel._addBufferedAmount(len(payload))
         chunk = self._chunk(channel, payload)
         sctp._sent_queue.append(chunk)
-        run_now(sctp.transport._send_data(self._packet(bytes(chunk))))
+        acknowledgement = self._acknowledgement() if len(payload) <= USERDATA_MAX_LENGTH - SACK_CHUNK else b""
+        run_now(sctp.transport._send_data(self._packet(acknowledgement + bytes(chunk))))
         if sctp._t3_handle is None:
             sctp._t3_start()
         channel._addBufferedAmount(-len(payload))
@@ -88,7 +92,7 @@ class ShortCuts:
             return False
         _, _, length, acknowledged, _, gaps, duplicates = _sack.unpack_from(packet, 12)
         _, _, tag = _common_header.unpack_from(packet)
-        if gaps or duplicates or length != SACK_LENGTH - 12 or tag != sctp._local_verification_tag:
+        if gaps or duplicates or length != SACK_CHUNK or tag != sctp._local_verification_tag:
             return False
         if _checksum.unpack_from(packet, 8)[0] != crc32c(packet[:8] + bytes(4) + packet[12:]):
             return False
@@ -133,10 +137,10 @@ class ShortCuts:
         sctp._flight_size += chunk._book_size
         return chunk
 
-    def _packet(self, chunk: bytes) -> bytes:
+    def _packet(self, chunks: bytes) -> bytes:
         sctp = self._sctp
         header = _common_header.pack(sctp._local_port, sctp._remote_port, sctp._remote_verification_tag)
-        return header + _checksum.pack(crc32c(header + bytes(4) + chunk)) + chunk
+        return header + _checksum.pack(crc32c(header + bytes(4) + chunks)) + chunks
 
     def _acknowledged(self, tsn: int) -> None:
         """Everything up to this one has arrived."""

@@ -18,7 +18,7 @@ import contextlib
 from typing import Any
 
 from aiortc import RTCDataChannel, RTCPeerConnection
-from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH
+from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH, SackChunk
 from OpenSSL import SSL
 
 from server.data_short_cuts_private import ShortCuts
@@ -41,11 +41,10 @@ def tune_data_transport(pc: RTCPeerConnection) -> None:
     Call after setRemoteDescription(offer), before setLocalDescription. Once per connection.
     """
     if pc.sctp is not None:
-        short_cuts = ShortCuts(pc.sctp)
+        short_cuts = ShortCuts(pc.sctp, _Acknowledgements(pc.sctp).take)
         _drain_dtls(pc.sctp, short_cuts)
         _hasten_sctp(pc.sctp)
         _send_at_once(pc.sctp, short_cuts)
-        _acknowledge_later(pc.sctp)
 
 
 def _drain_dtls(sctp: Any, short_cuts: ShortCuts) -> None:
@@ -152,30 +151,46 @@ def _send_at_once(sctp: Any, short_cuts: ShortCuts) -> None:
     sctp._data_channel_send = send_now
 
 
-def _acknowledge_later(sctp: Any) -> None:
-    """Acknowledge every second packet, or after a while (RFC 9260 6.2), as browsers do.
+class _Acknowledgements:
+    """Acknowledge with the next message, with every second packet, or after a while (RFC 9260 6.2), as browsers do.
 
     At once when something is missing or came twice: the sender is to find out soon.
     """
-    acknowledge = sctp._send_sack
-    timer: asyncio.TimerHandle | None = None
 
-    def late() -> None:
-        nonlocal timer
-        timer = None
-        if sctp.state == "connected":
-            with contextlib.suppress(ConnectionError, SSL.Error):  # the connection ends meanwhile
-                run_now(acknowledge())
+    def __init__(self, sctp: Any) -> None:
+        self._sctp = sctp
+        self._acknowledge = sctp._send_sack
+        self._timer: asyncio.TimerHandle | None = None
+        sctp._send_sack = self._send_soon
 
-    async def acknowledge_soon() -> None:
-        nonlocal timer
-        if timer is None and not sctp._sack_misordered and not sctp._sack_duplicates:
+    def take(self) -> bytes:
+        """The SACK chunk for a packet that leaves now; empty when none is due, or when it is not a plain one."""
+        sctp = self._sctp
+        if self._timer is None and not sctp._sack_needed or sctp._sack_misordered or sctp._sack_duplicates:
+            return b""
+        self._forget()
+        sack = SackChunk()
+        sack.cumulative_tsn = sctp._last_received_tsn
+        sack.advertised_rwnd = max(0, sctp._advertised_rwnd)
+        return bytes(sack)
+
+    async def _send_soon(self) -> None:
+        sctp = self._sctp
+        if self._timer is None and not sctp._sack_misordered and not sctp._sack_duplicates:
             sctp._sack_needed = False
-            timer = asyncio.get_running_loop().call_later(ACKNOWLEDGEMENT_DELAY, late)
+            self._timer = asyncio.get_running_loop().call_later(ACKNOWLEDGEMENT_DELAY, self._send_late)
             return
-        if timer is not None:
-            timer.cancel()
-            timer = None
-        await acknowledge()
+        self._forget()
+        await self._acknowledge()
 
-    sctp._send_sack = acknowledge_soon
+    def _send_late(self) -> None:
+        self._timer = None
+        if self._sctp.state == "connected":
+            with contextlib.suppress(ConnectionError, SSL.Error):  # the connection ends meanwhile
+                run_now(self._acknowledge())
+
+    def _forget(self) -> None:
+        self._sctp._sack_needed = False
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None

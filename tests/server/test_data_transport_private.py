@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSctpTransport, RTCSessionDescription
 from aiortc.rtcdtlstransport import RTCDtlsTransport, State
-from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH, SackChunk, serialize_packet
+from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH, DataChunk, SackChunk, parse_packet, serialize_packet
 
 from server.data_transport_private import (
     RETRANSMISSION_CEILING,
@@ -81,7 +81,7 @@ def lose(sctp: Any, first: int) -> list[bytes]:
     send = dtls._send_data
 
     async def send_or_lose(data: bytes) -> None:
-        if data[12] == 0 and len(lost) < first:  # a DATA chunk (RFC 9260 3.3.1)
+        if len(lost) < first and any(isinstance(chunk, DataChunk) for chunk in parse_packet(data)[3]):
             lost.append(data)
         else:
             await send(data)
@@ -229,6 +229,27 @@ async def test_every_second_packet_is_acknowledged_and_a_single_one_after_a_whil
     async with asyncio.timeout(SOON):
         ends.client.send("single")
         await acknowledged.wait()
+
+
+async def test_an_acknowledgement_travels_with_the_answer(ends: Ends) -> None:
+    await ends.exchange()
+    left: list[bytes] = []
+    dtls: Any = ends.server.transport.transport
+    send = dtls._send_data
+
+    async def watch(data: bytes) -> None:
+        left.append(data)
+        await send(data)
+
+    dtls._send_data = watch
+    ends.server.on("message", lambda text: ends.server.send(f"answer to {text}"))
+    for number in range(5):
+        ends.client.send(str(number))
+        assert await ends.at_client.get() == f"answer to {number}"
+    client: Any = ends.client.transport
+    assert not client._sent_queue
+    chunks = [type(chunk) for data in left for chunk in parse_packet(data)[3]]
+    assert chunks == [SackChunk, DataChunk] * 5
 
 
 async def test_everything_arrives_once_and_in_order_whatever_is_lost(ends: Ends) -> None:
