@@ -9,8 +9,10 @@ from pathlib import Path
 
 import httpx
 import pytest
+from typer.testing import CliRunner
 
-from tests.support.stack import running_stack
+from server.cli import app
+from tests.support.stack import running_fleet, running_stack
 
 LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
 PATIENCE = 30.0  # s
@@ -102,3 +104,31 @@ async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], 
     assert words in err
     assert "Traceback" not in err
     assert "a-password" not in err
+
+
+async def test_up_runs_several_robots_each_with_a_name_and_ends_them_all(tmp_path: Path) -> None:
+    async with running_fleet(tmp_path, {"left": "planar", "right": "planar"}) as fleet:
+        assert set(fleet.robots) == {"left", "right"}
+        async with httpx.AsyncClient(base_url=fleet.console, trust_env=False) as http:
+            token = fleet.operator.partition("#token=")[2]
+            robots = (await http.get("/api/fleet", headers={"Authorization": f"Bearer {token}"})).json()["robots"]
+        assert [(each["name"], each["link"]) for each in robots] == [("left", "up"), ("right", "up")]
+        assert all(list(fleet.events("start", name)) for name in fleet.robots)
+    assert fleet.process.returncode == 0
+    for address in fleet.robots.values():
+        with socket.socket() as probe:
+            assert probe.connect_ex(("127.0.0.1", int(address.rpartition(":")[2]))) != 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        (("serve", "--robot", "A=tcp://127.0.0.1:1"), "bad_robot_name"),
+        (("serve", "--robot", "a=tcp://127.0.0.1:1", "--robot", "a=tcp://127.0.0.1:2"), "robot_named_twice"),
+        (("serve", "--robot", "a=tcp://127.0.0.1:1", "--robot", "tcp://127.0.0.1:2"), "robot_without_name"),
+        (("up", "--robot", "a=planar", "--robot", "a=planar"), "robot_named_twice"),
+    ],
+)
+def test_robots_that_cannot_be_meant_are_refused_by_name(arguments: tuple[str, ...], name: str) -> None:
+    asked = CliRunner().invoke(app, arguments)
+    assert (asked.exit_code, name in asked.stderr) == (2, True)

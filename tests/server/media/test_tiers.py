@@ -8,9 +8,10 @@ import pytest
 
 from robot_bridge.protocol.console import Quality, Report, StreamReport
 from server.media.plane import MediaPlane
+from server.media.quality.desk import LOW_FLOOR_BPS
 from server.media.quality.plan import PicturePlan
 from tests.server.media.feeding import timestamps, value
-from tests.server.media.viewer import HEIGHT, TIMEOUT, WIDTH, Viewer, noise, running_plane, viewing
+from tests.server.media.viewer import HEIGHT, TIMEOUT, WIDTH, Viewer, description, noise, running_plane, viewing
 
 
 def desk(plane: MediaPlane) -> Any:
@@ -189,3 +190,32 @@ async def test_while_the_operators_path_is_paused_no_picture_is_encoded_for_it()
         desk(plane).tick()
         await show(plane, [viewer], 4)
         assert value(plane, "frames_encoded_total", stream="camera0", codec="H264") == 3
+
+
+async def test_a_thumbnail_gets_the_first_camera_alone_in_the_lowest_tier_and_stays_there() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(description(cameras=2)))
+        good = await stack.enter_async_context(viewing(plane, ["video"]))
+        small = await stack.enter_async_context(viewing(plane, ["video", "audio", "video"], thumbnail=True))
+        assert [each.stream for each in small.media.streams] == ["camera0"]
+        assert [each.currentDirection for each in small.pc.getTransceivers()] == ["recvonly", "inactive", "inactive"]
+        await show(plane, [good, small], 1, 2)
+        for _ in range(200):
+            desk(plane).tick()
+        assert (good.media.tier, small.media.tier) == ("high", "low")
+        assert encoders(plane) == 2
+        plan = desk(plane)._plans["low", "camera0"]
+        assert plan.bitrate_bps <= LOW_FLOOR_BPS
+
+
+async def test_thumbnails_do_not_lower_the_tier_of_who_watches_over_a_bad_path() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane())
+        bad = await stack.enter_async_context(viewing(plane, ["video"]))
+        small = await stack.enter_async_context(viewing(plane, ["video"], thumbnail=True))
+        await show(plane, [bad, small], 1, 2)
+        bad.media.quality.path.rate = 300_000
+        for _ in range(11):
+            desk(plane).tick()
+        assert bad.media.tier == "low"
+        assert desk(plane)._plans["low", "camera0"].bitrate_bps > LOW_FLOOR_BPS

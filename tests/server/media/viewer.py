@@ -160,6 +160,7 @@ async def viewing(
     uris: dict[str, int] | None = None,
     priority: bool = False,
     trailer: bool = False,
+    thumbnail: bool = False,
 ) -> AsyncIterator[Viewer]:
     """A viewer whose media are flowing when this returns."""
     pc, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
@@ -170,7 +171,7 @@ async def viewing(
         await pc.setLocalDescription(await pc.createOffer())
         offer = with_extensions(pc.localDescription.sdp, uris or {})
         await server.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-        media = plane.attach(server, offer, priority=priority, trailer=trailer)
+        media = plane.attach(server, offer, priority=priority, trailer=trailer, thumbnail=thumbnail)
         await server.setLocalDescription(await server.createAnswer())
         answer = server.localDescription.sdp
         viewer = Viewer(pc, server, media, answer)
