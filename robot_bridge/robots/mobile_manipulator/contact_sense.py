@@ -22,7 +22,7 @@ TIME_CONSTANT: Final = 0.03  # s of the wrench's low-pass
 
 class ContactReading(NamedTuple):
     wrench: Array  # fx fy fz (N), tx ty tz (N m) on the robot in the mount's frame, unfiltered
-    normal: float  # N, sum of the normal forces of all contacts in the room
+    normal: float  # N, sum of the normal forces of all contacts in the room, the weight of what sleeps among them
     rubbing: float  # N, sum of the friction forces on the robot
 
 
@@ -33,6 +33,9 @@ class ContactSense:
         base = model.body("base").id
         self._is_robot = model.body_rootid[model.geom_bodyid] == base  # per geom
         self._mount = model.body(MOUNT).id
+        moving = model.body_treeid >= 0
+        masses = np.bincount(model.body_treeid[moving], model.body_mass[moving], model.ntree)
+        self._weights = masses * float(np.linalg.norm(model.opt.gravity))  # N, of each thing that moves by itself
         self.wrench: Array = np.zeros(6)
 
     def clear(self) -> None:
@@ -47,7 +50,8 @@ class ContactSense:
     def read(self, data: Any) -> ContactReading:
         contact = data.contact
         rows = contact.efc_address  # of the normal force; -1 for a contact that is not active
-        normal = float(data.efc_force[rows[rows >= 0]].sum())
+        # What sleeps has no contacts: without its weight, waking it would be heard as a blow.
+        normal = float(data.efc_force[rows[rows >= 0]].sum() + self._weights @ (data.tree_asleep >= 0))
         robot = self._is_robot[contact.geom]
         felt = np.flatnonzero((rows >= 0) & (robot[:, 0] != robot[:, 1]))  # equal: none or both are the robot's
         if not felt.size:

@@ -51,3 +51,23 @@ def test_the_wrench_follows_a_step_within_a_tenth_of_a_second(robot: MobileManip
     assert np.abs(sense.wrench).max() < 0.5
     sense.clear()
     assert not sense.wrench.any()
+
+
+def test_what_lies_still_sleeps_and_wakes_when_the_robot_pushes_it_without_a_jump_of_force(driver: Driver) -> None:
+    """Asleep it costs nothing; what is felt and heard of it must not change by that."""
+    model = driver.robot.simulation.model
+    crate = model.body("crate").id
+    driver.run(1.5)
+    assert driver.data.tree_asleep[model.body_treeid[crate]] >= 0
+    before, sense = driver.place("crate"), ContactSense(model)
+    asleep = sense.read(driver.data).normal
+    bearing = float(np.arctan2(before[1], before[0]))
+    forward = {"base_vx": 0.5 * float(np.cos(bearing)), "base_vy": 0.5 * float(np.sin(bearing))}
+    while driver.data.tree_asleep[model.body_treeid[crate]] >= 0:
+        driver.run(0.004, **forward)
+        assert driver.data.time < 20.0
+    assert driver.data.ncon > 0
+    driver.run(1.0, **forward)
+    assert np.linalg.norm(driver.place("crate")[:2] - before[:2]) > 0.2
+    driver.run(3.0)
+    assert sense.read(driver.data).normal == pytest.approx(asleep, rel=0.25)
