@@ -204,7 +204,8 @@ async def test_a_user_who_may_do_no_more_than_the_guide_says_suffices(server: Re
     (rules,) = re.findall(r"An ACL may grant `(.*)` and the commands\n`(.*)`", GUIDE.read_text())
     commands = [f"+{command.lower()}" for command in rules[1].split()]
     async with server.client() as client:
-        await client.execute_command("ACL", "SETUSER", "ann", "on", f">{PASSWORD}", *rules[0].split(), *commands)
+        user = ("ACL", "SETUSER", "ann", "on", f">{PASSWORD}", *rules[0].split(), *commands)
+        await client.execute_command(*user)  # type: ignore[no-untyped-call]
     url = f"redis://ann:{PASSWORD}@127.0.0.1:{server.port}/0"
     async with running_board(url, "one", tile("left")) as one, running_board(url, "two", tile("far")) as two:
         await eventually(lambda: one.others() and two.others(), "the robots")
