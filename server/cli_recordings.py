@@ -108,6 +108,8 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         except PortTaken as error:
             _say(f"{error}; choose another with --port")
             raise typer.Exit(EXIT_PORT_TAKEN) from error
+        except RecordingError as error:
+            raise _usage(str(error)) from error
 
     @app.command()
     def verify(
@@ -155,7 +157,9 @@ async def _replay(path: Path, host: str, port: int, as_json: bool) -> None:
         own_host, own_port = listener.getsockname()[:2]
         url = f"http://{f'[{own_host}]' if ':' in own_host else own_host}:{own_port}"
         link = f"{url}/recordings#token={access.issue('observer', 'replay')}&recording={path.stem}"
-        async with running(create_replay_app(path, access, host), listener):
+        app = create_replay_app(path, access, host)
+        await asyncio.to_thread(app.state.recordings.library.entries)  # so that its index is known when it is asked for
+        async with running(app, listener):
             if as_json:
                 sys.stdout.write(
                     msgspec.json.encode({"console": url, "recording": path.stem, "link": link}).decode() + "\n"

@@ -11,6 +11,7 @@ import "./style/replay_cards.css";
 import "./style/replay_deck.css";
 import { readReplayLink, replayHash, tokenIn } from "./core/replay_link";
 import { ListView } from "./replay/list_view";
+import { startDecoders } from "./replay/picture_decoder";
 import { PlayerView } from "./replay/player_view";
 import { RecordingsApi } from "./replay/recordings_api";
 import { installReplayHook } from "./replay/replay_hook";
@@ -61,6 +62,7 @@ async function route(): Promise<void> {
     return;
   }
   put(message("Opening the recording …", ""));
+  startDecoders();
   const waiting = view;
   try {
     const details = await api.details(link.recording, 0);

@@ -4,8 +4,15 @@ import type { ReplayPicture } from "../core/replay_moment";
 
 const PATIENCE_MS = 250; // for a decoder that gives a picture only when pressed
 
+const USUAL = "avc1.42C01F"; // constrained baseline, as the console encodes
+
 /** Why there is no picture. */
 export class CannotDecode extends Error {}
+
+/** Browsers take a while to start their first decoder: this lets them, while the recording is asked for. */
+export function startDecoders(): void {
+  if ("VideoDecoder" in globalThis) VideoDecoder.isConfigSupported(configOf(USUAL)).catch(() => undefined);
+}
 
 /** Decodes the pictures of one camera, exactly the one that was asked for. */
 export class PictureDecoder {

@@ -20,7 +20,8 @@ const GRID = 0x2c3440;
 const GRID_MIDDLE = 0x424e5e;
 const CELLS = 40;
 const CELL_SHARE = 0.5; // of the robot's radius, at most
-const DISTANCE = 2.7; // of the first look, in the robot's radii
+const DISTANCE = 4.2; // of the first look, in the robot's radii
+const LIFT = 0.012; // of the robot's radius: the squares show on a floor of the robot's own
 const SHARPEST = 2; // device pixels to a CSS pixel
 
 /** Draws one robot on one canvas, when there is something new to draw. Everything is scaled to a robot of radius 1. */
@@ -51,6 +52,7 @@ export class SceneStage {
     this.cell = roundLength(CELL_SHARE * radius);
     this.scale = `small square: ${lengthWords(this.cell)}`;
     this.floor = new GridHelper(CELLS * this.cell, CELLS, GRID_MIDDLE, GRID).rotateX(Math.PI / 2);
+    this.floor.position.z = LIFT * radius;
     this.world.add(this.model.root, this.floor);
     this.world.scale.setScalar(1 / radius);
     const sun = new DirectionalLight(0xffffff, 2.2);
@@ -98,7 +100,8 @@ export class SceneStage {
     this.camera.position.add(moved);
     this.controls.target.add(moved);
     const { x, y } = at.clone().divideScalar(this.world.scale.x);
-    this.floor.position.set(Math.round(x / this.cell) * this.cell, Math.round(y / this.cell) * this.cell, 0);
+    this.floor.position.x = Math.round(x / this.cell) * this.cell;
+    this.floor.position.y = Math.round(y / this.cell) * this.cell;
     this.controls.update();
   }
 
