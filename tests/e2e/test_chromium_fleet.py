@@ -60,6 +60,24 @@ async def _stats(page: Page) -> dict[str, Any]:
     return found
 
 
+async def _until_watched(page: Page, watching: dict[str, int], seconds: float = 20.0) -> None:
+    """Until the console has so many live pictures open for these robots."""
+    asking = """async ([wanted, limit]) => {
+      const token = new URLSearchParams(location.hash.slice(1)).get("token");
+      const end = performance.now() + limit;
+      for (;;) {
+        const answer = await fetch("api/fleet", { headers: { Authorization: `Bearer ${token}` } });
+        const told = Object.fromEntries((await answer.json()).robots.map((robot) => [robot.name, robot.watching]));
+        if (Object.entries(wanted).every(([name, count]) => told[name] === count)) return null;
+        if (performance.now() > end) return JSON.stringify(told);
+        await new Promise((resolve) => setTimeout(resolve, 100));
+      }
+    }"""
+    missed = await page.evaluate(asking, [watching, seconds * 1000])
+    if missed is not None:
+        raise AssertionError(f"never watched as {watching}, but {missed}")
+
+
 async def _names(page: Page) -> list[str]:
     return [robot["name"] for robot in (await _stats(page))["robots"]]
 
@@ -122,6 +140,7 @@ async def test_a_robot_that_is_away_says_so_first_and_stop_reaches_the_others(fl
             await _until(page, "r.left.picture === 'live' && r.middle.picture === 'live'")
             await page.get_by_role("searchbox").fill("left")
             await _until(page, "s.robots.length === 1 && s.open === 1")
+            await _until_watched(page, {"left": 1, "middle": 0})
             await page.keyboard.press("Escape")
             await _until(page, "s.stop && s.stop.stopped.length === 2 && s.stop.tone === 'bad'")
             answer = page.get_by_role("alert")
