@@ -16,8 +16,8 @@ import { RobotModel } from "./robot_model";
 import { addSigns, type SceneState } from "./robot_signs";
 
 const BACKGROUND = 0x10141a;
-const GRID = 0x2c3440;
-const GRID_MIDDLE = 0x424e5e;
+const GRID = 0x4d5a6b;
+const GRID_MIDDLE = 0x66768a;
 const CELLS = 40;
 const CELL_SHARE = 0.5; // of the robot's radius, at most
 const DISTANCE = 4.2; // of the first look, in the robot's radii
