@@ -137,9 +137,9 @@ class Connection:
     async def _go_through(self, ticket: RelayTicket) -> None:
         """Media and feedback come from the relay; the console's connection keeps the data channels alone."""
         wanted = {"video": self.options.video, "audio": int(self.options.audio)}
+        relay = self._relay = RelayMedia(ticket, self._received_from_relay)
         self.options = options = replace(self.options, video=0, audio=False, carrier="trailer")
         self.media = Reception("trailer", options.tolerance, options.gate, self._rendered)
-        relay = self._relay = RelayMedia(ticket, self._received_from_relay)
         await self._peer.close()
         self._peer = self._new_peer(ticket.relay)
         first = [each for kind in wanted for each in [s for s in ticket.streams if s.kind == kind][: wanted[kind]]]

@@ -35,14 +35,14 @@ MAX_MESSAGE = 256 * 1024  # bytes
 
 
 class RelayTicket(msgspec.Struct, frozen=True, kw_only=True):
-    """What GET /api/relay answers."""
+    """What GET /api/relay answers. Of a relay that is no Janus, only `engine` counts."""
 
     engine: str
     relay: str
     url: str
-    room: int
-    pin: str
     feed: int
+    room: int = 0
+    pin: str = ""
     streams: list[StreamInfo]
 
 
@@ -50,6 +50,8 @@ class RelayMedia:
     """Order: `negotiate`, then `take_packets` or `take_raw_rtp`, then `connect`; `run` until `ended`, then `close`."""
 
     def __init__(self, ticket: RelayTicket, on_message: Callable[[str | bytes], None]) -> None:
+        if ticket.engine != "janus":
+            raise ConnectFailed(f"this client watches through a Janus or directly, and not through a {ticket.engine}")
         self.ended = asyncio.Event()
         self.why = ""
         self._ticket = ticket

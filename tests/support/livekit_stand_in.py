@@ -26,6 +26,7 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
+from server.data_transport_private import tune_data_transport
 from server.media.publishing_private import offer_section
 
 __all__ = ["KEY", "SECRET", "LiveKitStandIn", "Member", "livekit_stand_in"]
@@ -303,6 +304,7 @@ class LiveKitStandIn:
         if not member.channels:
             member.channels["_lossy"] = pc.createDataChannel("_lossy", ordered=False, maxRetransmits=0)
             member.channels["_reliable"] = pc.createDataChannel("_reliable")
+            tune_data_transport(pc)
         for other in self._room(member):
             for track in other.tracks:
                 if track.codec and track.info.sid in member.wanted - set(member.outlets):

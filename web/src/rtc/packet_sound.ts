@@ -33,6 +33,9 @@ export class PacketSound implements Section, PacketPlayer {
   private output: GainNode | null = null;
   private decoder: AudioDecoder | null = null;
   private segments: Segment[] = [];
+  // RTP timestamps: decoders give one sound for each packet, with times of their own. Were one left out, what follows
+  // would count as older than it is, never as newer.
+  private decoding: number[] = [];
 
   constructor(private readonly codec: string) {}
 
@@ -75,6 +78,7 @@ export class PacketSound implements Section, PacketPlayer {
 
   private decode(packet: Uint8Array, time: number): void {
     if (this.decoder === null || this.decoder.state === "closed") {
+      this.decoding = [];
       this.decoder = new AudioDecoder({
         output: (decoded) => this.decoded(decoded),
         error: () => undefined, // it is closed then; the next packet makes another
@@ -83,13 +87,15 @@ export class PacketSound implements Section, PacketPlayer {
       this.decoder.configure({ codec: "opus", sampleRate: OPUS_RATE, numberOfChannels });
     }
     const timestamp = Math.round(time * US_PER_TICK);
+    this.decoding.push(time);
     this.decoder.decode(new EncodedAudioChunk({ type: "key", timestamp, data: packet }));
   }
 
   private decoded(data: AudioData): void {
     const samples = new Float32Array(data.numberOfFrames);
     data.copyTo(samples, { planeIndex: 0, format: "f32-planar" });
-    this.play(samples, data.sampleRate, Math.round(data.timestamp / US_PER_TICK));
+    const time = this.decoding.shift();
+    if (time !== undefined) this.play(samples, data.sampleRate, time);
     data.close();
   }
 
