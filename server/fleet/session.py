@@ -87,6 +87,8 @@ class FleetSession:
             except Exception:
                 metrics.session_failures.labels(self.name).inc()
                 log.exception("the session of this robot has failed")
+                if _ending():
+                    return
             self.settled.set()
             if loop.time() - since > HEALTHY_AFTER:
                 self._backoff.healthy()
@@ -119,3 +121,9 @@ class FleetSession:
         else:
             clock = here.console.clock
             self.pulse.look(now, up=here.console.robot.up, epoch=clock.epoch, event=clock.event)
+
+
+def _ending() -> bool:
+    """Whether this task was told to end, and a fault in ending has hidden that."""
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0

@@ -14,6 +14,7 @@ from robot_bridge.protocol.console import Participants, Seat, SeatRequest, Welco
 from robot_bridge.protocol.messages import Command, Stop, StopState
 from robot_bridge.protocol.serial import event_after
 from server.fleet.tiles import FAILED, UNREADABLE
+from server.media.plane import MediaPlane
 from server.recording.recorder import Recorder
 from tests.server.fleet.rig import running_fleet, running_fleet_rig
 from tests.server.rig import PATIENCE, TestPeer, eventually, running_bridge
@@ -383,3 +384,19 @@ async def test_a_robot_whose_directory_cannot_be_made_is_without_a_session_and_t
                 await rig.session("right").console.robot.reached.wait()
             tiles = await rig.tiles()
             assert (tiles["left"]["trouble"], tiles["right"]["link"]) == (FAILED, "up")
+
+
+async def test_a_fault_while_a_session_ends_does_not_keep_the_console_from_ending(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    close = MediaPlane.close
+
+    async def fault(plane: MediaPlane) -> None:
+        await close(plane)
+        raise RuntimeError("a fault of ours")
+
+    monkeypatch.setattr(MediaPlane, "close", fault)
+    async with asyncio.timeout(3 * PATIENCE):
+        async with running_fleet_rig("left", "right") as rig:
+            pass
+    assert all(each.services is None for each in rig.fleet.sessions.values())
