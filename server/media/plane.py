@@ -38,6 +38,7 @@ from server.media.quality.metrics import QualityMetrics
 from server.media.quality.path import RateLimits
 from server.media.quality.peer_quality import CameraLink, PeerQuality
 from server.media.receive_guard_private import guard_transports
+from server.media.receive_turns import ReceiveTurns
 from server.media.recorded_output import FrameTaker, RecordedOutput
 from server.media.settings import MediaSettings
 from server.media.sources.source_url import SourceSpec
@@ -74,6 +75,7 @@ class MediaPlane:
         self._wall_clock = wall_clock
         self._capture_clock = CaptureClock()
         self._fan_out = FanOut(settings.slice_seconds, time.perf_counter)
+        self._turns = ReceiveTurns(time.perf_counter)
         self._quality = QualityDesk(settings, QualityMetrics(metrics_registry))
         self._streams: dict[str, AnyStream] = {}
         self._peers: dict[PeerMedia, None] = {}  # an ordered set
@@ -189,7 +191,7 @@ class MediaPlane:
         first camera alone, in the lowest tier. `voice` takes the peer's own sound, from the first audio section in
         which it would only send.
         """
-        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc())
+        self._guard(pc, None if priority else self._turns)
         extensions = offered_extensions(offer_sdp)
         sources: dict[str, Iterator[AnyStream]] = {
             kind: iter([stream for stream in self._streams.values() if stream.kind == kind][: 1 if thumbnail else None])
@@ -231,7 +233,7 @@ class MediaPlane:
             for stream in self._streams.values()
             for codec in [stream.codec_in_use(camera_codec if stream.kind == "video" else "")]
         ]
-        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc())
+        self._guard(pc, self._turns)
         deliveries: list[Delivery] = []
         peer = PeerMedia(deliveries, self._peer_quality(pc, priority=False), self._detached)
         for stream, codec, transceiver in sections:
@@ -278,6 +280,9 @@ class MediaPlane:
         attached = {self._stream_names[spec.name]: spec for spec in self._attached.values()}
         spec = attached.get(stream.name)
         return spec is not None and spec.passing and spec.size is None
+
+    def _guard(self, pc: RTCPeerConnection, turns: ReceiveTurns | None) -> None:
+        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc(), turns)
 
     def _peer_quality(self, pc: RTCPeerConnection, priority: bool) -> PeerQuality:
         cameras = min(

@@ -11,6 +11,7 @@ aiortc and aioice have no public hooks for that. What is used and why:
 """
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from typing import Any, cast
 
@@ -20,6 +21,7 @@ from aiortc.rtcdtlstransport import RTCDtlsTransport, State
 from aiortc.rtp import is_rtcp
 from OpenSSL import SSL
 
+from server.media.receive_turns import ReceiveTurns
 from server.run_now import run_now
 
 __all__ = ["guard_transports"]
@@ -27,21 +29,24 @@ __all__ = ["guard_transports"]
 RECEIVE_QUEUE_DATAGRAMS = 1024
 HANDSHAKE_DONE = "_RTCDtlsTransport__handshake_done"
 ESTIMATOR = "_RTCRtpReceiver__remote_bitrate_estimator"
+COMPONENT = 1  # of ICE: RTP and RTCP are multiplexed
 DATAGRAM_MAX = 1500  # bytes, what pylibsrtp takes
 
 
 class _Intake(asyncio.Queue[Any]):
-    """Stands in for an ICE connection's receive queue: handles a datagram as it comes.
+    """Stands in for an ICE connection's receive queue: handles a datagram as it comes, or in its turn.
 
     The way through the queue, a task and its coroutines costs more than most datagrams do. Voice goes that way, and so
     does what comes before DTLS is connected, within a bound. What the connection could not use, or what would raise
     further on, is dropped and counted.
     """
 
-    def __init__(self, dtls: Any, on_error: Callable[[str], None]) -> None:
+    def __init__(self, dtls: Any, on_error: Callable[[str], None], turns: ReceiveTurns | None) -> None:
         super().__init__()
         self._dtls = dtls
         self._on_error = on_error
+        self._turns = turns  # None: everything at once
+        self._later: deque[bytes] = deque()  # what waits for its turn
         self._awaited = False
 
     async def get(self) -> Any:
@@ -56,12 +61,22 @@ class _Intake(asyncio.Queue[Any]):
             super().put_nowait(None)
         elif not 0 < len(item[0]) <= DATAGRAM_MAX:
             self._on_error("datagram_size")
-        elif self._is_idle() and self._handled(item[0]):
-            pass
-        elif self.qsize() >= RECEIVE_QUEUE_DATAGRAMS:
+        elif self.qsize() + len(self._later) >= RECEIVE_QUEUE_DATAGRAMS:
             self._on_error("receive_overflow")
-        else:
+        elif not self._is_idle():
             super().put_nowait(item)
+        elif self._turns is not None:
+            self._later.append(item[0])
+            self._turns.add(self)
+        elif not self._handled(item[0]):
+            super().put_nowait(item)
+
+    def handle_next(self) -> bool:
+        """In our turn: one of those that wait; whether there are more."""
+        data = self._later.popleft()
+        if self._dtls._state is State.CONNECTED and not self._handled(data):
+            super().put_nowait((data, COMPONENT))
+        return bool(self._later)
 
     def _is_idle(self) -> bool:
         """Whether DTLS is connected, and waits for just this datagram."""
@@ -101,8 +116,10 @@ class _Intake(asyncio.Queue[Any]):
             run_now(dtls._data_receiver._handle_data(record))
 
 
-def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None]) -> None:
+def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None], turns: ReceiveTurns | None = None) -> None:
     """Keep what a peer sends from ending its connection or filling memory; `on_error` gets a stable name to count.
+
+    With `turns` its datagrams are handled in its turn, without at once.
 
     Call after setRemoteDescription, when the transports exist. Calling it again changes nothing.
     """
@@ -112,7 +129,7 @@ def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None]) -> 
     if pc.sctp is not None:
         transports.add(pc.sctp.transport)
     for transport in transports:
-        _guard_transport(transport, on_error)
+        _guard_transport(transport, on_error, turns)
 
 
 def _estimate_nothing(receiver: RTCRtpReceiver) -> None:
@@ -121,13 +138,13 @@ def _estimate_nothing(receiver: RTCRtpReceiver) -> None:
     setattr(receiver, ESTIMATOR, None)
 
 
-def _guard_transport(dtls: RTCDtlsTransport, on_error: Callable[[str], None]) -> None:
+def _guard_transport(dtls: RTCDtlsTransport, on_error: Callable[[str], None], turns: ReceiveTurns | None) -> None:
     connection = dtls.transport._connection
     if isinstance(connection._queue, _Intake):
         return
     if not hasattr(dtls, HANDSHAKE_DONE):
         raise RuntimeError("aiortc moved __handshake_done; see server/media/receive_guard_private.py")
-    connection._queue = _Intake(dtls, on_error)
+    connection._queue = _Intake(dtls, on_error, turns)
     receive = dtls._recv_next
 
     async def guarded() -> None:

@@ -2,16 +2,18 @@
 
 import asyncio
 import inspect
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
-from aiortc.rtcdtlstransport import RTCDtlsTransport
+from aiortc.rtcdtlstransport import RTCDtlsTransport, State
 
 from server.media.aiortc_private import create_peer_connection
 from server.media.receive_guard_private import HANDSHAKE_DONE, _Intake, guard_transports
+from server.media.receive_turns import ReceiveTurns
 from tests.server.rig import PATIENCE
 
 MOVED = "aiortc moved a private part: see server/media/receive_guard_private.py"
@@ -37,7 +39,7 @@ class Ends:
 
 
 @asynccontextmanager
-async def connected() -> AsyncIterator[Ends]:
+async def connected(turns: ReceiveTurns | None = None) -> AsyncIterator[Ends]:
     client, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
     opened = asyncio.Event()
     errors: list[str] = []
@@ -49,7 +51,7 @@ async def connected() -> AsyncIterator[Ends]:
         async with asyncio.timeout(PATIENCE):
             await client.setLocalDescription(await client.createOffer())
             await server.setRemoteDescription(RTCSessionDescription(client.localDescription.sdp, "offer"))
-            guard_transports(server, errors.append)
+            guard_transports(server, errors.append, turns)
             await server.setLocalDescription(await server.createAnswer())
             await client.setRemoteDescription(RTCSessionDescription(server.localDescription.sdp, "answer"))
             await opened.wait()
@@ -86,7 +88,7 @@ def test_what_is_done_with_a_datagram_is_as_expected() -> None:
 
 def test_before_the_connection_is_up_the_queue_is_bounded_and_still_ends() -> None:
     errors: list[str] = []
-    queue = _Intake(None, errors.append)
+    queue = _Intake(None, errors.append, None)
     for _ in range(3000):
         queue.put_nowait((b"data", 1))
     queue.put_nowait((b"", 1))
@@ -112,6 +114,37 @@ async def test_a_message_is_handled_in_the_turn_that_its_datagram_comes_in(monke
             await exchanged(ends, str(number))
         assert handled.count(True) == 5
         assert ends.errors == []
+
+
+async def test_an_observers_message_is_handled_in_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with connected(ReceiveTurns(time.perf_counter)) as ends:
+        await exchanged(ends, "first")
+        handled: list[bool] = []
+        take = ends.intake.put_nowait
+
+        def put(item: Any) -> None:
+            before = ends.came.qsize()
+            take(item)
+            handled.append(ends.came.qsize() > before)
+
+        monkeypatch.setattr(ends.intake, "put_nowait", put)
+        for number in range(5):
+            await exchanged(ends, str(number))
+        assert len(handled) >= 5
+        assert not any(handled)
+
+
+async def test_what_waits_for_its_turn_is_bounded_and_forgotten_at_the_end() -> None:
+    async with connected(ReceiveTurns(time.perf_counter)) as ends:
+        await exchanged(ends, "first")
+        intake = ends.intake
+        for _ in range(2000):
+            intake.put_nowait((bytes([23]) + bytes(40), 1))
+        assert ends.errors == ["receive_overflow"] * (2000 - 1024)
+        ends.dtls._set_state(State.CLOSED)
+        while intake.handle_next():
+            pass
+        assert set(ends.errors) == {"receive_overflow"}
 
 
 async def test_what_is_not_from_the_peer_is_ignored_and_the_connection_goes_on() -> None:
