@@ -18,6 +18,7 @@ __all__ = ["DEFAULT_ROBOT", "Bridge", "Metrics", "Stack", "available_robots", "r
 
 DEFAULT_ROBOT = "mobile-manipulator"
 ROBOTS = (DEFAULT_ROBOT, "planar")
+TRIES = 30  # for the counters, a Retry-After apart
 MAX_PEERS = 300  # more than any section needs
 
 
@@ -44,7 +45,10 @@ class Stack:
     async def metrics(self) -> "Metrics":
         """The console's counters now; asks again where others at this address have used up its requests."""
         async with httpx.AsyncClient(trust_env=False) as http:
-            while (answer := await http.get(f"{self.url}/metrics")).status_code == httpx.codes.TOO_MANY_REQUESTS:
+            for _ in range(TRIES):
+                answer = await http.get(f"{self.url}/metrics")
+                if answer.status_code != httpx.codes.TOO_MANY_REQUESTS:
+                    break
                 await asyncio.sleep(float(answer.headers["Retry-After"]))
             return Metrics(answer.raise_for_status().text)
 

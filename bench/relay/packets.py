@@ -20,9 +20,9 @@ from client.relay import RelayMedia, RelayTicket
 from robot_bridge.protocol.description import Camera, RobotDescription
 from robot_bridge.protocol.messages import Media
 from server.media.plane import MediaPlane, MediaSettings
+from server.relay.janus_publishing import publish
 from server.relay.janus_room import JanusRoom, RoomKeys
 from server.relay.janus_session import open_janus
-from server.relay.janus_publishing import publish
 
 __all__ = ["main"]
 

@@ -1,8 +1,8 @@
 """50, 100 and 200 observers besides one operator: does each get every picture, what does one cost, who is slowed?
 
 The observers are headless clients in a process of their own; they receive all cameras and the sound, count RTP and
-decode nothing. Their processes have the lowest priority: real ones have machines of their own. The operator drives from a
-third process, before they come and while they are there.
+decode nothing. Their processes have the lowest priority: real ones have machines of their own. The operator drives
+from a third process, before they come and while they are there.
 
 Every picture: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while
 the pictures are counted, at the console's encoder and at each observer. Both counts must grow by the same number.

@@ -19,7 +19,7 @@ from server.media.aiortc_private import (
 )
 from server.media.codec_choice_private import keep_codec
 from server.media.receive_guard_private import guard_transports
-from tests.server.media.viewer import running_plane, viewing
+from tests.server.media.viewer import running_plane, sender_of, viewing
 
 MOVED = "aiortc moved a private part: see server/media/aiortc_private.py"
 
@@ -65,7 +65,7 @@ async def test_a_connected_transport_has_the_parts_that_are_used() -> None:
         pair = dtls.transport._connection._nominated[1]
         assert callable(pair.protocol.transport.sendto), MOVED
         assert pair.remote_addr[0] == "127.0.0.1"
-        assert transceiver.sender is viewer.media._deliveries[0].sender, MOVED
+        assert transceiver.sender is sender_of(viewer), MOVED
         assert cast(Any, transceiver.receiver)._RTCRtpReceiver__rtcp_ssrc == transceiver.sender._ssrc, MOVED
 
 

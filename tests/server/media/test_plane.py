@@ -23,6 +23,7 @@ from tests.server.media.viewer import (
     noise,
     picture,
     running_plane,
+    sender_of,
     sound,
     viewing,
 )
@@ -171,7 +172,7 @@ async def test_a_plane_that_was_never_configured_closes() -> None:
 
 async def test_bandwidth_estimates_are_kept_for_the_stream_they_are_about() -> None:
     async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
-        sender = viewer.media._deliveries[0].sender
+        sender = sender_of(viewer)
         for bitrate, ssrc in ((700_000, sender._ssrc), (5, sender._ssrc ^ 1)):
             fci = pack_remb_fci(bitrate, [ssrc])
             await sender._handle_rtcp_packet(RtcpPsfbPacket(fmt=15, ssrc=1, media_ssrc=0, fci=fci))

@@ -17,6 +17,7 @@ from tests.server.media.viewer import (
     TIMEOUT,
     picture,
     running_plane,
+    sender_of,
     sound,
     viewing,
 )
@@ -129,7 +130,7 @@ async def test_malformed_packets_of_a_peer_are_counted_and_media_flow_on() -> No
         theirs._nominated[1].protocol.datagram_received(b"", ("127.0.0.1", 9))
         await peer.transport._send(b"\x80" + bytes(1600))
         await peer.transport._send(b"\x80" + bytes(40))  # not SRTP
-        sender = viewer.media._deliveries[0].sender
+        sender = sender_of(viewer)
         nack = RtcpRtpfbPacket(fmt=1, ssrc=1, media_ssrc=sender._ssrc, lost=[1, 2, 3])
         await peer._send_rtp(bytes(nack))
         await viewer.until(lambda: viewer.media.stats[viewer.media.streams[0].mid].not_retransmitted == 3)
@@ -165,7 +166,7 @@ async def test_a_sender_without_a_connected_transport_sends_nothing() -> None:
     frame = EncodedFrame(b"x", packetise_sound, keyframe=True, marker=True, stamp=1, capture_time=0.0, media_time=0)
     async with running_plane() as plane:
         async with viewing(plane, ["video"]) as viewer:
-            sender = viewer.media._deliveries[0].sender
+            sender = sender_of(viewer)
         assert sender.transmit(frame) == (0, 0)
         sender.report()
         sender._retransmit_all([1])
@@ -193,7 +194,7 @@ async def test_a_sender_without_a_connected_transport_sends_nothing() -> None:
 async def test_what_encryption_refuses_is_counted_and_the_next_frame_passes() -> None:
     async with running_plane() as plane, viewing(plane, ["video"], priority=True) as viewer:
         await stream(plane, viewer, "video", picture, 2)
-        sender = viewer.media._deliveries[0].sender
+        sender = sender_of(viewer)
         session = cast(Any, sender.transport)._tx_srtp
         sent = viewer.received[-1].packet.sequence_number
         with pytest.MonkeyPatch.context() as patch:

@@ -21,6 +21,7 @@ from tests.server.media.viewer import (
     noise,
     picture,
     running_plane,
+    sender_of,
     sound,
     viewing,
 )
@@ -63,7 +64,7 @@ async def test_a_joining_peer_gets_a_keyframe_with_the_next_picture() -> None:
 async def test_a_storm_of_picture_loss_indications_is_merged() -> None:
     async with running_plane(keyframe_spacing_seconds=0.3) as plane, viewing(plane, ["video"]) as viewer:
         await stream(plane, viewer, "video", picture, 2)
-        sender = viewer.media._deliveries[0].sender
+        sender = sender_of(viewer)
         for i in range(3, 33):  # 0.6 s, one request per picture
             await sender._handle_rtcp_packet(RtcpPsfbPacket(fmt=1, ssrc=1, media_ssrc=sender._ssrc))
             await stream(plane, viewer, "video", picture, 1, first=i)
@@ -189,7 +190,7 @@ async def test_the_operators_packets_leave_before_feed_of_the_next_picture_and_b
         plane = await stack.enter_async_context(running_plane())
         viewers = [await stack.enter_async_context(viewing(plane, ["video"], priority=i == 3)) for i in range(4)]
         for i, viewer in enumerate(viewers):
-            sender = cast(Any, viewer.media._deliveries[0].sender)
+            sender = cast(Any, sender_of(viewer))
 
             def spy(frame: Any, i: int = i, transmit: Any = sender.transmit) -> Any:
                 sent.append("operator" if i == 3 else "observer")

@@ -11,7 +11,17 @@ from server.media.plane import MediaPlane
 from server.media.quality.desk import LOW_FLOOR_BPS
 from server.media.quality.plan import PicturePlan
 from tests.server.media.feeding import timestamps, value
-from tests.server.media.viewer import HEIGHT, TIMEOUT, WIDTH, Viewer, description, noise, running_plane, viewing
+from tests.server.media.viewer import (
+    HEIGHT,
+    TIMEOUT,
+    WIDTH,
+    Viewer,
+    description,
+    noise,
+    running_plane,
+    sender_of,
+    viewing,
+)
 
 
 def desk(plane: MediaPlane) -> Any:
@@ -174,7 +184,7 @@ async def test_with_quality_off_everybody_gets_one_tier_with_everything() -> Non
         observer = await stack.enter_async_context(viewing(plane, ["video"]))
         await show(plane, [operator, observer], 1, 3)
         assert encoders(plane) == 1
-        assert operator.media._deliveries[0].sender._pacer is None
+        assert sender_of(operator)._pacer is None
 
 
 async def test_while_the_operators_path_is_paused_no_picture_is_encoded_for_it() -> None:

@@ -13,7 +13,7 @@ from prometheus_client import CollectorRegistry
 
 from robot_bridge.protocol.description import Axis, Camera, Microphone, RobotDescription
 from robot_bridge.protocol.messages import Media
-from server.media.aiortc_private import create_peer_connection
+from server.media.aiortc_private import MediaSender, create_peer_connection
 from server.media.plane import MediaPlane, MediaSettings, PeerMedia
 
 WIDTH, HEIGHT = 160, 120
@@ -184,6 +184,13 @@ async def viewing(
     finally:
         await server.close()
         await pc.close()
+
+
+def sender_of(viewer: Viewer) -> MediaSender:
+    """What sends the viewer's first stream over RTP."""
+    sender = viewer.media._deliveries[0].sender
+    assert isinstance(sender, MediaSender)
+    return sender
 
 
 def _notify_of_server_input(viewer: Viewer) -> None:

@@ -1,4 +1,4 @@
-"""A real console publishes with LiveKit's real client. Where no server can be had, a stand-in takes it (tests/support)."""
+"""A real console publishes with LiveKit's real client; a stand-in takes it where there is no server (tests/support)."""
 
 import asyncio
 import socket
