@@ -94,6 +94,7 @@ class Viewer:
         self.received: list[Received] = []
         self.lose: Callable[[Received], bool] = lambda received: False
         self._changed = asyncio.Condition()
+        self._changing: set[asyncio.Task[None]] = set()
 
     async def until(self, condition: Callable[[], bool]) -> None:
         """Wait until `condition` holds; it is checked after everything either side receives."""
@@ -103,6 +104,12 @@ class Viewer:
     async def changed(self) -> None:
         async with self._changed:
             self._changed.notify_all()
+
+    def change_soon(self) -> None:
+        """As `changed`, for callers that cannot wait."""
+        task = asyncio.get_running_loop().create_task(self.changed())
+        self._changing.add(task)
+        task.add_done_callback(self._changing.discard)
 
     def of(self, kind: str) -> list[Received]:
         """Packets of the first section of a kind, without retransmissions."""
@@ -196,13 +203,19 @@ def sender_of(viewer: Viewer) -> MediaSender:
 def _notify_of_server_input(viewer: Viewer) -> None:
     """Wake `until` after everything the server receives, too."""
     for transport in {cast(Any, t.receiver.transport) for t in viewer.server.getTransceivers()}:
-        receive = transport._recv_next
+        receive, intake = transport._recv_next, transport.transport._connection._queue
+        handled = intake._handled  # most datagrams do not come to `_recv_next`
 
         async def received(receive: Any = receive) -> None:
             await receive()
             await viewer.changed()
 
+        def handled_and_told(data: bytes, handled: Any = handled) -> bool:
+            viewer.change_soon()
+            return bool(handled(data))
+
         transport._recv_next = received
+        intake._handled = handled_and_told
 
 
 def _answered(answer: str) -> dict[str, int]:
