@@ -35,13 +35,16 @@ RECORD = 1500  # bytes, the most that a DTLS record carries here
 WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
 
 
-def tune_data_transport(pc: RTCPeerConnection) -> None:
+def tune_data_transport(pc: RTCPeerConnection, *, observes: bool = False) -> None:
     """Let data channels take what has come, and find out about a loss soon. Nothing to do for a peer without any.
+
+    Who `observes` has few acknowledgements. Somebody who drives has one for each packet: where some are lost, what he
+    may send must not wait for the next.
 
     Call after setRemoteDescription(offer), before setLocalDescription. Once per connection.
     """
     if pc.sctp is not None:
-        short_cuts = ShortCuts(pc.sctp, _Acknowledgements(pc.sctp).take)
+        short_cuts = ShortCuts(pc.sctp, _Acknowledgements(pc.sctp).take if observes else bytes)
         _drain_dtls(pc.sctp, short_cuts)
         _hasten_sctp(pc.sctp)
         _send_at_once(pc.sctp, short_cuts)

@@ -160,7 +160,7 @@ async def _negotiate(
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
             await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-            tune_data_transport(pc)
+            tune_data_transport(pc, observes=identity.role == "observer")
             line = here.voice.line(identity.role)
             media = here.media.attach(
                 pc,

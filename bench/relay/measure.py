@@ -17,6 +17,7 @@ ROOMY = {"max_peers": "500", "max_unconnected": "500", "max_offer_burst": "2000"
 SETTLE = 3.0  # s
 BACK_SECONDS = 30.0  # that a page may take at most to be measured at all
 CROWD_SECONDS = 400.0
+NICE = ("nice", "-n", "19")  # observers have machines of their own, and take what the others leave
 
 
 async def hop_delays(folder: Path, seconds: float) -> dict[str, list[float]]:
@@ -80,7 +81,7 @@ async def crowd(folder: Path, counts: Sequence[int], seconds: float, say: Callab
         for count in counts:
             if audience is not None:
                 await audience.end()
-            command = [sys.executable, "-m", "bench.relay.audience", stage.links["observer"], str(count)]
+            command = [*NICE, sys.executable, "-m", "bench.relay.audience", stage.links["observer"], str(count)]
             audience = await stage.start("robot", command)
             await audience.line(r'"connected"', CROWD_SECONDS)
             await asyncio.sleep(SETTLE)

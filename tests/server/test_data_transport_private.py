@@ -51,7 +51,7 @@ async def ends() -> AsyncIterator[Ends]:
 
 
 @asynccontextmanager
-async def connected() -> AsyncIterator[Ends]:
+async def connected(*, observes: bool = True) -> AsyncIterator[Ends]:
     """The server's side is tuned, the client's is plain aiortc. Sections are bundled, as browsers do."""
     client, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
     there: asyncio.Future[RTCDataChannel] = asyncio.get_running_loop().create_future()
@@ -64,7 +64,7 @@ async def connected() -> AsyncIterator[Ends]:
         async with asyncio.timeout(PATIENCE):
             await client.setLocalDescription(await client.createOffer())
             await server.setRemoteDescription(RTCSessionDescription(client.localDescription.sdp, "offer"))
-            tune_data_transport(server)
+            tune_data_transport(server, observes=observes)
             await server.setLocalDescription(await server.createAnswer())
             await client.setRemoteDescription(RTCSessionDescription(server.localDescription.sdp, "answer"))
             await opened.wait()
@@ -229,6 +229,25 @@ async def test_every_second_packet_is_acknowledged_and_a_single_one_after_a_whil
     async with asyncio.timeout(SOON):
         ends.client.send("single")
         await acknowledged.wait()
+
+
+async def test_who_drives_has_an_acknowledgement_for_each_packet() -> None:
+    async with connected(observes=False) as ends:
+        await ends.exchange()
+        server: Any = ends.server.transport
+        sent: list[int] = []
+        send = server._send_chunk
+
+        async def watch(chunk: Any) -> None:
+            if isinstance(chunk, SackChunk):
+                sent.append(chunk.cumulative_tsn)
+            await send(chunk)
+
+        server._send_chunk = watch
+        for number in range(10):
+            ends.client.send(str(number))
+            assert await ends.at_server.get() == str(number)
+        assert len(sent) == 10
 
 
 async def test_an_acknowledgement_travels_with_the_answer(ends: Ends) -> None:
