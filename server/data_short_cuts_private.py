@@ -109,6 +109,7 @@ class ShortCuts:
             and sctp._forward_tsn_chunk is None
             and sctp._fast_recovery_exit is None
             and not sctp._forward_tsn_streams
+            and not uint32_gt(sctp._advanced_peer_ack_tsn, sctp._last_sacked_tsn)
             and not any(chunk._retransmit or chunk._abandoned for chunk in sctp._sent_queue)
         )
 

@@ -32,7 +32,9 @@ RETRANSMISSION_START = 0.5  # s before the first measured round trip
 CONNECT_CEILING = 3.0  # s, to which the interval grows while nobody answers; aiortc gives up after eight
 ACKNOWLEDGEMENT_DELAY = 0.15  # s; RFC 9260 6.2 allows 0.5 and recommends 0.2
 RECORD = 1500  # bytes, the most that a DTLS record carries here
-WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
+# Bytes that may be unacknowledged whatever was lost: the answers to two salvos of a command's copies. Else the newest
+# feedback waits for a timeout behind answers that are lost.
+WINDOW_FLOOR = 24 * USERDATA_MAX_LENGTH
 
 
 def tune_data_transport(pc: RTCPeerConnection, *, observes: bool = False) -> None:
@@ -59,6 +61,7 @@ def _drain_dtls(sctp: Any, short_cuts: ShortCuts) -> None:
         while record is not None:
             if not short_cuts.take(record):
                 await handle(record)
+                sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
             record = _next_record(sctp.transport)
 
     sctp._handle_data = handle_all
@@ -97,6 +100,8 @@ def _hasten_sctp(sctp: Any) -> None:
     def expired_sending() -> None:
         expire_sending()
         sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
+        # What waited behind it; aiortc would wait for an acknowledgement.
+        asyncio.get_running_loop().call_soon(sctp._data_channel_flush)
 
     async def transmit_or_not() -> None:
         # Not around single packets: the end of the connection must keep aiortc from starting its timer again.
