@@ -131,7 +131,8 @@ async def healthz(request: Request) -> Response:
 
 @router.get("/metrics")
 async def metrics(request: Request) -> Response:
-    text = services(request).metrics_text()
+    here = services(request)
+    text = await here.metrics.exposition.text(here.collect)
     return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})
 
 

@@ -32,16 +32,17 @@ RETRANSMISSION_START = 0.5  # s before the first measured round trip
 CONNECT_CEILING = 3.0  # s, to which the interval grows while nobody answers; aiortc gives up after eight
 ACKNOWLEDGEMENT_DELAY = 0.15  # s; RFC 9260 6.2 allows 0.5 and recommends 0.2
 RECORD = 1500  # bytes, the most that a DTLS record carries here
-# Bytes that may be unacknowledged whatever was lost: the answers to two salvos of a command's copies. Else the newest
-# feedback waits for a timeout behind answers that are lost.
-WINDOW_FLOOR = 24 * USERDATA_MAX_LENGTH
+WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
+# The same for who drives, whatever was lost: the answers to two salvos of a command's copies. Else the newest feedback
+# waits for a timeout behind answers that are lost.
+DRIVING_WINDOW_FLOOR = 24 * USERDATA_MAX_LENGTH
 
 
 def tune_data_transport(pc: RTCPeerConnection, *, observes: bool = False) -> None:
     """Let data channels take what has come, and find out about a loss soon. Nothing to do for a peer without any.
 
-    Who `observes` has few acknowledgements. Somebody who drives has one for each packet: where some are lost, what he
-    may send must not wait for the next.
+    Who `observes` has few acknowledgements, and a small window after a loss. Somebody who drives has an acknowledgement
+    for each packet and a window of his own: where some are lost, neither what he sends nor his feedback may wait.
 
     Call after setRemoteDescription(offer), before setLocalDescription. Once per connection.
     """
@@ -49,6 +50,8 @@ def tune_data_transport(pc: RTCPeerConnection, *, observes: bool = False) -> Non
         short_cuts = ShortCuts(pc.sctp, _Acknowledgements(pc.sctp).take if observes else bytes)
         _drain_dtls(pc.sctp, short_cuts)
         _hasten_sctp(pc.sctp)
+        if not observes:
+            _keep_window(pc.sctp)
         _send_at_once(pc.sctp, short_cuts)
 
 
@@ -61,7 +64,6 @@ def _drain_dtls(sctp: Any, short_cuts: ShortCuts) -> None:
         while record is not None:
             if not short_cuts.take(record):
                 await handle(record)
-                sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
             record = _next_record(sctp.transport)
 
     sctp._handle_data = handle_all
@@ -100,8 +102,6 @@ def _hasten_sctp(sctp: Any) -> None:
     def expired_sending() -> None:
         expire_sending()
         sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
-        # What waited behind it; aiortc would wait for an acknowledgement.
-        asyncio.get_running_loop().call_soon(sctp._data_channel_flush)
 
     async def transmit_or_not() -> None:
         # Not around single packets: the end of the connection must keep aiortc from starting its timer again.
@@ -109,11 +109,29 @@ def _hasten_sctp(sctp: Any) -> None:
             await transmit()
 
     sctp._rto = RETRANSMISSION_START
-    sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
     sctp._update_rto = update
     sctp._t1_expired = expired_connecting
     sctp._t3_expired = expired_sending
     sctp._transmit = transmit_or_not
+
+
+def _keep_window(sctp: Any) -> None:
+    """Nothing that is lost may keep the newest feedback from who drives."""
+    handle, expire_sending = sctp._handle_data, sctp._t3_expired
+
+    async def handle_and_keep(data: bytes) -> None:
+        await handle(data)
+        sctp._cwnd = max(sctp._cwnd, DRIVING_WINDOW_FLOOR)
+
+    def expired_sending() -> None:
+        expire_sending()
+        sctp._cwnd = max(sctp._cwnd, DRIVING_WINDOW_FLOOR)
+        # What waited behind it; aiortc would wait for an acknowledgement.
+        asyncio.get_running_loop().call_soon(sctp._data_channel_flush)
+
+    sctp._cwnd = max(sctp._cwnd, DRIVING_WINDOW_FLOOR)
+    sctp._handle_data = handle_and_keep
+    sctp._t3_expired = expired_sending
 
 
 def _send_at_once(sctp: Any, short_cuts: ShortCuts) -> None:

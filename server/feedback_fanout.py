@@ -12,7 +12,7 @@ from typing import Protocol
 
 __all__ = ["FeedbackFanout", "FeedbackPace", "FeedbackReceiver"]
 
-SLICE = 4  # observers served in one turn of the loop
+SLICE = 2  # observers served in one turn of the loop
 FULL_RATE = 50  # observers that are served at the full rate
 LEAST_RATE = 0.5  # of the full rate
 

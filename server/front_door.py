@@ -12,11 +12,12 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from server.errors import ConsoleError, HostRefused, TooManyRequests, http_error
 from server.rate_limits import RateLimits
+from server.request_turns import RequestTurns
 from server.robot_paths import below_robot
 
 __all__ = ["FrontDoor", "HostNames", "client_address"]
 
-# A stop is never turned away; a health check must not fail for others' floods.
+# A stop is never turned away and never waits; a health check must not fail for others' floods.
 UNLIMITED = ("/api/stop", "/api/fleet/stop", "/healthz", "/readyz")
 POLICY_VIOLATION = 1008  # RFC 6455 7.4.1
 
@@ -61,6 +62,7 @@ class FrontDoor:
         self._requests = requests
         self._count = count
         self._clock = clock
+        self._turns = RequestTurns()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -72,14 +74,18 @@ class FrontDoor:
             self._count(scope, http_error(error).name)
             await _refuse(scope, send, error)
         else:
+            if not _is_unlimited(scope):
+                await self._turns.take(client_address(scope))
             await self._app(scope, receive, send)
 
     def _check(self, scope: Scope) -> None:
         self._hosts.check(Headers(scope=scope).get("host"))
-        if below_robot(scope["path"]) not in UNLIMITED and not self._requests.spend(
-            client_address(scope), self._clock()
-        ):
+        if not _is_unlimited(scope) and not self._requests.spend(client_address(scope), self._clock()):
             raise TooManyRequests("too many requests from this address")
+
+
+def _is_unlimited(scope: Scope) -> bool:
+    return below_robot(scope["path"]) in UNLIMITED
 
 
 def client_address(scope: Scope) -> str:

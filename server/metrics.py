@@ -2,7 +2,9 @@
 
 from collections import Counter as Totals
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
+
+from server.exposition import Exposition
 
 __all__ = ["Metrics"]
 
@@ -13,6 +15,7 @@ class Metrics:
     def __init__(self, *, process: bool = True) -> None:
         """`process`: with what the whole process uses."""
         self.registry = CollectorRegistry()
+        self.exposition = Exposition(self.registry)
         self._robot_bad_input: Totals[str] = Totals()
         self._robot_drops: Totals[str] = Totals()
         self._audit = (0, 0)
@@ -68,7 +71,3 @@ class Metrics:
         self.audit_lost.inc(lost - self._audit[0])
         self.audit_failures.inc(failures - self._audit[1])
         self._audit = (lost, failures)
-
-    def text(self) -> bytes:
-        """The exposition format, version 0.0.4."""
-        return generate_latest(self.registry)

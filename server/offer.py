@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 MAX_SECTIONS = 40  # media sections
-MAX_CANDIDATES = 100
+MAX_CANDIDATES = 100  # of a section
 DEFAULT_MESSAGE_SIZE = "a=max-message-size:65536"
 ICE_USERNAME = re.compile(r"[A-Za-z0-9+/]{4,256}")
 ICE_PASSWORD = re.compile(r"[A-Za-z0-9+/]{22,256}")
@@ -36,6 +36,7 @@ def prepare_offer(text: str) -> str:
         BadSdp: not an offer that can be answered.
     """
     lines = text.splitlines()
+    _count(lines)
     kept = [line for line in lines if not (line.startswith("a=candidate:") and ".local " in line)]
     if len(kept) != len(lines):
         kept = [line for line in kept if line != "a=end-of-candidates"]
@@ -50,12 +51,19 @@ def prepare_offer(text: str) -> str:
     return prepared
 
 
+def _count(lines: Sequence[str]) -> None:
+    """Before aiortc's parser, which takes longer over thousands of them than an operator's message may wait."""
+    sections = sum(line.startswith("m=") for line in lines)
+    if sections > MAX_SECTIONS:
+        raise BadSdp(f"more than {MAX_SECTIONS} media sections")
+    if sum(line.startswith("a=candidate:") for line in lines) > max(1, sections) * MAX_CANDIDATES:
+        raise BadSdp(f"more than {MAX_CANDIDATES} candidates")
+
+
 def _check(text: str) -> None:
     description = _parsed(text)
     if not description.media:
         raise BadSdp("the offer has no media section")
-    if len(description.media) > MAX_SECTIONS:
-        raise BadSdp(f"more than {MAX_SECTIONS} media sections")
     if sum(media.kind == "application" for media in description.media) > 1:
         raise BadSdp("more than one data channel section")
     mids = [media.rtp.muxId for media in description.media]

@@ -50,11 +50,6 @@ class Services:
     def guard(self) -> Guard:
         return self.house.guard
 
-    def metrics_text(self) -> bytes:
-        """All that is counted here, in the exposition format."""
-        self.collect()
-        return self.metrics.text()
-
     def collect(self) -> None:
         """Bring into the metrics what is counted elsewhere."""
         self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())

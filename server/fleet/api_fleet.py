@@ -132,7 +132,8 @@ async def readyz(request: Request) -> Response:
 
 @router.get("/metrics")
 async def metrics(request: Request) -> Response:
-    text = fleet_of(request).metrics.text()
+    metrics = fleet_of(request).metrics
+    text = await metrics.exposition.text(metrics.collect)
     return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})
 
 

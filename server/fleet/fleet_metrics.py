@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Iterator
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, ProcessCollector, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, ProcessCollector
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 from prometheus_client.samples import Sample
 
+from server.exposition import Exposition
 from server.services import Services
 
 __all__ = ["FleetMetrics"]
@@ -23,6 +24,7 @@ class FleetMetrics:
         )
         self.internal_errors = Counter("lockstep_internal_errors", "Our own faults", ["where"], registry=self._own)
         self.registry = CollectorRegistry()
+        self.exposition = Exposition(self.registry)
         ProcessCollector(registry=self.registry)
         self.robots = Gauge("lockstep_fleet_robots", "Robots of this console", registry=self.registry)
         self.session_failures = Counter(
@@ -40,11 +42,10 @@ class FleetMetrics:
     def forget(self, robot: str) -> None:
         self._sessions.pop(robot, None)
 
-    def text(self) -> bytes:
-        """The exposition format, version 0.0.4."""
+    def collect(self) -> None:
+        """Bring into the metrics of all robots what is counted elsewhere."""
         for session in self._sessions.values():
             session.collect()
-        return generate_latest(self.registry)
 
 
 class _Together(Collector):

@@ -7,7 +7,7 @@ from typing import Protocol
 
 __all__ = ["ReceiveTurns", "Waiting"]
 
-SLICE = 0.001  # s
+SLICE = 0.00025  # s; each of the operator's messages waits for one or two of them
 
 
 class Waiting(Protocol):

@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from scripts.generate_dashboard import PATH as DASHBOARD
@@ -21,7 +22,7 @@ def _known() -> set[str]:
     metrics = Metrics()
     MediaMetrics(metrics.registry)
     names: set[str] = set()
-    for family in text_string_to_metric_families(metrics.text().decode()):
+    for family in text_string_to_metric_families(generate_latest(metrics.registry).decode()):
         suffixes = {"counter": ["_total"], "histogram": ["_bucket", "_sum", "_count"]}.get(family.type, [""])
         names |= {family.name + suffix for suffix in suffixes}
     return names

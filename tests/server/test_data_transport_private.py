@@ -13,6 +13,7 @@ from aiortc.rtcdtlstransport import RTCDtlsTransport, State
 from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH, DataChunk, SackChunk, parse_packet, serialize_packet
 
 from server.data_transport_private import (
+    DRIVING_WINDOW_FLOOR,
     RETRANSMISSION_CEILING,
     RETRANSMISSION_FLOOR,
     WINDOW_FLOOR,
@@ -141,8 +142,21 @@ async def test_the_console_tunes_its_connections() -> None:
     async with running_rig() as rig, rig.peer("observer"):
         (peer,) = rig.services.console.peers
         sctp: Any = peer.pc.sctp
-        assert sctp._cwnd >= WINDOW_FLOOR
         assert sctp._rto < SOON
+
+
+async def test_who_drives_has_a_window_that_no_loss_makes_smaller_and_who_observes_has_not() -> None:
+    async with running_rig() as rig, rig.peer("operator"), rig.peer("observer"):
+        windows = dict[str, list[int]]()
+        for peer in rig.services.console.peers:
+            sctp: Any = peer.pc.sctp
+            windows[peer.role] = [sctp._cwnd]
+            sctp._t3_cancel()
+            sctp._t3_expired()
+            windows[peer.role].append(sctp._cwnd)
+        assert all(window >= DRIVING_WINDOW_FLOOR for window in windows["operator"])
+        assert all(window < DRIVING_WINDOW_FLOOR for window in windows["observer"])
+        assert windows["observer"][1] >= WINDOW_FLOOR
 
 
 async def test_every_record_that_waits_is_delivered_at_once(ends: Ends) -> None:

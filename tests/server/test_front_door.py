@@ -1,5 +1,7 @@
 """Host names, and requests of an address; over real HTTP where the console's own answer matters."""
 
+import asyncio
+
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
@@ -91,3 +93,26 @@ async def test_a_websocket_for_a_foreign_name_is_closed_and_other_scopes_pass() 
     assert passed == ["lifespan"]
     assert sent == [{"type": "websocket.close", "code": 1008}]
     assert counted == ["host_refused"]
+
+
+async def test_a_stop_does_not_wait_for_the_turn_of_others() -> None:
+    order: list[str] = []
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        order.append(scope["path"])
+
+    async def receive() -> Message:
+        raise AssertionError("nothing to receive")
+
+    async def send(message: Message) -> None:
+        raise AssertionError("nothing to send")
+
+    door = FrontDoor(app, HostNames(()), RateLimits(1, 9), lambda scope, name: None, lambda: 0.0)
+    paths = ("/api/session", "/metrics", "/api/invitations", "/api/stop")
+    requests = [
+        asyncio.create_task(door({"type": "http", "path": path, "headers": [(b"host", b"localhost")]}, receive, send))
+        for path in paths
+    ]
+    await asyncio.gather(*requests)
+    assert order.index("/api/stop") < order.index("/metrics")
+    assert sorted(order) == sorted(paths)

@@ -12,8 +12,8 @@ def test_what_the_links_count_is_added_once() -> None:
     assert found("lockstep_dropped_total", {"queue": "robot overview"}) == 5
 
 
-def test_two_consoles_in_one_process_count_apart() -> None:
+async def test_two_consoles_in_one_process_count_apart() -> None:
     first, second = Metrics(), Metrics()
     first.resets.inc()
-    assert b"lockstep_resets_total 1.0" in first.text()
-    assert b"lockstep_resets_total 0.0" in second.text()
+    assert b"lockstep_resets_total 1.0" in await first.exposition.text()
+    assert b"lockstep_resets_total 0.0" in await second.exposition.text()
