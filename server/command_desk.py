@@ -85,6 +85,12 @@ class CommandDesk:
     def in_flight(self) -> Command | None:
         return self._in_flight
 
+    @property
+    def latched(self) -> Stop | None:
+        """The stop that holds or is still to arrive; None when there is none."""
+        held = self._clock.stop
+        return self._unconfirmed_stop or (Stop(by=held.by, reason=held.reason) if held.stopped else None)
+
     def link_up(self, description: RobotDescription) -> Stop | None:
         """Returns a stop that nobody knows to have arrived: send it first of all."""
         self._description = description
@@ -95,9 +101,7 @@ class CommandDesk:
     def epoch_ends(self) -> None:
         """Call before the clock begins another epoch: a bridge that starts anew must not release a latched stop."""
         self._sent_event = 0
-        stop = self._clock.stop
-        if stop.stopped:
-            self._unconfirmed_stop = self._unconfirmed_stop or Stop(by=stop.by, reason=stop.reason)
+        self._unconfirmed_stop = self.latched
 
     def link_down(self) -> None:
         self._link_is_up = False

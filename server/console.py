@@ -131,6 +131,10 @@ class Console:
 
     # what peers and HTTP ask for
 
+    @property
+    def latched_stop(self) -> Stop | None:
+        return self._desk.latched
+
     def stop(self, by: Actor, where: str, reason: str) -> bool:
         """Latch the stop. False when no link lives: then it is sent as soon as one does, before all else."""
         self._metrics.stops.labels(where).inc()

@@ -1,11 +1,13 @@
 """What the routes of one robot need, made by its session."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from fastapi import Request
 from starlette.requests import HTTPConnection
 
 from server.access import Access, Identity
+from server.audit import Actor
 from server.audit_log import AuditLog
 from server.console import Console
 from server.errors import RobotFailed, SceneUnavailable
@@ -22,7 +24,18 @@ from server.settings import Settings
 from server.state import ConsoleState
 from server.voice import VoiceService
 
-__all__ = ["Services", "authorized", "services"]
+__all__ = ["Services", "TakesStops", "authorized", "services", "takes_stops"]
+
+
+class TakesStops(Protocol):
+    """Whom a STOP of one robot is said to."""
+
+    @property
+    def access(self) -> Access: ...
+
+    def stop(self, by: Actor, where: str, reason: str) -> tuple[bool, int]:
+        """Whether the robot was told, else the stop is kept; and its event."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +63,10 @@ class Services:
     def guard(self) -> Guard:
         return self.house.guard
 
+    def stop(self, by: Actor, where: str, reason: str) -> tuple[bool, int]:
+        """Whether the robot was told, else the stop is kept; and its event."""
+        return self.console.stop(by, where, reason), self.console.clock.event
+
     def collect(self) -> None:
         """Bring into the metrics what is counted elsewhere."""
         self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
@@ -70,6 +87,12 @@ def services(connection: HTTPConnection) -> Services:
     if not isinstance(found, Services):
         raise TypeError("the app is not running")
     return found
+
+
+def takes_stops(connection: HTTPConnection) -> TakesStops:
+    """In a fleet there is somebody also while the session has failed."""
+    keeper: TakesStops | None = getattr(connection.app.state, "stop_keeper", None)
+    return services(connection) if keeper is None else keeper
 
 
 def authorized(request: Request) -> Identity:

@@ -13,6 +13,7 @@ from server.robot_paths import ROBOTS
 __all__ = ["FLEET_OPERATIONS", "fleet_openapi"]
 
 ROBOT = Parameter("robot", "path", {"type": "string", "pattern": f"^{NAME_PATTERN}$"}, required=True)
+STOP = "/api/stop"  # is taken, and kept, also while the robot's session has failed
 LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS})
 
 FLEET_OPERATIONS: tuple[Operation, ...] = (
@@ -38,7 +39,7 @@ def fleet_openapi() -> dict[str, Any]:
     of_robots = [
         each._replace(
             path=f"{ROBOTS}/{{robot}}{each.path}",
-            errors=(*each.errors, NotFound, RobotFailed),
+            errors=(*each.errors, NotFound, *(() if each.path == STOP else (RobotFailed,))),
             parameters=(ROBOT, *each.parameters),
         )
         for each in OPERATIONS

@@ -267,6 +267,18 @@ def test_a_bridge_that_starts_anew_is_stopped_again_if_the_last_one_was() -> Non
     assert bench.desk.command("me", _command(2)) == Forward(_command(2))
 
 
+def test_what_is_latched_is_the_stop_that_holds_or_is_still_to_arrive() -> None:
+    bench = Bench()
+    assert bench.desk.latched is None
+    bench.desk.stop("any", "smoke", 0.0)
+    assert bench.desk.latched == Stop(by="any", reason="smoke")
+    bench.hear(_feedback(7, 2, stopped=True))
+    assert bench.desk.latched == Stop(by="", reason=""), "as the robot says it"
+    bench.desk.reset("me")
+    bench.hear(_feedback(7, 3))
+    assert bench.desk.latched is None
+
+
 def test_a_stop_that_was_reset_before_any_feedback_showed_it_is_over() -> None:
     bench = Bench()
     bench.desk.stop("any", "", 0.0)

@@ -10,7 +10,9 @@ from typing import Any
 import httpx
 from aiortc import RTCPeerConnection
 
-from robot_bridge.protocol.console import Role
+from robot_bridge.protocol.console import Role, Seat, SeatRequest
+from robot_bridge.protocol.messages import Command
+from robot_bridge.protocol.serial import event_after
 from server.fleet.fleet import Fleet
 from server.fleet.fleet_app import create_fleet_app
 from server.fleet.robots import robot_settings
@@ -21,7 +23,7 @@ from server.settings import Settings
 from server.state import ConsoleState, open_state
 from tests.server.rig import PATIENCE, Rig, TestPeer, running_bridge
 
-__all__ = ["FleetRig", "running_fleet", "running_fleet_rig"]
+__all__ = ["FleetRig", "drive_once", "running_fleet", "running_fleet_rig"]
 
 
 @dataclass
@@ -113,3 +115,14 @@ async def running_fleet_rig(*names: str, **settings: Any) -> AsyncIterator[Fleet
         rig = await stack.enter_async_context(running_fleet(ports, **settings))
         await rig.all_reached()
         yield rig
+
+
+async def drive_once(peer: TestPeer) -> int:
+    """Take the seat, and one event that moves nothing; its number."""
+    peer.send("session", SeatRequest())
+    await peer.until(lambda each: isinstance(each, Seat) and each.holder != "")
+    now = await peer.feedback()
+    following = event_after(now.event)
+    peer.send("control", Command(event=following, issue=now.issue, values=[0.0] * len(now.axes)))
+    await peer.feedback(lambda each: each.event == following)
+    return following

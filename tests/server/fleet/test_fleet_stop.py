@@ -1,0 +1,72 @@
+"""STOP for all robots of a console."""
+
+import pytest
+
+from robot_bridge.protocol.messages import StopState
+from server.fleet.tiles import UNREADABLE
+from tests.server.fleet.rig import running_fleet, running_fleet_rig
+from tests.server.rig import eventually, running_bridge
+
+
+async def test_stop_for_all_stops_those_that_the_link_is_good_for() -> None:
+    async with running_fleet_rig("left", "right", "third") as rig, rig.peer("left", "observer") as peer:
+        answer = await rig.http.post(
+            "/api/fleet/stop", headers=rig.token("observer", "left", "right"), json={"reason": "enough"}
+        )
+        stopped = {each["name"]: each["delivered"] for each in answer.json()["robots"]}
+        assert (answer.status_code, stopped) == (200, {"left": True, "right": True})
+        for name in ("left", "right"):
+            await eventually(lambda name=name: rig.session(name).console.clock.stop.stopped)  # type: ignore[misc]
+        assert rig.session("left").console.clock.stop == StopState(stopped=True, by="observer", reason="enough")
+        assert (await peer.feedback(lambda each: each.stop.stopped)).stop.reason == "enough"
+        assert not rig.session("third").console.clock.stop.stopped
+        tiles = await rig.tiles()
+        assert [tiles[name]["stopped"] for name in tiles] == [True, True, False]
+        nobody = await rig.http.post("/api/fleet/stop", headers=rig.token("observer", "middle"))
+        assert (nobody.status_code, nobody.json()["error"]) == (403, "link_other_robot")
+
+
+async def test_a_robot_that_is_away_keeps_its_stop_and_holds_up_no_other() -> None:
+    async with running_bridge() as here, running_bridge() as away:
+        port = away.address[1]
+        async with running_fleet({"here": here.address[1], "away": port}) as rig:
+            await rig.all_reached()
+            await away.close()
+            console = rig.session("away").console
+            await eventually(lambda: not console.robot.up)
+            answer = await rig.http.post("/api/fleet/stop", headers=rig.token("operator"))
+            found = {each["name"]: each for each in answer.json()["robots"]}
+            assert (found["here"]["delivered"], found["away"]["delivered"]) == (True, False)
+            assert "kept" in found["away"]["detail"]
+            health = (await rig.http.get("/healthz")).json()
+            assert (health["status"], health["robots"]["here"]["robot_link"]) == ("degraded", "up")
+            ready = await rig.http.get("/readyz")
+            assert (ready.status_code, ready.json()) == (200, {"ready": True, "unreachable": ["away"]})
+            tile = (await rig.tiles())["away"]
+            assert tile["link"] == "down"
+            assert tile["detail"]
+            async with running_bridge(port):
+                await eventually(lambda: console.clock.stop.stopped)
+
+
+async def test_a_fault_in_showing_or_stopping_one_robot_hides_and_spares_no_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fault(*_: object) -> bool:
+        raise RuntimeError("a fault of ours")
+
+    async with running_fleet_rig("left", "right") as rig:
+        monkeypatch.setattr(rig.session("left").console, "stop", fault)
+        monkeypatch.setattr(rig.session("left").recorder, "state", fault)
+        assert (await rig.tiles())["left"]["trouble"] == UNREADABLE
+        answer = await rig.http.post("/api/fleet/stop", headers=rig.token("operator"))
+        assert [each["delivered"] for each in answer.json()["robots"]] == [False, True]
+        await eventually(lambda: rig.session("right").console.clock.stop.stopped)
+
+
+async def test_a_stop_for_all_is_never_turned_away_for_the_rate_of_requests() -> None:
+    async with running_fleet_rig("left", max_request_burst=1, max_request_rate=0.001) as rig:
+        await rig.http.get("/api/fleet", headers=rig.token("operator"))
+        assert (await rig.http.get("/api/fleet", headers=rig.token("operator"))).status_code == 429
+        for path in ("/api/fleet/stop", "/robots/left/api/stop"):
+            assert (await rig.http.post(path, headers=rig.token("operator"))).status_code == 200

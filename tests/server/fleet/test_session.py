@@ -1,0 +1,152 @@
+"""A robot's session that fails, and what is kept for the next one."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from robot_bridge.protocol.messages import Command, StopState
+from robot_bridge.protocol.serial import event_after
+from server.audit import Actor
+from server.fleet.tiles import FAILED
+from server.media.plane import MediaPlane
+from server.recording.recorder import Recorder
+from tests.server.fleet.rig import FleetRig, drive_once, running_fleet, running_fleet_rig
+from tests.server.rig import PATIENCE, eventually, running_bridge
+
+
+class Faults:
+    """Ends a robot's session by a fault, when told to."""
+
+    def __init__(self) -> None:
+        self._told: dict[Recorder, asyncio.Event] = {}
+
+    async def until_told(self, recorder: Recorder) -> None:
+        told = self._told[recorder] = asyncio.Event()
+        await told.wait()
+        raise RuntimeError("a fault of ours")
+
+    async def end(self, rig: FleetRig, name: str) -> None:
+        """Returns while there is no session."""
+        self._told[rig.session(name).recorder].set()
+        await eventually(lambda: rig.fleet.sessions[name].services is None)
+
+    async def back(self, rig: FleetRig, name: str) -> None:
+        """Until the next session has reached its robot."""
+        await eventually(lambda: rig.fleet.sessions[name].services is not None)
+        await rig.all_reached()
+
+
+@pytest.fixture
+def faults(monkeypatch: pytest.MonkeyPatch) -> Faults:
+    made = Faults()
+
+    async def run(recorder: Recorder) -> None:
+        await made.until_told(recorder)
+
+    monkeypatch.setattr(Recorder, "run", run)
+    return made
+
+
+def _stops(rig: FleetRig, name: str) -> list[tuple[str, str]]:
+    """Who stopped this robot and by which way, as its audit has it."""
+    return [(each.who, each.what) for each in rig.session(name).audit.tail if each.kind == "stop"]
+
+
+async def test_a_session_that_fails_is_started_again_and_no_other_notices(faults: Faults) -> None:
+    async with (
+        running_fleet_rig("left", "right") as rig,
+        rig.peer("left", "operator") as lost,
+        rig.peer("right", "operator") as peer,
+    ):
+        event = await drive_once(peer)
+        untouched = rig.session("right")
+        await faults.end(rig, "left")
+        tile = (await rig.tiles())["left"]
+        assert (tile["link"], tile["trouble"]) == ("down", FAILED)
+        answer = await rig.http.get("/robots/left/api/session", headers=rig.token("observer"))
+        assert (answer.status_code, answer.json()["error"]) == (503, "robot_failed")
+        kept = await rig.http.post("/api/fleet/stop", headers=rig.token("operator", "left"))
+        assert kept.json()["robots"][0]["delivered"] is False
+        await faults.back(rig, "left")
+        await eventually(lambda: rig.session("left").console.clock.stop.stopped)
+        async with asyncio.timeout(PATIENCE):
+            await lost.closed.wait()
+        text = (await rig.http.get("/metrics")).text
+        assert 'lockstep_fleet_session_failures_total{robot="left"} 1.0' in text
+        assert rig.session("right") is untouched
+        assert not peer.closed.is_set()
+        now = peer.newest_feedback()
+        peer.send("control", Command(event=event_after(event), issue=now.issue, values=[0.0] * len(now.axes)))
+        await peer.feedback(lambda each: each.event == event_after(event))
+
+
+async def test_a_stop_at_a_robot_whose_session_has_failed_is_kept_and_done_first_by_the_next(faults: Faults) -> None:
+    async with running_fleet_rig("left") as rig:
+        await faults.end(rig, "left")
+        answer = await rig.http.post(
+            "/robots/left/api/stop", headers=rig.token("observer", "left"), json={"reason": "smoke"}
+        )
+        assert (answer.status_code, answer.json()["error"]) == (503, "link_down")
+        assert "kept" in answer.json()["detail"]
+        await faults.back(rig, "left")
+        console = rig.session("left").console
+        await eventually(lambda: console.clock.stop == StopState(stopped=True, by="observer", reason="smoke"))
+        assert _stops(rig, "left")[0] == ("observer", "http, not delivered yet")
+        assert (await rig.http.post("/robots/left/api/reset", headers=rig.token("operator"))).status_code == 200
+        await eventually(lambda: not console.clock.stop.stopped)
+
+
+async def test_who_may_not_stop_a_robot_may_not_while_its_session_has_failed(faults: Faults) -> None:
+    async with running_fleet_rig("left", "right") as rig:
+        await faults.end(rig, "left")
+        for headers, error in (({}, "unauthorized"), (rig.token("operator", "right"), "link_other_robot")):
+            answer = await rig.http.post("/robots/left/api/stop", headers=headers)
+            assert answer.json()["error"] == error
+        await faults.back(rig, "left")
+        assert _stops(rig, "left") == []
+        assert not rig.session("left").console.clock.stop.stopped
+
+
+async def test_a_stop_that_the_robot_has_not_heard_of_outlives_a_session_that_fails(faults: Faults) -> None:
+    async with running_bridge() as first:
+        port = first.address[1]
+        async with running_fleet({"left": port}) as rig:
+            await rig.all_reached()
+            await first.close()
+            await eventually(lambda: not rig.session("left").console.robot.up)
+            rig.session("left").console.stop(Actor("Ann"), "stop", "smoke")
+            await faults.end(rig, "left")
+            async with running_bridge(port):
+                await faults.back(rig, "left")
+                clock = rig.session("left").console.clock
+                await eventually(lambda: clock.stop == StopState(stopped=True, by="Ann", reason="smoke"))
+                assert ("Ann", "restart, not delivered yet") in _stops(rig, "left")
+
+
+async def test_a_robot_whose_directory_cannot_be_made_is_without_a_session_and_the_others_run(tmp_path: Path) -> None:
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "left").write_text("in the way")
+    async with running_bridge() as left, running_bridge() as right:
+        ports = {"left": left.address[1], "right": right.address[1]}
+        async with running_fleet(ports, state_dir=tmp_path) as rig:
+            async with asyncio.timeout(PATIENCE):
+                await rig.session("right").console.robot.reached.wait()
+            tiles = await rig.tiles()
+            assert (tiles["left"]["trouble"], tiles["right"]["link"]) == (FAILED, "up")
+
+
+async def test_a_fault_while_a_session_ends_does_not_keep_the_console_from_ending(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    close = MediaPlane.close
+
+    async def fault(plane: MediaPlane) -> None:
+        await close(plane)
+        raise RuntimeError("a fault of ours")
+
+    monkeypatch.setattr(MediaPlane, "close", fault)
+    async with asyncio.timeout(3 * PATIENCE):
+        async with running_fleet_rig("left", "right") as rig:
+            pass
+    assert all(each.services is None for each in rig.fleet.sessions.values())
