@@ -1,0 +1,76 @@
+"""Two ends of a data channel, the one as the console tunes it."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from aiortc.rtcsctptransport import DataChunk, parse_packet
+
+from server.data_transport_private import (
+    tune_data_transport,
+)
+from server.media.aiortc_private import create_peer_connection
+from tests.server.rig import PATIENCE
+
+__all__ = ["Ends", "connected", "lose"]
+
+
+class Ends:
+    """Two ends of a reliable channel: a plain client's and the server's."""
+
+    def __init__(self, client: RTCDataChannel, server: RTCDataChannel) -> None:
+        self.client = client
+        self.server = server
+        self.at_client: asyncio.Queue[str] = asyncio.Queue(100)
+        self.at_server: asyncio.Queue[str] = asyncio.Queue(100)
+        client.on("message", self.at_client.put_nowait)
+        server.on("message", self.at_server.put_nowait)
+
+    async def exchange(self) -> None:
+        """One message each way, so that both have measured a round trip."""
+        self.server.send("there")
+        assert await self.at_client.get() == "there"
+        self.client.send("back")
+        assert await self.at_server.get() == "back"
+
+
+@asynccontextmanager
+async def connected(*, observes: bool = True) -> AsyncIterator[Ends]:
+    """The server's side is tuned, the client's is plain aiortc. Sections are bundled, as browsers do."""
+    client, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
+    there: asyncio.Future[RTCDataChannel] = asyncio.get_running_loop().create_future()
+    server.on("datachannel", there.set_result)
+    opened = asyncio.Event()
+    client.addTransceiver("video", direction="recvonly")
+    here = client.createDataChannel("session")
+    here.on("open", opened.set)
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await client.setLocalDescription(await client.createOffer())
+            await server.setRemoteDescription(RTCSessionDescription(client.localDescription.sdp, "offer"))
+            tune_data_transport(server, observes=observes)
+            await server.setLocalDescription(await server.createAnswer())
+            await client.setRemoteDescription(RTCSessionDescription(server.localDescription.sdp, "answer"))
+            await opened.wait()
+            yield Ends(here, await there)
+    finally:
+        await server.close()
+        await client.close()
+
+
+def lose(sctp: Any, first: int) -> list[bytes]:
+    """Lose the first so many data packets that `sctp` sends; the list has what was lost."""
+    lost: list[bytes] = []
+    dtls = sctp.transport
+    send = dtls._send_data
+
+    async def send_or_lose(data: bytes) -> None:
+        if len(lost) < first and any(isinstance(chunk, DataChunk) for chunk in parse_packet(data)[3]):
+            lost.append(data)
+        else:
+            await send(data)
+
+    dtls._send_data = send_or_lose
+    return lost
