@@ -244,20 +244,28 @@ def _bounded(
         reader.close()
 
 
-class _Head(msgspec.Struct, frozen=True):
+class _Head(msgspec.Struct, frozen=True, omit_defaults=True):
     topic: str
     event: int
     arrived: int  # µs since 1970
     captured: int
     keyframe: bool
     size: int
+    format: str = ""  # of a picture: "h264", "vp8"
 
 
 def _framed(record: Record) -> bytes:
-    payload = record.payload
+    picture = record.picture
+    payload = record.payload if picture is None else picture.data
     head = msgspec.json.encode(
         _Head(
-            record.topic, record.event, record.arrived // 1000, record.captured // 1000, record.keyframe, len(payload)
+            record.topic,
+            record.event,
+            record.arrived // 1000,
+            record.captured // 1000,
+            picture is None or picture.keyframe,
+            len(payload),
+            "" if picture is None else picture.format,
         )
     )
     return len(head).to_bytes(4, "big") + head + payload

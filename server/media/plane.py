@@ -132,7 +132,7 @@ class MediaPlane:
                 None
                 if self._recorder is None
                 else RecordedOutput(
-                    _recorded_codec(stream),
+                    stream.codecs if video else (_recorded_codec(stream),),
                     "high" if video else "operator",
                     self._recorder,
                     keyframe_seconds=self._record_keyframes,
@@ -146,7 +146,7 @@ class MediaPlane:
             stream.record_keyframe()
 
     def recorded_codecs(self) -> dict[str, str]:
-        """What each stream is recorded as, by its name: "H264", "opus" or "PCMU"."""
+        """What each stream is recorded as, by its name: "H264" (VP8 where all take that), "opus" or "PCMU"."""
         return {each.name: _recorded_codec(each) for each in self._streams.values()}
 
     def _attached_stream(self, spec: SourceSpec, name: str) -> AnyStream:

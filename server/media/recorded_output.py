@@ -6,6 +6,7 @@ from typing import Protocol
 from robot_bridge.protocol.console import Tier
 from server.media.frame import EncodedFrame
 from server.media.output import Output
+from server.media.passing import PASSED
 from server.media.quality.plan import PicturePlan
 
 __all__ = ["FrameTaker", "RecordedOutput", "RecordedStream"]
@@ -36,11 +37,12 @@ class RecordedStream(Protocol):
 class RecordedOutput:
     """Call `choose` before each medium, `published` with each frame, `close` at the end.
 
-    The operator's encoding comes first; then what a camera encoded itself; then that of observers; else one is made.
-    Another one is taken from its next keyframe on. A camera cannot be asked for one: ours is recorded until it comes.
+    The operator's encoding comes first; then what a camera encoded itself; then that of observers. Where nobody takes
+    the first codec it is what they take of the next one; one is made only where nothing is encoded. Another one is
+    taken from its next keyframe on. A camera cannot be asked for one: ours is recorded until it comes.
 
     Args:
-        codec: in which it is recorded
+        codecs: in which it can be recorded; in the first one, where that is encoded or nothing is
         own_tier: what is made for a recording alone
         keyframe_seconds: longest time between two keyframes; twice that on a path without room
         attached: whether the source is the console's own, and not the robot's
@@ -48,14 +50,14 @@ class RecordedOutput:
 
     def __init__(
         self,
-        codec: str,
+        codecs: tuple[str, ...],
         own_tier: Tier,
         take: FrameTaker,
         *,
         keyframe_seconds: float,
         attached: bool,
     ) -> None:
-        self._codec = codec
+        self._codecs = codecs
         self._own_tier = own_tier
         self._take = take
         self._keyframe_seconds = keyframe_seconds
@@ -75,7 +77,7 @@ class RecordedOutput:
         if self._next is not None:
             self._begin(self._next, stream)
             if self._current is None and wanted is stream.passed:
-                self._meanwhile = stream.output(self._codec, self._own_tier)
+                self._meanwhile = self._ours(stream)
                 self._begin(self._meanwhile, stream)
 
     def _begin(self, output: Output, stream: RecordedStream) -> None:
@@ -86,10 +88,19 @@ class RecordedOutput:
         output.request_keyframe("record")
 
     def _best(self, stream: RecordedStream) -> Output:
-        taken = [found for tier in TIERS if (found := stream.outputs.get((self._codec, tier))) and found.targets]
-        if taken and taken[0].tier == "operator":
-            return taken[0]
-        return stream.passed or next(iter(taken), None) or stream.output(self._codec, self._own_tier)
+        operators = stream.outputs.get((self._codecs[0], "operator"))
+        if operators is not None and operators.targets:
+            return operators
+        return stream.passed or self._ours(stream)
+
+    def _ours(self, stream: RecordedStream) -> Output:
+        """What we encode for somebody; where that is nobody, for the recording."""
+        for codec in self._codecs:
+            for tier in TIERS:
+                found = stream.outputs.get((codec, tier))
+                if found is not None and found.targets:
+                    return found
+        return stream.output(self._codecs[0], self._own_tier)
 
     def published(self, stream: str, output: Output, frame: EncodedFrame) -> None:
         if frame.keyframe and output is self._next:
@@ -99,13 +110,14 @@ class RecordedOutput:
         elif frame.keyframe and output is self._meanwhile:
             self._current, self._meanwhile = output, None
         if output is self._current:
-            self._take(stream, self._codec, frame, attached=self._attached)
+            codec = self._codecs[0] if output.codec == PASSED else output.codec
+            self._take(stream, codec, frame, attached=self._attached)
 
     def request_keyframe(self) -> None:
         """A new file begins."""
         if self._current is None:
             return
-        if self._current.codec == self._codec:
+        if self._current.codec != PASSED:
             self._current.request_keyframe("record")
         else:  # a camera's own: what is recorded is chosen afresh, and begins with ours
             for output in (self._current, self._next):

@@ -23,6 +23,7 @@ from robot_bridge.protocol.serial import is_newer
 from server.recording.errors import RecordingDamaged
 from server.recording.event_rows import WRENCH, event_rows
 from server.recording.lerobot_meta import episode_table, info_of, picture_statistics, statistics_of, tasks_table
+from server.recording.pictures import RecordedPictures
 from server.recording.reader import RecordingReader
 from server.recording.records import FeedbackRecord
 from server.recording.topics import CAMERA
@@ -113,18 +114,17 @@ def aligned(pictures: Iterable[Picture], events: Iterable[int]) -> Iterator[av.V
 
 def _pictures(path: Path, topic: str) -> Iterator[Picture]:
     """Decoded, from the first keyframe on."""
-    decoder = av.CodecContext.create("h264", "r")
+    decoder = RecordedPictures()
     stamps: dict[int, int] = {}
     with RecordingReader(path) as reader:
         for number, record in enumerate(reader.records(topics={topic})):
-            if not stamps and not record.keyframe:
+            picture = record.picture
+            if picture is None or (not stamps and not picture.keyframe):
                 continue
-            packet = av.Packet(record.payload)
-            packet.pts = number  # comes back with the picture, whatever the decoder holds back
             stamps[number] = record.event
-            for frame in decoder.decode(packet):
+            for frame in decoder.decode(picture, number):
                 yield Picture(stamps.get(frame.pts or number, record.event), frame)
-        for frame in decoder.decode(None):
+        for frame in decoder.flush():
             yield Picture(stamps.get(frame.pts or 0, 0), frame)
 
 

@@ -1,6 +1,7 @@
 """`lockstep export --to mp4`: one file for each camera, with sound. Pictures and Opus are copied, not encoded again.
 
-Only where the size of the pictures changed on the way they are encoded anew, all in the largest size.
+Only where the size of the pictures changed on the way, or where there is VP8, which MP4 does not hold, they are encoded
+anew, all in the largest size.
 """
 
 from collections.abc import Iterator
@@ -15,7 +16,8 @@ from av.container import OutputContainer
 from server.recording.errors import RecordingDamaged
 from server.recording.event_index import TopicEntry
 from server.recording.export_sound import CopiedOpus, EncodedG711
-from server.recording.payload import picture_size
+from server.recording.payload import RecordedPicture
+from server.recording.pictures import RecordedPictures, picture_size
 from server.recording.reader import RecordingReader
 from server.recording.topics import CAMERA
 
@@ -31,7 +33,7 @@ class Timed(NamedTuple):
     topic: str
     captured: int  # ns since 1970
     data: bytes
-    keyframe: bool
+    picture: RecordedPicture | None  # None: it is sound
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
@@ -72,21 +74,24 @@ def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
 
 
 def _write(reader: RecordingReader, topic: str, sound: TopicEntry | None, target: Path) -> None:
-    sizes = {size for each in _timed(reader, topic) if each.keyframe for size in [picture_size(each.data)] if size}
+    keyframes = (each.picture for each in _timed(reader, topic) if each.picture is not None and each.picture.keyframe)
+    kinds = {(each.format, size) for each in keyframes if (size := picture_size(each)) is not None}
+    sizes = {size for _, size in kinds}
     first = next(_timed(reader, topic), None)
     if first is None or not sizes:
         raise RecordingDamaged(f"{topic}: there is no picture that can be decoded")
     packet = None if sound is None else next(_timed(reader, sound.topic), None)
     began = min(each.captured for each in (first, packet) if each is not None)
     with av.open(str(target), "w", format="mp4", options={"movflags": "+faststart"}) as output:
-        pictures = _Copied(output, first.data) if len(sizes) == 1 else _Encoded(output, max(sizes))
+        copied = kinds == {("h264", *sizes)}
+        video = _Copied(output, first.data) if copied else _Encoded(output, max(sizes))
         audio = None if packet is None or sound is None else _sound_writer(output, sound.schema, packet.data)
         for each in _timed(reader, topic, *([] if sound is None else [sound.topic])):
             if each.topic == topic:
-                pictures.take(each, began)
+                video.take(each, began)
             elif audio is not None:
                 audio.take(each.data, each.captured - began)
-        pictures.close()
+        video.close()
         if audio is not None:
             audio.close()
 
@@ -109,39 +114,45 @@ class _Copied:
         packet = av.Packet(each.data)
         packet.stream, packet.time_base = self._stream, VIDEO_BASE
         packet.pts = packet.dts = round((each.captured - began) / SECOND / VIDEO_BASE)
-        packet.is_keyframe = each.keyframe
+        packet.is_keyframe = each.picture is not None and each.picture.keyframe
         self._output.mux(packet)
 
     def close(self) -> None: ...
 
 
 class _Encoded:
-    """Pictures of different sizes, all in one."""
+    """Pictures of different sizes or formats, all in one."""
 
     def __init__(self, output: OutputContainer, size: tuple[int, int]) -> None:
         self._output = output
-        self._decoder = av.CodecContext.create("h264", "r")
+        self._decoder = RecordedPictures()
         self._stream = output.add_stream("libx264", rate=25, options={"preset": "veryfast", "crf": "20"})
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = "yuv420p"
         self._stream.codec_context.time_base = VIDEO_BASE
 
     def take(self, each: Timed, began: int) -> None:
-        for frame in self._decoder.decode(av.Packet(each.data)):
-            whole = frame.reformat(self._stream.width, self._stream.height, interpolation="BILINEAR")
-            whole.pts, whole.time_base = round((each.captured - began) / SECOND / VIDEO_BASE), VIDEO_BASE
-            self._output.mux(self._stream.encode(whole))
+        if each.picture is not None:
+            self._encode(self._decoder.decode(each.picture, round((each.captured - began) / SECOND / VIDEO_BASE)))
 
     def close(self) -> None:
+        self._encode(self._decoder.flush())
         self._output.mux(self._stream.encode(None))
+
+    def _encode(self, frames: list[av.VideoFrame]) -> None:
+        for frame in frames:
+            whole = frame.reformat(self._stream.width, self._stream.height, interpolation="BILINEAR")
+            whole.pts, whole.time_base = frame.pts, VIDEO_BASE
+            self._output.mux(self._stream.encode(whole))
 
 
 def _timed(reader: RecordingReader, *topics: str) -> Iterator[Timed]:
     """In the order of arrival; pictures from the first keyframe on, times of each topic increasing."""
     newest: dict[str, int] = {}
     for record in reader.records(topics=topics):
-        if record.topic not in newest and not record.keyframe:
+        picture = record.picture
+        if record.topic not in newest and picture is not None and not picture.keyframe:
             continue
         captured = max(record.captured, newest.get(record.topic, 0) + MILLISECOND)
         newest[record.topic] = captured
-        yield Timed(record.topic, captured, record.payload, record.keyframe)
+        yield Timed(record.topic, captured, record.payload if picture is None else picture.data, picture)

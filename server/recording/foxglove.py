@@ -32,9 +32,9 @@ def _stamp(time: int) -> Timestamp:
     return Timestamp(seconds=time // SECOND, nanos=time % SECOND)
 
 
-def camera_message(stream: str, captured: int, picture: bytes) -> bytes:
-    """One H.264 access unit in Annex B."""
-    found = CompressedVideo(timestamp=_stamp(captured), frame_id=stream, data=picture, format="h264")
+def camera_message(stream: str, captured: int, picture: bytes, picture_format: str = "h264") -> bytes:
+    """One H.264 access unit in Annex B, or one frame of "vp8"."""
+    found = CompressedVideo(timestamp=_stamp(captured), frame_id=stream, data=picture, format=picture_format)
     return found.SerializeToString()
 
 

@@ -10,7 +10,7 @@ from robot_bridge.protocol.messages import Feedback
 from server.recording.foxglove import camera_message, feedback_messages, log_message, sound_message
 from server.recording.records import FeedbackRecord, OwnRecord, RobotRecord
 from server.recording.records_in_words import in_words
-from server.recording.topics import LOG, OWN_TOPICS, media_topic
+from server.recording.topics import LOG, OWN_TOPICS, PICTURE_FORMATS, media_topic
 from server.recording.writer import Entry
 
 __all__ = ["FeedbackItem", "Item", "MediaItem", "OwnItem", "RobotItem", "entries_of"]
@@ -38,7 +38,7 @@ class MediaItem(NamedTuple):
     captured: int
     epoch: str
     stream: str
-    codec: str  # "H264", "opus" or "PCMU"
+    codec: str  # "H264", "VP8", "opus" or "PCMU"
     stamp: int
     keyframe: bool
     data: bytes
@@ -76,8 +76,9 @@ def _own(record: OwnRecord, arrived: int, captured: int) -> Entry:
 
 def _media(item: MediaItem) -> Entry:
     topic = media_topic(item.stream, item.codec)
-    if item.codec == "H264":
-        data = camera_message(item.stream, item.captured, item.data)
+    picture_format = PICTURE_FORMATS.get(item.codec)
+    if picture_format is not None:
+        data = camera_message(item.stream, item.captured, item.data, picture_format)
         return Entry(topic, item.stamp, item.arrived, item.captured, data, keyframe=item.keyframe)
     sound_format = "opus" if item.codec == "opus" else "g711-ulaw"
     data = sound_message(sound_format, item.captured, item.data, PCMU_RATE, 1)

@@ -1,8 +1,7 @@
 """What stands in a record: the bare picture or sound, or one of Lockstep's own records. No I/O."""
 
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
-import av
 import msgspec
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
@@ -12,16 +11,19 @@ from google.protobuf.message import DecodeError
 from server.recording.errors import RecordingDamaged
 from server.recording.records import OWN_RECORDS, OwnRecord
 
-__all__ = ["has_idr", "own_record", "own_record_of", "payload_of", "picture_size"]
+__all__ = ["VIDEO", "RecordedPicture", "own_record", "own_record_of", "payload_of", "picture_of"]
+
+VIDEO = "foxglove.CompressedVideo"
 
 MEDIA: dict[str, type[CompressedVideo | CompressedAudio | RawAudio]] = {
-    "foxglove.CompressedVideo": CompressedVideo,
+    VIDEO: CompressedVideo,
     "foxglove.CompressedAudio": CompressedAudio,
     "foxglove.RawAudio": RawAudio,
 }
 IDR, SLICE = 5, 1  # ITU-T H.264 table 7-1
 NAL_KIND = 0x1F
 START_CODE = b"\x00\x00\x01"
+VP8_START = b"\x9d\x01\x2a"  # RFC 6386 9.1, behind the frame tag of a keyframe
 
 Kind = TypeVar("Kind", bound=OwnRecord)
 _decoders = {kind: msgspec.json.Decoder(kind) for kind in OWN_RECORDS.values()}
@@ -42,6 +44,27 @@ def payload_of(schema: str, data: bytes) -> bytes:
         raise RecordingDamaged(f"not a {schema}") from error
 
 
+class RecordedPicture(NamedTuple):
+    format: str  # "h264", "vp8"
+    data: bytes
+    keyframe: bool
+
+
+def picture_of(data: bytes) -> RecordedPicture:
+    """What a message of the schema VIDEO holds. Raises RecordingDamaged."""
+    try:
+        found = CompressedVideo.FromString(data)
+    except DecodeError as error:
+        raise RecordingDamaged(f"not a {VIDEO}") from error
+    return RecordedPicture(found.format, found.data, _is_keyframe(found.format, found.data))
+
+
+def _is_keyframe(picture_format: str, picture: bytes) -> bool:
+    if picture_format == "vp8":
+        return len(picture) > 6 and not picture[0] & 1 and picture[3:6] == VP8_START
+    return _has_idr(picture)
+
+
 def own_record(kind: type[Kind], data: bytes) -> Kind:
     """Raises RecordingDamaged."""
     try:
@@ -57,7 +80,7 @@ def own_record_of(schema: str, data: bytes) -> OwnRecord | None:
     return None if kind is None else own_record(kind, data)
 
 
-def has_idr(picture: bytes) -> bool:
+def _has_idr(picture: bytes) -> bool:
     """Whether an H.264 access unit in Annex B is a keyframe: its first slice is one of an IDR picture."""
     at = picture.find(START_CODE)
     while 0 <= at < len(picture) - len(START_CODE):
@@ -66,13 +89,3 @@ def has_idr(picture: bytes) -> bool:
             return kind == IDR
         at = picture.find(START_CODE, at + len(START_CODE))
     return False
-
-
-def picture_size(keyframe: bytes) -> tuple[int, int] | None:
-    """Width and height of an H.264 keyframe; None: it cannot be decoded."""
-    decoder = av.CodecContext.create("h264", "r")
-    try:
-        frames = [*decoder.decode(av.Packet(keyframe)), *decoder.decode(None)]
-    except av.FFmpegError:
-        return None
-    return (frames[0].width, frames[0].height) if frames else None

@@ -17,10 +17,10 @@ from robot_bridge.protocol.serial import is_newer
 from server.recording.errors import RecordingDamaged, RecordingTampered
 from server.recording.event_index import INDEX_NAME, EventEntry, EventIndex, decode_index
 from server.recording.info import METADATA_NAME, RecordingInfo
-from server.recording.payload import has_idr, own_record, payload_of
+from server.recording.payload import VIDEO, RecordedPicture, own_record, payload_of, picture_of
 from server.recording.records import RobotRecord
 from server.recording.scan import scan_file
-from server.recording.topics import CAMERA, OWN_TOPICS
+from server.recording.topics import OWN_TOPICS
 
 __all__ = ["Record", "RecordingReader"]
 
@@ -47,9 +47,15 @@ class Record(NamedTuple):
         return payload_of(self.schema, self.data)
 
     @property
+    def picture(self) -> RecordedPicture | None:
+        """None: it is none. Raises RecordingDamaged."""
+        return picture_of(self.data) if self.schema == VIDEO else None
+
+    @property
     def keyframe(self) -> bool:
         """Whether it can be decoded without earlier ones: always, but for most pictures."""
-        return not self.topic.startswith(CAMERA) or has_idr(self.payload)
+        picture = self.picture
+        return picture is None or picture.keyframe
 
 
 class RecordingReader:

@@ -34,7 +34,7 @@ from server.recording.errors import DiskTrouble, RecordingDamaged
 from server.recording.event_index import INDEX_NAME, EventIndex, IndexBuilder, TopicEntry
 from server.recording.info import METADATA_NAME, RecordingInfo
 from server.recording.marks import MarkFinder
-from server.recording.payload import has_idr, own_record_of, payload_of
+from server.recording.payload import VIDEO, own_record_of, picture_of
 from server.recording.records import Degraded, FeedbackRecord
 
 __all__ = ["Scan", "complete_file", "scan_file"]
@@ -111,8 +111,7 @@ class Scan:
         self.counts[message.channel_id] = self.counts.get(message.channel_id, 0) + 1
         channel = self.channels[message.channel_id]
         schema = self.schemas[channel.schema_id].name
-        picture = schema == "foxglove.CompressedVideo"
-        keyframe = picture and has_idr(payload_of(schema, message.data))
+        keyframe = schema == VIDEO and picture_of(message.data).keyframe
         record = own_record_of(schema, message.data)
         micros = message.log_time // 1000
         feedback = isinstance(record, FeedbackRecord)

@@ -40,6 +40,7 @@ __all__ = [
     "LOG",
     "MICROPHONE",
     "OWN_TOPICS",
+    "PICTURE_FORMATS",
     "POSE",
     "SCAN",
     "Topic",
@@ -52,6 +53,7 @@ __all__ = [
 CAMERA, MICROPHONE = "/camera/", "/microphone/"  # and the stream's name
 JOINTS, SCAN, POSE, LOG = "/joint_states", "/scan", "/pose", "/log"
 
+PICTURE_FORMATS = {"H264": "h264", "VP8": "vp8"}  # in CompressedVideo, by codec; one topic can have both
 MEDIA_SCHEMAS: dict[str, type[Message]] = {"H264": CompressedVideo, "opus": CompressedAudio, "PCMU": RawAudio}
 
 OWN_TOPICS: dict[type[OwnRecord], str] = {
@@ -96,7 +98,7 @@ def topics_of(description: RobotDescription, codecs: Mapping[str, str]) -> list[
 
 
 def media_topic(stream: str, codec: str) -> str:
-    return (CAMERA if codec == "H264" else MICROPHONE) + stream
+    return (CAMERA if codec in PICTURE_FORMATS else MICROPHONE) + stream
 
 
 def stream_of(topic: str) -> str:

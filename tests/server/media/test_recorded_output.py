@@ -20,10 +20,12 @@ class Taken:
 
     def __init__(self) -> None:
         self.frames: list[EncodedFrame] = []
+        self.codecs: list[str] = []
         self._news = asyncio.Event()
 
     def __call__(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
-        assert (stream, codec, attached) == ("camera0", "H264", False)
+        assert (stream, attached) == ("camera0", False)
+        self.codecs.append(codec)
         self.frames.append(frame)
         self._news.set()
 
@@ -73,17 +75,65 @@ async def test_what_the_operator_gets_in_h264_is_recorded_and_encoded_once() -> 
         assert [slices(frame) for frame in operator.frames("video")] == [slices(frame.data) for frame in taken.frames]
 
 
-async def test_where_all_take_vp8_the_pictures_are_encoded_once_more_in_h264() -> None:
+@pytest.mark.parametrize("priority", [True, False])
+async def test_where_all_take_vp8_that_is_recorded_and_nothing_is_encoded_for_it(priority: bool) -> None:
+    """As it was sent, byte for byte; an operator's and an observer's."""
     taken = Taken()
     async with (
         running_plane(description(microphones=0)) as plane,
-        viewing(plane, ["video"], codecs=["VP8"], priority=True) as operator,
+        viewing(plane, ["video"], codecs=["VP8"], priority=priority) as viewer,
     ):
         plane.record(taken)
         await taken.feed(plane, plain(1, 4))
-        await operator.until(lambda: timestamps(operator, "video") == 4)
-        assert taken.stamps == [1, 2, 3, 4]
-        assert (encoded(plane, "H264"), encoded(plane, "VP8")) == (4, 4)
+        await viewer.until(lambda: timestamps(viewer, "video") == 4)
+        assert (taken.stamps, set(taken.codecs)) == ([1, 2, 3, 4], {"VP8"})
+        assert (encoded(plane, "H264"), encoded(plane, "VP8")) == (0, 4)
+        assert viewer.frames("video") == [frame.data for frame in taken.frames]
+        plane.record_keyframes()
+        for medium in plain(5, 40):
+            await taken.feed(plane, [medium])
+            if taken.frames[-1].keyframe:
+                break
+        assert taken.frames[-1].keyframe
+
+
+async def test_the_codec_changes_with_a_keyframe_when_who_takes_h264_goes_and_comes() -> None:
+    taken = Taken()
+    async with (
+        running_plane(description(microphones=0)) as plane,
+        viewing(plane, ["video"], codecs=["VP8"]),
+    ):
+        async with viewing(plane, ["video"], priority=True):
+            plane.record(taken)
+            await taken.feed(plane, plain(1, 4))
+            assert taken.codecs == ["H264"] * 4
+        await taken.feed(plane, plain(5, 30))
+        assert taken.codecs[-1] == "VP8"
+        before = encoded(plane, "H264")
+        await taken.feed(plane, plain(31, 34))
+        assert encoded(plane, "H264") == before
+        async with viewing(plane, ["video"], priority=True):
+            await taken.feed(plane, plain(35, 60))
+        assert taken.codecs[-1] == "H264"
+    assert sorted(set(taken.stamps)) == list(range(1, 61))  # one with which another begins may be there in both
+    assert taken.stamps == sorted(taken.stamps)
+    starts = [at for at in range(1, 60) if taken.codecs[at] != taken.codecs[at - 1]]
+    assert len(starts) == 2
+    assert all(taken.frames[at].keyframe for at in starts)
+
+
+async def test_with_nobody_there_h264_is_made_until_somebody_takes_vp8() -> None:
+    taken = Taken()
+    async with running_plane(description(microphones=0)) as plane:
+        plane.record(taken)
+        await taken.feed(plane, plain(1, 3))
+        assert (taken.codecs, encoded(plane, "H264")) == (["H264"] * 3, 3)
+        async with viewing(plane, ["video"], codecs=["VP8"]):
+            await taken.feed(plane, plain(4, 30))
+            before = encoded(plane, "H264")
+            await taken.feed(plane, plain(31, 34))
+            assert (taken.codecs[-4:], encoded(plane, "H264")) == (["VP8"] * 4, before)
+    assert sorted(set(taken.stamps)) == list(range(1, 35))
 
 
 @pytest.mark.parametrize("codecs", [["H264"], ["VP8"]])

@@ -1,6 +1,7 @@
 """Recordings that tests make: a robot of two axes with a camera, a microphone and a force sensor."""
 
 from collections.abc import Callable, Iterator
+from itertools import cycle
 from pathlib import Path
 
 import av
@@ -20,7 +21,7 @@ from robot_bridge.protocol.description import (
 )
 from robot_bridge.protocol.messages import StopState
 from robot_bridge.protocol.serial import event_after
-from server.media.picture_encoder import H264Encoder
+from server.media.picture_encoder import create_picture_encoder
 from server.media.sound_encoder import OpusEncoder, Segment
 from server.recording.foxglove import camera_message, feedback_messages, sound_message
 from server.recording.info import RecordingInfo
@@ -32,7 +33,7 @@ from server.recording.records import (
     RobotRecord,
     SeatRecord,
 )
-from server.recording.topics import CAMERA, MICROPHONE, OWN_TOPICS
+from server.recording.topics import CAMERA, MICROPHONE, OWN_TOPICS, PICTURE_FORMATS
 from server.recording.writer import Entry, RecordingWriter
 
 __all__ = ["CODECS", "DESCRIPTION", "EPOCH", "INFO", "SECOND", "START", "Story", "own_entry", "rewritten"]
@@ -76,6 +77,7 @@ class Story:
         force_at: number of the event at which the robot touches something; 0: never
         stopped: numbers of the events whose feedback says that the robot is stopped
         real: pictures and sound that can be decoded; the pictures' brightness is 2 x the event
+        codecs: of real pictures; the next one, over and over, with each keyframe
     """
 
     def __init__(
@@ -86,12 +88,14 @@ class Story:
         force_at: int = 0,
         stopped: range = range(0),
         real: bool = False,
+        codecs: tuple[str, ...] = ("H264",),
     ) -> None:
         self.first_event = first_event
         self.events = events
         self.force_at = force_at
         self.stopped = stopped
-        self._pictures = _real_pictures() if real else _false_pictures
+        self._codecs = codecs
+        self._pictures = {codec: _real_pictures(codec) if real else _false_pictures for codec in codecs}
         self._sounds = _real_sounds() if real else _false_sounds
 
     def entries(self) -> list[Entry]:
@@ -100,6 +104,8 @@ class Story:
 
     def _entries(self) -> Iterator[Entry]:
         event, at = self.first_event, START
+        codecs = cycle(self._codecs)
+        codec = ""
         yield own_entry(RobotRecord(epoch=EPOCH, event=event, link="up", description=DESCRIPTION), START)
         yield own_entry(SeatRecord(epoch=EPOCH, event=event, holder="p1", name="Ada", why="request"), START)
         yield from self._feedback(event, at, 0)
@@ -109,7 +115,8 @@ class Story:
             yield from self._feedback(event, at, number)
             key = number % KEYFRAMES == 1
             captured = at + 1_000_000
-            picture = camera_message("front", captured, self._pictures(number, key))
+            codec = next(codecs) if key else codec
+            picture = camera_message("front", captured, self._pictures[codec](number, key), PICTURE_FORMATS[codec])
             yield Entry(CAMERA + "front", event, at + 5_000_000, captured, picture, key)
             for part in (0, 1):
                 moment = at + part * 20_000_000
@@ -183,8 +190,8 @@ def _false_sounds(number: int, part: int) -> bytes:
     return b"opus" + number.to_bytes(4, "big") + bytes([part])
 
 
-def _real_pictures() -> Callable[[int, bool], bytes]:
-    encoder = H264Encoder(2_000_000, 25.0)
+def _real_pictures(codec: str) -> Callable[[int, bool], bytes]:
+    encoder = create_picture_encoder(codec, 2_000_000, 25.0)
 
     def picture(number: int, key: bool) -> bytes:
         grey = np.full((240, 320, 3), min(250, 2 * (number + 1)), np.uint8)

@@ -53,6 +53,24 @@ def test_mp4_has_the_same_pictures_and_sound_and_not_encoded_again(file: Path, t
         assert samples >= (2 * (EVENTS - 1) - 2) * 960
 
 
+@pytest.mark.parametrize("codecs", [("VP8",), ("H264", "VP8")])
+def test_pictures_in_vp8_are_encoded_for_mp4_and_lerobot_all_of_them(codecs: tuple[str, ...], tmp_path: Path) -> None:
+    """Also where the codec changed on the way."""
+    path = tmp_path / "a.mcap"
+    Story(events=EVENTS, real=True, codecs=codecs).write(path)
+    (target,) = export_mp4.export(path, tmp_path / "a.mp4", "")
+    with av.open(str(target)) as video:
+        assert [each.codec_context.name for each in video.streams] == ["h264", "opus"]
+        shown = [brightness(frame) for frame in video.decode(video=0)]
+    assert shown == pytest.approx([2 * event for event in range(2, EVENTS + 1)], abs=6)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    events = pq.read_table(root / "data" / "chunk-000" / "file-000.parquet").column("lockstep.event").to_pylist()
+    assert events == list(range(2, EVENTS))
+    with av.open(str(root / "videos" / "observation.images.front" / "chunk-000" / "file-000.mp4")) as video:
+        shown = [brightness(frame) for frame in video.decode(video=0)]
+    assert shown == pytest.approx([2 * event for event in events], abs=6)
+
+
 def test_mp4_has_g711_sound_as_aac_with_silence_where_packets_are_missing(tmp_path: Path) -> None:
     source, rate, gap = tmp_path / "a.mcap", 8000, range(20, 40)  # 0.8 s
     tone = (12_000 * np.sin(np.arange(160) * 2 * np.pi * 400 / rate)).astype(np.int16)

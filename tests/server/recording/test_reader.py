@@ -41,6 +41,21 @@ def test_pictures_that_can_be_decoded_begin_with_a_keyframe_at_or_before_the_eve
         assert [record.keyframe for record in found] == [True] + [False] * 10
 
 
+def test_pictures_in_vp8_say_so_and_are_found_from_their_keyframe_also_after_an_interruption(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=120, real=True, codecs=("H264", "VP8")).write(path)
+    with RecordingReader(path) as reader:
+        index = reader.index
+        found = list(reader.records(60, 62, {"/camera/front"}, decodable=True))
+        assert [record.event for record in found] == list(range(52, 63))
+        pictures = [record.picture for record in found]
+    assert [(each.format, each.keyframe) for each in pictures if each] == [("vp8", True)] + [("vp8", False)] * 10
+    path.write_bytes(path.read_bytes()[:-1])
+    with RecordingReader(path) as reader:
+        assert reader.interrupted
+        assert reader.index.keyframes == index.keyframes
+
+
 def test_the_index_has_the_description_the_marks_and_no_more_than_a_second_in_a_chunk(file: Path) -> None:
     with RecordingReader(file) as reader:
         assert reader.info == INFO

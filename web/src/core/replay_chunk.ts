@@ -8,6 +8,7 @@ export interface ReplayRecord {
   readonly arrived: number;
   readonly captured: number;
   readonly keyframe: boolean;
+  readonly format: string; // of a picture: "h264", "vp8"; else ""
   readonly payload: Uint8Array;
 }
 
@@ -104,6 +105,7 @@ function* recordsOf(number: number, body: ArrayBuffer): Generator<ReplayRecord> 
       arrived: numeric(head["arrived"]),
       captured: numeric(head["captured"]),
       keyframe: head["keyframe"] === true,
+      format: text(head["format"]),
       payload: new Uint8Array(body, at, size),
     };
     at += size;

@@ -4,6 +4,7 @@ import type { ReplayPicture } from "../core/replay_moment";
 
 const PATIENCE_MS = 250; // for a decoder that gives a picture only when pressed
 
+const VP8 = "vp8";
 const USUAL = "avc1.42C01F"; // constrained baseline, as the console encodes
 
 /** Why there is no picture. */
@@ -59,11 +60,12 @@ export class PictureDecoder {
 
   private async ready(sequence: readonly ReplayRecord[]): Promise<VideoDecoder> {
     if (!("VideoDecoder" in globalThis)) throw new CannotDecode(withoutDecoder());
-    const codec = sequence[0] === undefined ? null : avcCodec(sequence[0].payload);
+    const codec = codecOf(sequence[0]);
     if (codec === null) throw new CannotDecode("The recording says nothing of how this picture was encoded");
     if (this.decoder?.state === "configured" && codec === this.codec) return this.decoder;
     const { supported } = await VideoDecoder.isConfigSupported(configOf(codec));
-    if (supported !== true) throw new CannotDecode("This browser cannot decode H.264");
+    if (supported !== true)
+      throw new CannotDecode(`This browser cannot decode ${codec === VP8 ? "VP8" : "H.264"}`);
     if (this.decoder !== null && this.decoder.state !== "closed") this.decoder.close();
     this.codec = codec;
     this.fed = null;
@@ -103,7 +105,13 @@ export class PictureDecoder {
   }
 }
 
-/** Annex B: the parameter sets stand in front of each keyframe. */
+/** Of what begins with this record; it changes at keyframes only. Null: it does not say. */
+function codecOf(first: ReplayRecord | undefined): string | null {
+  if (first === undefined) return null;
+  return first.format === "vp8" ? VP8 : avcCodec(first.payload);
+}
+
+/** H.264 is Annex B: the parameter sets stand in front of each keyframe. */
 function configOf(codec: string): VideoDecoderConfig {
   return { codec, optimizeForLatency: true, hardwareAcceleration: "prefer-software" };
 }
