@@ -67,12 +67,14 @@ class ConsolePage:
         })"""
         missed = await self.page.evaluate(waiting % holds, seconds * 1000)
         if missed is not None:
-            raise AssertionError(f"never came true: {condition}\nthe page's statistics: {missed}")
+            shown = " | ".join((await self.page.inner_text("body")).split("\n"))
+            raise AssertionError(f"never came true: {condition}\nthe page's statistics: {missed}\nthe page: {shown}")
 
     async def until_live(self) -> None:
         """Connected, and every picture stream was drawn a few times."""
         videos = "Object.values(s.streams).filter((x) => x.kind === 'video')"
-        await self.until(f"s.connected && {videos}.length > 0 && {videos}.every((x) => x.rendered > 3)")
+        # A machine that is just starting other programs may leave a browser without a turn for half a minute.
+        await self.until(f"s.connected && {videos}.length > 0 && {videos}.every((x) => x.rendered > 3)", 45)
 
     async def press(self, button: int, pressed: bool = True) -> None:
         """As a finger does it: no shorter than the page's sampling can see."""
