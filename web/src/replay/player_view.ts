@@ -161,7 +161,7 @@ export class PlayerView {
         this.rendered.set(topic.slice(CAMERA.length), [{ stamp, event }]);
     }
     const { feedback, command } = moment;
-    this.scene?.show(event, feedback);
+    this.scene?.show(event, feedback, moment.damaged);
     const description = this.player.description;
     const unknown = new Set(
       feedback?.unknown.map((name) => description?.axes.findIndex((axis) => axis.name === name) ?? -1),
@@ -169,7 +169,7 @@ export class PlayerView {
     this.axes?.show(command?.values ?? [], feedback?.axes ?? [], unknown);
     this.force.state.feedback = feedback;
     if (feedback !== null) noteForce(this.force.touch.trace, event, forceOf(feedback.wrench));
-    void this.sounds.show(moment.sounds);
+    void this.sounds.show(moment.sounds, moment.damaged);
     setText(this.number, grouped(event));
     setText(this.state, stateWords(shown));
     setData(this.state, "tone", feedback?.stopped === true ? "bad" : "");

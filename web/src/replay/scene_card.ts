@@ -14,7 +14,7 @@ export class SceneCard {
   private readonly scale = h("span", "scene-scale");
   private state: SceneCardState = "waiting";
   private stage: SceneStage | null = null;
-  private shown: { event: number; feedback: ReplayFeedback | null } | null = null;
+  private shown: { event: number; feedback: ReplayFeedback | null; damaged: boolean } | null = null;
   private closed = false;
 
   constructor(private readonly description: RobotDescription) {
@@ -31,9 +31,9 @@ export class SceneCard {
     this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault()); // it may come back
   }
 
-  /** The robot as feedback `event` measured it; null: that was not recorded. */
-  show(event: number, feedback: ReplayFeedback | null): void {
-    this.shown = { event, feedback };
+  /** The robot as feedback `event` measured it; null: that was not recorded, or cannot be read. */
+  show(event: number, feedback: ReplayFeedback | null, damaged: boolean): void {
+    this.shown = { event, feedback, damaged };
     this.draw();
     if (this.state === "waiting") void this.load();
   }
@@ -72,8 +72,9 @@ export class SceneCard {
     if (this.state === "failed")
       setText(this.words, "This browser cannot draw the 3D scene: it has no WebGL");
     if (shown === null || stage === null) return;
-    const { event, feedback } = shown;
-    const missing = feedback === null ? "No state of this event was recorded" : "";
+    const { event, feedback, damaged } = shown;
+    const why = damaged ? "This part of the recording is damaged" : "No state of this event was recorded";
+    const missing = feedback === null ? why : "";
     setHidden(this.words, missing === "");
     setText(this.words, missing);
     this.canvas.classList.toggle("is-blank", feedback === null);

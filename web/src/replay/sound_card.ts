@@ -34,13 +34,14 @@ export class SoundCard {
     this.element.hidden = topics.length === 0;
   }
 
-  async show(sounds: ReadonlyMap<string, ReplaySegment>): Promise<void> {
+  /** `damaged`: what is missing may be in a part that cannot be read. */
+  async show(sounds: ReadonlyMap<string, ReplaySegment>, damaged: boolean): Promise<void> {
     const turn = ++this.turn;
     for (const [topic, { canvas, words }] of this.rows) {
       const segment = sounds.get(topic);
       const stamp = segment?.packets[0]?.event;
       if (segment === undefined || stamp === undefined) {
-        setText(words, "none yet");
+        setText(words, damaged ? "damaged" : "none yet");
         draw(canvas, new Float32Array(0));
         continue;
       }

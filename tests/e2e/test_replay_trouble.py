@@ -1,0 +1,121 @@
+"""The player in Chromium when what it plays is damaged, is deleted, or cannot be asked for; and pictures in VP8."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from playwright.async_api import Browser, Page, expect
+
+from bench.browsers.chromium import open_page
+from bench.browsers.console_page import READ_STRIP, ConsolePage
+from client import Console
+from server.recording.reader import RecordingReader
+from tests.support.stack import Stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+EVENTS = 100  # to drive for: about five chunks
+CAMERAS = ("overview", "front")
+
+
+def _token(link: str) -> str:
+    return link.partition("#token=")[2].partition("&")[0]
+
+
+async def _ask(stack: Stack, method: str, path: str) -> dict[str, Any]:
+    async with httpx.AsyncClient(trust_env=False, timeout=30) as http:
+        headers = {"Authorization": f"Bearer {_token(stack.supervisor)}"}
+        answer = await http.request(method, f"{stack.console}{path}", headers=headers)
+        answer.raise_for_status()
+        found: dict[str, Any] = answer.json()
+        return found
+
+
+async def _record_a_drive_in_vp8(stack: Stack) -> str:
+    """Its id."""
+    async with Console(stack.operator, codec="VP8", name="Ada") as console:
+        await console.take_seat()
+        await console.drive([0.3, 0.0, 0.2])
+        await _ask(stack, "POST", "/api/recordings")
+        for number in range(EVENTS):
+            await console.drive([0.3 if number // 25 % 2 == 0 else -0.3, 0.0, 0.2])
+        await _ask(stack, "POST", "/api/recordings/stop")
+    (recording,) = (await _ask(stack, "GET", "/api/recordings"))["recordings"]
+    found: str = recording["id"]
+    return found
+
+
+def _damage_the_last_chunk(path: Path) -> None:
+    with RecordingReader(path) as reader:
+        offset = reader.index.chunks[-1].offset + 500
+    with path.open("r+b") as file:
+        file.seek(offset)
+        byte = file.read(1)
+        file.seek(offset)
+        file.write(bytes([byte[0] ^ 1]))
+
+
+async def _seek(page: Page, event: int) -> None:
+    await page.evaluate("(event) => { location.hash = location.hash.replace(/event=\\d+/, `event=${event}`); }", event)
+
+
+async def _fits(page: Page) -> None:
+    """Nothing is wider than a phone or a laptop, and the alert is in sight."""
+    for width, height in ((1280, 800), (390, 844)):
+        await page.set_viewport_size({"width": width, "height": height})
+        assert await page.evaluate("document.documentElement.scrollWidth") <= width
+        await page.set_viewport_size({"width": 1280, "height": 800})
+
+
+async def test_pictures_in_vp8_are_played_and_damage_and_deletion_are_said_and_leave_the_rest(
+    stack: Stack, chromium: Browser, tmp_path: Path
+) -> None:
+    recording = await _record_a_drive_in_vp8(stack)
+    path = tmp_path / "state" / "recordings" / f"{recording}.mcap"
+    await asyncio.to_thread(_damage_the_last_chunk, path)
+    with RecordingReader(path) as reader:
+        chunks = reader.index.chunks
+        whole, damaged = chunks[0].last_event - 2, chunks[-1].last_event - 1
+    link = f"{stack.console}/recordings#token={_token(stack.observer)}&recording={recording}&event={whole}"
+    async with open_page(chromium, link) as page:
+        replay = ConsolePage(page)
+        await replay.until(f"s.ready && s.event === {whole}")
+        for camera in CAMERAS:
+            strip = await page.evaluate(READ_STRIP, camera)
+            assert strip["event"] == strip["stamp"] <= whole
+        await _seek(page, damaged)
+        await replay.until(f"s.ready && s.event === {damaged} && s.unreadable.damaged === 1")
+        await expect(page.get_by_text("1 damaged part", exact=True)).to_be_visible()
+        await expect(page.locator("figure").get_by_text("This part of the recording is damaged")).to_have_count(3)
+        await _fits(page)
+        await _ask(stack, "DELETE", f"/api/recordings/{recording}")
+        await _seek(page, whole)  # it is loaded
+        await replay.until(f"s.ready && s.event === {whole}")
+        assert (await page.evaluate(READ_STRIP, "front"))["event"] <= whole
+
+
+async def test_a_player_of_a_running_recording_outlives_the_loss_of_its_console_and_then_of_its_file(
+    stack: Stack, chromium: Browser
+) -> None:
+    await _ask(stack, "POST", "/api/recordings")
+    async with open_page(chromium, f"{stack.console}/recordings#token={_token(stack.observer)}") as page:
+        replay = ConsolePage(page)
+        await page.get_by_role("listitem").get_by_role("button").click()
+        await replay.until("s.ready && s.running && s.pictures.front !== undefined")
+        alert = page.get_by_role("alert")
+        await page.context.set_offline(True)
+        await expect(alert).to_be_visible(timeout=15_000)
+        await _fits(page)
+        assert (await replay.stats())["pictures"]["front"] is not None
+        known = (await replay.stats())["ended"]
+        await page.context.set_offline(False)
+        await replay.until(f"s.ended > {known} && s.ready")
+        await expect(alert).to_be_hidden()
+        (recording,) = (await _ask(stack, "GET", "/api/recordings"))["recordings"]
+        await _ask(stack, "POST", "/api/recordings/stop")
+        await _ask(stack, "DELETE", f"/api/recordings/{recording['id']}")
+        await replay.until("s.deleted && !s.running")
+        await expect(alert).to_contain_text("This recording was deleted")
+        await _fits(page)
