@@ -11,6 +11,7 @@ from robot_bridge.protocol.messages import Feedback, StopState, Text
 from server.access import Identity, require_role
 from server.body import read_json
 from server.errors import LinkDown
+from server.json_answer import json_answer
 from server.services import authorized, services, takes_stops
 
 __all__ = ["Delivered", "Health", "ScenePath", "SessionInfo", "StopRequest", "router"]
@@ -72,7 +73,7 @@ class Delivered(msgspec.Struct, frozen=True):
 @router.get("/api/session")
 async def session(request: Request, caller: Caller) -> Response:
     console = services(request).console
-    return _json(
+    return json_answer(
         SessionInfo(
             epoch=console.clock.epoch,
             event=console.clock.event,
@@ -100,7 +101,7 @@ async def stop(request: Request) -> Response:
     delivered, event = robot.stop(caller.actor, "http", wanted.reason)
     if not delivered:
         raise LinkDown("the robot cannot be told now; the stop is kept and sent first when the link is back")
-    return _json(Delivered(True, event))
+    return json_answer(Delivered(True, event))
 
 
 @router.post("/api/reset")
@@ -108,7 +109,7 @@ async def reset(request: Request, caller: Caller) -> Response:
     require_role(caller, "operator", "supervisor")
     console = services(request).console
     console.reset(caller.actor, "http")
-    return _json(Delivered(True, console.clock.event))
+    return json_answer(Delivered(True, console.clock.event))
 
 
 @router.post("/api/scene")
@@ -119,7 +120,7 @@ async def scene(request: Request, caller: Caller) -> Response:
     root = str(request.scope.get("root_path", ""))
     base = f"{str(request.base_url).replace('http', 'ws', 1).rstrip('/')}{root}"
     ticket = here.access.issue_ticket(caller.token_id)
-    return _json(ScenePath(f"{root}/scene/?websocket={base}/scene/ws/{ticket}&darkMode&hideViserLogo"))
+    return json_answer(ScenePath(f"{root}/scene/?websocket={base}/scene/ws/{ticket}&darkMode&hideViserLogo"))
 
 
 @router.get("/healthz")
@@ -128,7 +129,7 @@ async def healthz(request: Request) -> Response:
     health = Health(
         status="ok" if robot.up else "degraded", robot_link="up" if robot.up else "down", detail=robot.detail
     )
-    return _json(health)
+    return json_answer(health)
 
 
 @router.get("/metrics")
@@ -136,7 +137,3 @@ async def metrics(request: Request) -> Response:
     here = services(request)
     text = await here.metrics.exposition.text(here.collect)
     return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})
-
-
-def _json(answer: msgspec.Struct) -> Response:
-    return Response(msgspec.json.encode(answer), media_type="application/json", headers={"Cache-Control": "no-store"})

@@ -7,17 +7,14 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from server.access import Identity, require_role
 from server.board.board import SharedRecord
-from server.fleet.fleet import Fleet, fleet_of
+from server.fleet.fleet import Fleet, fleet_caller, fleet_of
+from server.json_answer import json_answer
 
 __all__ = ["MAX_RECORDS", "FleetAudit", "router"]
 
 router = APIRouter()
 
 MAX_RECORDS = 500  # in one answer
-
-
-def _fleet_caller(request: Request) -> Identity:
-    return fleet_of(request).caller(request)
 
 
 class FleetAudit(msgspec.Struct, frozen=True, kw_only=True):
@@ -31,7 +28,7 @@ class FleetAudit(msgspec.Struct, frozen=True, kw_only=True):
 @router.get("/api/fleet/audit")
 async def audit(
     request: Request,
-    caller: Annotated[Identity, Depends(_fleet_caller)],
+    caller: Annotated[Identity, Depends(fleet_caller)],
     limit: Annotated[int, Query(ge=1, le=MAX_RECORDS)] = 100,
 ) -> Response:
     """The newest `limit` records of the robots that the supervisor's link is good for."""
@@ -40,8 +37,7 @@ async def audit(
     shared = await here.board.audit(MAX_RECORDS if caller.robots else limit)
     found = {_key(each): each for each in (*shared.records, *_own(here, limit)) if here.may(caller, each.robot)}
     records = sorted(found.values(), key=lambda each: each.record.time)
-    answer = FleetAudit(records=records[-limit:], complete=shared.complete, detail=shared.detail)
-    return Response(msgspec.json.encode(answer), media_type="application/json", headers={"Cache-Control": "no-store"})
+    return json_answer(FleetAudit(records=records[-limit:], complete=shared.complete, detail=shared.detail))
 
 
 def _key(shared: SharedRecord) -> tuple[str, int, float]:

@@ -14,18 +14,15 @@ from server.board.board import BoardState
 from server.board.tile import Tile
 from server.body import read_json
 from server.errors import LinkOtherRobot
-from server.fleet.fleet import Fleet, Stopped, fleet_of
+from server.fleet.fleet import Fleet, Stopped, fleet_caller, fleet_of
+from server.json_answer import json_answer
 
 __all__ = ["FleetHealth", "FleetInfo", "FleetReadiness", "FleetStop", "RobotTile", "router"]
 
 router = APIRouter()
 
 
-def _fleet_caller(request: Request) -> Identity:
-    return fleet_of(request).caller(request)
-
-
-Caller = Annotated[Identity, Depends(_fleet_caller)]
+Caller = Annotated[Identity, Depends(fleet_caller)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +91,7 @@ class FleetReadiness(msgspec.Struct, frozen=True, kw_only=True):
 async def fleet(request: Request, caller: Caller) -> Response:
     here = fleet_of(request)
     may_drive = caller.role != "observer"
-    return _json(
+    return json_answer(
         FleetInfo(
             you=You(caller.role, caller.name),
             time=round(time.time(), 3),
@@ -113,21 +110,21 @@ async def stop(request: Request, caller: Caller) -> Response:
     stopped = await here.stop_all(caller, caller.actor, wanted.reason)
     if not stopped:
         raise LinkOtherRobot("this link is good for none of the robots here")
-    return _json(FleetStop(robots=[_stopped(each) for each in stopped]))
+    return json_answer(FleetStop(robots=[_stopped(each) for each in stopped]))
 
 
 @router.get("/healthz")
 async def healthz(request: Request) -> Response:
     robots = _health(fleet_of(request))
     well = all(each.robot_link == "up" for each in robots.values())
-    return _json(FleetHealth(status="ok" if well else "degraded", robots=robots))
+    return json_answer(FleetHealth(status="ok" if well else "degraded", robots=robots))
 
 
 @router.get("/readyz")
 async def readyz(request: Request) -> Response:
     robots = _health(fleet_of(request))
     away = [name for name, each in robots.items() if each.robot_link == "down"]
-    return _json(FleetReadiness(ready=True, unreachable=away))
+    return json_answer(FleetReadiness(ready=True, unreachable=away))
 
 
 @router.get("/metrics")
@@ -160,7 +157,3 @@ def _notices(state: BoardState) -> list[Notice]:
         names = " and ".join(each.consoles)
         found.append(Notice("error", f"{each.error}: {names} both say that they have the robot {each.robot!r}."))
     return found
-
-
-def _json(answer: msgspec.Struct) -> Response:
-    return Response(msgspec.json.encode(answer), media_type="application/json", headers={"Cache-Control": "no-store"})

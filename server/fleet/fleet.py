@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import structlog
-from starlette.requests import HTTPConnection
+from starlette.requests import HTTPConnection, Request
 
 from server.access import Access, Identity
 from server.audit import Actor, AuditRecord
@@ -24,7 +24,7 @@ from server.settings import Settings
 from server.state import robot_place
 from server.sweeper import sweep_forever
 
-__all__ = ["Fleet", "Stopped", "fleet_of"]
+__all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
 
 log = structlog.get_logger(__name__)
 
@@ -204,3 +204,8 @@ def fleet_of(connection: HTTPConnection) -> Fleet:
     if not isinstance(found, Fleet):
         raise TypeError("the app has no fleet")
     return found
+
+
+def fleet_caller(connection: Request) -> Identity:
+    """Who asks the fleet. Raises AccessError."""
+    return fleet_of(connection).caller(connection)

@@ -3,23 +3,20 @@
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
-import msgspec
-from fastapi import Depends, FastAPI, Request, Response
+from fastapi import FastAPI, Request, Response
 from starlette.routing import Mount
 
-from server.app import guard_app, restrict_ice, same_origin
+from server.bare_app import bare_app, guard_app, open_house
 from server.board import make_board
-from server.error_answers import answer_errors
 from server.errors import NotFound
 from server.fleet import api_audit, api_fleet
 from server.fleet.fleet import Fleet, fleet_of
 from server.fleet.fleet_openapi import fleet_openapi
-from server.guard import Guard
-from server.house import House
+from server.json_answer import json_answer
 from server.page import page_router
 from server.robot_paths import ROBOTS
 from server.settings import Settings
-from server.state import ConsoleState, open_state
+from server.state import ConsoleState
 
 __all__ = ["create_fleet_app"]
 
@@ -30,31 +27,19 @@ def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: 
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        opened = state or open_state(settings)
-        restrict_ice(settings)
-        guard = Guard(settings)
-        house = House(opened, guard, fleet.metrics, settings.max_total_peers, settings.reserved_places)
-        app.state.house = house
+        house = open_house(app, settings, state, fleet.metrics, settings.max_total_peers, settings.reserved_places)
         board = make_board(
             settings,
-            opened.signing_key(settings),
+            house.state.signing_key(settings),
             fleet,
-            opened.invitations,
+            house.state.invitations,
             settings.public_url,
             fleet.metrics.registry,
         )
         async with fleet.running(house, board):
             yield
 
-    app = FastAPI(
-        title="Lockstep fleet",
-        lifespan=lifespan,
-        dependencies=[Depends(same_origin)],
-        docs_url=None,
-        redoc_url=None,
-        openapi_url=None,
-    )
-    app.state.settings = settings
+    app = bare_app("Lockstep fleet", settings, lifespan)
     app.state.fleet = fleet
     app.include_router(api_fleet.router)
     app.include_router(api_audit.router)
@@ -63,7 +48,6 @@ def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: 
         app.router.routes.append(Mount(f"{ROBOTS}/{name}", app=session.app))
     app.add_api_route(f"{ROBOTS}/{{name}}", _with_slash, include_in_schema=False)
     app.include_router(page_router(first="fleet.html", of_robot=False))
-    answer_errors(app)
     guard_app(app, settings)
     return app
 
@@ -76,4 +60,4 @@ async def _with_slash(request: Request, name: str) -> Response:
 
 
 async def _describe() -> Response:
-    return Response(msgspec.json.encode(fleet_openapi()), media_type="application/json")
+    return json_answer(fleet_openapi())

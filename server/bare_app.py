@@ -1,0 +1,88 @@
+"""What every app of a console begins and ends with, for one robot or several: house, errors, front door."""
+
+from fastapi import Depends, FastAPI
+from starlette.middleware.cors import CORSMiddleware
+from starlette.requests import HTTPConnection
+from starlette.types import Lifespan
+
+from server.error_answers import answer_errors, count_refused
+from server.front_door import FrontDoor, HostNames
+from server.guard import Guard
+from server.house import House, HouseMetrics
+from server.media.aiortc_private import own_addresses, restrict_ice_hosts
+from server.rate_limits import RateLimits
+from server.security import SAFE_METHODS, SecurityHeaders, check_origin
+from server.settings import Settings
+from server.state import ConsoleState, open_state
+
+__all__ = ["bare_app", "guard_app", "open_house"]
+
+LOOPBACK = "127.0.0.1"
+
+
+def bare_app(title: str, settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
+    """Without a route. It needs `app.state.house` before the first request."""
+    app = FastAPI(
+        title=title,
+        lifespan=lifespan,
+        dependencies=[Depends(_same_origin)],
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+    )
+    app.state.settings = settings
+    answer_errors(app)
+    return app
+
+
+def open_house(
+    app: FastAPI,
+    settings: Settings,
+    state: ConsoleState | None,
+    metrics: HouseMetrics,
+    max_peers: int | None = None,
+    reserved: int = 0,
+) -> House:
+    """To be called when the lifespan of `app` begins; `state` stands in for what the settings name."""
+    opened = state or open_state(settings)
+    _restrict_ice(settings)
+    house = House(opened, Guard(settings), metrics, max_peers, reserved)
+    app.state.house = house
+    return house
+
+
+def guard_app(app: FastAPI, settings: Settings) -> None:
+    """What every request passes before any route."""
+    if settings.allowed_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=list(settings.allowed_origins),
+            allow_methods=["GET", "POST", "PATCH", "DELETE"],
+            allow_headers=["Authorization", "Content-Type", "If-Match"],
+            expose_headers=["Location", "ETag", "Link"],
+        )
+    app.add_middleware(
+        FrontDoor,
+        hosts=HostNames((settings.host, *settings.own_names)),
+        requests=RateLimits(settings.max_request_rate, settings.max_request_burst),
+        count=count_refused,
+    )
+    app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None, relays=settings.relay_origins)
+
+
+def _restrict_ice(settings: Settings) -> None:
+    """A console bound to loopback offers loopback, which aioice never gathers, and this machine's own addresses.
+
+    Firefox pairs loopback with nothing unless a hidden preference says so; it reaches the console by an own address.
+    Only who got ICE credentials over the loopback-bound signalling can use either.
+    """
+    if settings.ice_hosts:
+        restrict_ice_hosts(settings.ice_hosts)
+    elif settings.bound_to_loopback:
+        restrict_ice_hosts([settings.host if settings.host != "localhost" else LOOPBACK, *own_addresses()])
+
+
+def _same_origin(connection: HTTPConnection) -> None:
+    """A dependency of all routes. WebSockets check for themselves: a refusal is another thing there."""
+    if connection.scope["type"] == "http" and connection.scope["method"] not in SAFE_METHODS:
+        check_origin(connection.headers, connection.app.state.settings.allowed_origins)
