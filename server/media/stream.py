@@ -10,6 +10,7 @@ from typing import Generic, Literal, TypeVar
 from robot_bridge.protocol.console import Tier
 from robot_bridge.protocol.messages import Media
 from robot_bridge.protocol.serial import event_gap
+from robot_bridge.thread_name import name_thread
 from server.media.errors import MediaError
 from server.media.fanout import FanOut
 from server.media.frame import EncodedFrame
@@ -60,7 +61,9 @@ class Stream(ABC, Generic[Job]):
         self._last_stamp: int | None = None
         self._reported = False  # that the worker failed
         self._wake = asyncio.Event()
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"media-{name}")
+        self._thread = ThreadPoolExecutor(
+            1, thread_name_prefix=f"media-{name}", initializer=name_thread, initargs=(f"media-{name}",)
+        )
         self._peers = metrics.peers.labels(name)
         self._frames_in = metrics.frames_in.labels(name)
         self._outputs: dict[tuple[str, Tier], Output] = {}

@@ -13,6 +13,7 @@ from robot_bridge.protocol.description import Camera
 from robot_bridge.robots.mujoco_view.canvas import DEFAULT_LOOK, Canvas, Look
 from robot_bridge.robots.mujoco_view.graphics import graphics_unavailable
 from robot_bridge.robots.mujoco_view.sheet import Sheet
+from robot_bridge.thread_name import name_thread
 
 __all__ = ["Renderer"]
 
@@ -27,7 +28,9 @@ class Renderer:
             RobotUnavailable: OpenGL cannot be used here.
         """
         self._sheets: dict[tuple[int, int], Sheet] = {}  # by size, used again for each picture
-        self._thread = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="render")
+        self._thread = concurrent.futures.ThreadPoolExecutor(
+            max_workers=1, thread_name_prefix="render", initializer=name_thread, initargs=("render",)
+        )
         try:
             self._canvas: Canvas | None = self._thread.submit(Canvas, model, width, height, look).result()
         except (ImportError, RuntimeError, AttributeError, OSError, mujoco.FatalError) as error:
