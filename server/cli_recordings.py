@@ -29,7 +29,7 @@ from server.settings import Settings
 from server.state import ConsoleState, open_state, robot_directory
 from server.state_dir import StateDirUnusable
 
-__all__ = ["add_recording_commands"]
+__all__ = ["DirectoryOption", "File", "add_recording_commands", "recording_file"]
 
 EXIT_BROKEN = 1  # a promise is not kept
 EXIT_USAGE = 2
@@ -102,7 +102,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         as_json: Json = False,
     ) -> None:
         """Serve the player for one recording, without a robot, and print its link."""
-        path = _found(file, make_settings(state_dir=state_dir), robot, directory)
+        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         try:
             asyncio.run(_replay(path, host, port, as_json))
         except PortTaken as error:
@@ -120,7 +120,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         as_json: Json = False,
     ) -> None:
         """Check what is promised against a recording. Exit code 1: it is not kept; 2: it cannot be read."""
-        path = _found(file, make_settings(state_dir=state_dir), robot, directory)
+        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         verdict = _or_usage(lambda: verify_file(path))
         if as_json:
             sys.stdout.write(msgspec.json.encode({"file": str(path), **msgspec.to_builtins(verdict)}).decode() + "\n")
@@ -142,7 +142,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         state_dir: StateDirOption = None,
     ) -> None:
         """Write a recording in another form."""
-        path = _found(file, make_settings(state_dir=state_dir), robot, directory)
+        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         # Loaded only here: parquet and lerobot need pyarrow, the extra "export".
         exporter: Any = import_module(f"server.recording.export_{to.value}")
         written = _or_usage(lambda: exporter.export(path, out, task))
@@ -216,7 +216,7 @@ def _shelf(settings: Settings, robot: str, directory: Path | None) -> Shelf:
     return Shelf(directory or own, settings.recording)
 
 
-def _found(file: Path, settings: Settings, robot: str, directory: Path | None) -> Path:
+def recording_file(file: Path, settings: Settings, robot: str, directory: Path | None) -> Path:
     """`file` itself, or the recording of that id."""
     if file.is_file():
         return file

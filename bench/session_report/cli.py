@@ -10,9 +10,12 @@ import typer
 
 from bench.session_report.figures import Figure, session_figures
 from bench.session_report.session import Session, read_session
+from server.cli_access import RobotOption, StateDirOption
+from server.cli_recordings import DirectoryOption, File, recording_file
 from server.recording.errors import RecordingError
 from server.recording.verify import Verdict
 from server.recording.verify_file import verify_file
+from server.settings import Settings
 
 __all__ = ["report_command", "write_report"]
 
@@ -20,12 +23,17 @@ STYLE = files("bench.experiment") / "report.css"
 
 
 def report_command(
-    file: Annotated[Path, typer.Argument(help="A recording.", exists=True, dir_okay=False)],
+    file: File,
     out: Annotated[Path | None, typer.Option(help="HTML file to write; unset: beside the recording.")] = None,
+    directory: DirectoryOption = None,
+    robot: RobotOption = "",
+    state_dir: StateDirOption = None,
 ) -> None:
     """Draw the thesis' figures from a recorded session."""
+    settings = Settings() if state_dir is None else Settings(state_dir=state_dir)
+    path = recording_file(file, settings, robot, directory)
     try:
-        print(write_report(file, out or file.with_suffix(".html")))
+        print(write_report(path, out or path.with_suffix(".html")))
     except (RecordingError, OSError) as error:
         typer.echo(f"lockstep: {error}", err=True)
         raise typer.Exit(2) from error

@@ -82,6 +82,14 @@ def test_a_dataset_goes_where_it_is_told(directory: Path, tmp_path: Path) -> Non
     assert (out / "meta" / "info.json").is_file()
 
 
+def test_a_report_is_drawn_of_an_id_as_of_a_path(directory: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    done = _lockstep(directory, "report", "one", "--out", str(out))
+    assert done.exit_code == 0, done.output
+    assert "<svg" in out.read_text(encoding="utf-8")
+    assert _lockstep(directory, "report", "nowhere").exit_code == 2
+
+
 def test_what_cannot_be_exported_is_said_in_one_line(directory: Path) -> None:
     (directory / "text.mcap").write_text("no recording")
     done = _lockstep(directory, "export", "text", "--to", "csv")
