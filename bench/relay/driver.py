@@ -1,6 +1,7 @@
-"""An operator in a process of its own: `python -m bench.relay.driver LINK` drives without end.
+"""An operator in a process of its own: `python -m bench.relay.driver LINK SECONDS` drives without end.
 
-Every second it says in a JSON line how long each command took to its feedback, and when that was.
+SECONDS pass between a feedback and the next command. Every second it says in a JSON line how long each command took to
+its feedback, and when that was.
 """
 
 import asyncio
@@ -16,7 +17,7 @@ __all__ = ["main"]
 SWING_SECONDS = 4.0
 
 
-async def drive(link: str) -> None:
+async def drive(link: str, interval: float) -> None:
     async with Console(link, video=False, audio=False, name="driver") as console:
         await console.take_seat()
         axis = console.description.axes[0]
@@ -31,10 +32,11 @@ async def drive(link: str) -> None:
             if began - told >= 1.0:
                 print(json.dumps({"at": began, "event": console.stats().event, "trips_ms": trips}), flush=True)
                 trips, told = [], began
+            await asyncio.sleep(interval)
 
 
 def main() -> None:
-    asyncio.run(drive(sys.argv[1]))
+    asyncio.run(drive(sys.argv[1], float(sys.argv[2])))
 
 
 if __name__ == "__main__":

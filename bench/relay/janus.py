@@ -15,6 +15,7 @@ general: {{
     debug_colors = false
     session_timeout = 60
     server_name = "lockstep"
+    event_loops = 1
 }}
 media: {{ rtp_port_range = "{first_port}-{last_port}" }}
 nat: {{ ignore_mdns = true }}

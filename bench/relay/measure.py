@@ -17,6 +17,9 @@ ROOMY = {"max_peers": "500", "max_unconnected": "500", "max_offer_burst": "2000"
 SETTLE = 3.0  # s
 BACK_SECONDS = 30.0  # that a page may take at most to be measured at all
 CROWD_SECONDS = 400.0
+CALM = (
+    0.3  # s between the crowd's operator's commands: every feedback goes to each observer, on the machine that drives
+)
 NICE = ("nice", "-n", "19")  # observers have machines of their own, and take what the others leave
 
 
@@ -73,7 +76,7 @@ async def crowd(folder: Path, counts: Sequence[int], seconds: float, say: Callab
         await stage.add_janus("robot", 0)
         await stage.add_janus("robot", 1)
         await stage.add_console([("robot", 0), ("robot", 1)], "--observers-direct", "0", **ROOMY)
-        driver = await stage.add_driver("robot")
+        driver = await stage.add_driver("robot", CALM)
         await asyncio.sleep(SETTLE)
         found = [await _look(stage, driver, None, 0, seconds)]
         say(f"relay: {found[-1].summary}")
@@ -106,7 +109,8 @@ async def _look(stage: RelayStage, driver: Process, audience: Process | None, co
         connected = said[0]["connected"]
         first, last = said[max(1, heard)], said[-1]
         between = max(1e-3, last["at"] - first["at"])
-        packets, least = ((last[name] - first[name]) / between for name in ("packets", "least"))
+        rates = [(now - before) / between for before, now in zip(first["packets"], last["packets"], strict=True)]
+        packets, least = sum(rates), min(rates)
     janus = len(stage.janus)
     return Crowd(
         count, shares[0], tuple(shares[1 : 1 + janus]), sum(shares[1 + janus :]), trips, packets, least, connected

@@ -140,9 +140,10 @@ class RelayStage:
         async with running_chromium(executable=script, flags=[secure]) as browser:
             yield browser
 
-    async def add_driver(self, side: Side = "operator") -> Process:
-        """An operator that drives from now on."""
-        driver = await self.start(side, [sys.executable, "-m", "bench.relay.driver", self.links["operator"]])
+    async def add_driver(self, side: Side = "operator", interval: float = 0.0) -> Process:
+        """An operator that drives from now on; `interval`: seconds between a feedback and the next command."""
+        command = [sys.executable, "-m", "bench.relay.driver", self.links["operator"], str(interval)]
+        driver = await self.start(side, command)
         await driver.line(r'^\{"at"')
         return driver
 
