@@ -1,7 +1,6 @@
 """A real Caddy with the fleet's Caddyfile in front of two servers that say who they are."""
 
 import asyncio
-import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -9,9 +8,9 @@ from pathlib import Path
 import httpx
 import pytest
 
+from tests.support.fleet_entry import running_entry
 from tests.support.redis_server import free_port
 
-CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile.fleet"
 READY_SECONDS = 20.0
 
 
@@ -36,28 +35,19 @@ def _address(server: asyncio.Server) -> str:
 @asynccontextmanager
 async def _entry(directory: Path, one: asyncio.Server, two: asyncio.Server) -> AsyncIterator[httpx.AsyncClient]:
     https = free_port()
-    settings = {"LOCKSTEP_SITE": "localhost", "LOCKSTEP_ONE": _address(one), "LOCKSTEP_TWO": _address(two)}
-    ports = {"LOCKSTEP_HTTPS_PORT": str(https), "LOCKSTEP_HTTP_PORT": str(free_port())}
-    folders = {"HOME": str(directory), "XDG_DATA_HOME": str(directory), "XDG_CONFIG_HOME": str(directory)}
-    process = await asyncio.create_subprocess_exec(
-        *("caddy", "run", "--config", str(CADDYFILE), "--adapter", "caddyfile"),
-        env=os.environ | settings | ports | folders,
-        stderr=asyncio.subprocess.DEVNULL,
-    )
-    try:
-        async with httpx.AsyncClient(base_url=f"https://localhost:{https}", verify=False, trust_env=False) as http:
-            async with asyncio.timeout(READY_SECONDS):
-                while True:
-                    try:
-                        await http.get("/")
-                    except httpx.TransportError:
-                        await asyncio.sleep(0.05)
-                    else:
-                        break
-            yield http
-    finally:
-        process.terminate()
-        await process.wait()
+    async with (
+        running_entry(directory, _address(one), _address(two), https),
+        httpx.AsyncClient(base_url=f"https://localhost:{https}", verify=False, trust_env=False) as http,
+        asyncio.timeout(READY_SECONDS),
+    ):
+        while True:  # until it has a certificate
+            try:
+                await http.get("/")
+            except httpx.TransportError:
+                await asyncio.sleep(0.05)
+            else:
+                break
+        yield http
 
 
 @pytest.mark.timeout(60)

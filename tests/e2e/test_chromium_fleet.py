@@ -5,7 +5,6 @@ import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.async_api import Browser, Page, expect
@@ -13,6 +12,7 @@ from playwright.async_api import Browser, Page, expect
 from bench.browsers.chromium import open_page
 from bench.browsers.console_page import ConsolePage
 from client import Console
+from tests.e2e.overview import in_view, stats, until
 from tests.support.stack import Stack, running_fleet
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
@@ -31,33 +31,6 @@ async def lone(tmp_path: Path) -> AsyncIterator[Stack]:
     """A fleet of one."""
     async with running_fleet(tmp_path, {"left": "planar"}) as running:
         yield running
-
-
-async def _until(page: Page, condition: str, seconds: float = 30.0) -> None:
-    """Until `condition`, over `s`, the overview's figures, and `r`, its robots by name, is true."""
-    waiting = """(limit) => new Promise((resolve) => {
-      const holds = () => {
-        try {
-          const s = window.lockstepFleet.stats(), r = Object.fromEntries(s.robots.map((each) => [each.name, each]));
-          return Boolean(%s);
-        } catch { return false; }
-      };
-      const end = performance.now() + limit;
-      const look = () => {
-        if (holds()) resolve(null);
-        else if (performance.now() > end) resolve(JSON.stringify(window.lockstepFleet?.stats() ?? null));
-        else setTimeout(look, 20);
-      };
-      look();
-    })"""
-    missed = await page.evaluate(waiting % condition, seconds * 1000)
-    if missed is not None:
-        raise AssertionError(f"never came true: {condition}\nthe overview: {missed}")
-
-
-async def _stats(page: Page) -> dict[str, Any]:
-    found: dict[str, Any] = await page.evaluate("window.lockstepFleet.stats()")
-    return found
 
 
 async def _until_watched(page: Page, watching: dict[str, int], seconds: float = 20.0) -> None:
@@ -79,15 +52,7 @@ async def _until_watched(page: Page, watching: dict[str, int], seconds: float = 
 
 
 async def _names(page: Page) -> list[str]:
-    return [robot["name"] for robot in (await _stats(page))["robots"]]
-
-
-async def _in_view(page: Page, name: str) -> bool:
-    box = await page.get_by_role("button", name=name).bounding_box()
-    size = page.viewport_size
-    if box is None or size is None:
-        return False
-    return box["x"] >= 0 and box["x"] + box["width"] <= size["width"] and box["y"] + box["height"] <= size["height"]
+    return [robot["name"] for robot in (await stats(page))["robots"]]
 
 
 @asynccontextmanager
@@ -113,43 +78,43 @@ async def test_every_robot_has_a_live_tile_behind_its_gate_that_leads_to_its_pag
     fleet: Stack, chromium: Browser
 ) -> None:
     async with open_page(chromium, fleet.operator) as page:
-        await _until(page, f"s.robots.length === {len(NAMES)} && s.robots.every((x) => x.picture === 'live')")
+        await until(page, f"s.robots.length === {len(NAMES)} && s.robots.every((x) => x.picture === 'live')")
         await expect(page.get_by_role("heading", level=2)).to_have_text(list(NAMES))
         await expect(page.get_by_role("article", name="middle")).to_contain_text("Free")
         async with _driving(fleet, "middle"):
-            await _until(page, "r.middle.state === 'driven' && r.middle.words === 'Driven by Ann'")
+            await until(page, "r.middle.state === 'driven' && r.middle.words === 'Driven by Ann'")
             await expect(page.get_by_role("article", name="left")).to_contain_text("Free")
-            await _until(page, "r.middle.stamp > 30 && r.left.stamp === 1")
-        assert {robot["violations"] for robot in (await _stats(page))["robots"]} == {0}
+            await until(page, "r.middle.stamp > 30 && r.left.stamp === 1")
+        assert {robot["violations"] for robot in (await stats(page))["robots"]} == {0}
         await page.get_by_role("link", name="Open to drive: middle").click()
         await ConsolePage(page).until_live()
         assert "/robots/middle/#token=" in page.url
-        assert await _in_view(page, "Stop the robot")
+        assert await in_view(page, "Stop the robot")
         await page.get_by_role("link", name="All robots").click()
-        await _until(page, f"s.robots.length === {len(NAMES)}")
+        await until(page, f"s.robots.length === {len(NAMES)}")
         assert page.url == fleet.operator
 
 
 async def test_a_robot_that_is_away_says_so_first_and_stop_reaches_the_others(fleet: Stack, chromium: Browser) -> None:
     async with open_page(chromium, fleet.observer) as page:
-        await _until(page, "s.open === 3 && s.robots.every((x) => x.picture === 'live')")
+        await until(page, "s.open === 3 && s.robots.every((x) => x.picture === 'live')")
         with fleet.frozen_bridge("right"):
-            await _until(page, "r.right.state === 'unreachable' && !r.right.connected && r.right.picture !== 'live'")
+            await until(page, "r.right.state === 'unreachable' && !r.right.connected && r.right.picture !== 'live'")
             assert (await _names(page))[0] == "right"
             await expect(page.get_by_role("article", name="right")).to_contain_text("Unreachable since")
-            await _until(page, "r.left.picture === 'live' && r.middle.picture === 'live'")
+            await until(page, "r.left.picture === 'live' && r.middle.picture === 'live'")
             await page.get_by_role("searchbox").fill("left")
-            await _until(page, "s.robots.length === 1 && s.open === 1")
+            await until(page, "s.robots.length === 1 && s.open === 1")
             await _until_watched(page, {"left": 1, "middle": 0})
             await page.keyboard.press("Escape")
-            await _until(page, "s.stop && s.stop.stopped.length === 2 && s.stop.tone === 'bad'")
+            await until(page, "s.stop && s.stop.stopped.length === 2 && s.stop.tone === 'bad'")
             answer = page.get_by_role("alert")
             await expect(answer).to_contain_text("2 of 3 robots stopped")
             await expect(answer).to_contain_text("right: not delivered")
             await expect(answer).to_contain_text("emergency stops")
             for name in ("left", "middle"):
                 assert list(fleet.events("stop", name))
-        await _until(page, "s.stop && s.stop.tone === 'done' && s.stop.title === 'All 3 robots are stopped'")
+        await until(page, "s.stop && s.stop.tone === 'done' && s.stop.title === 'All 3 robots are stopped'")
         await page.get_by_role("button", name="Close").click()
         await page.get_by_role("searchbox").fill("")
         await expect(page.get_by_role("article", name="left")).to_contain_text("Stopped by")
@@ -157,28 +122,28 @@ async def test_a_robot_that_is_away_says_so_first_and_stop_reaches_the_others(fl
 
 async def test_a_lost_console_leaves_no_picture_that_looks_live(lone: Stack, chromium: Browser) -> None:
     async with open_page(chromium, lone.observer, width=390, height=844, touch=True) as page:
-        await _until(page, "s.robots.length === 1 && s.robots.some((x) => x.picture === 'live')")
+        await until(page, "s.robots.length === 1 && s.robots.some((x) => x.picture === 'live')")
         assert (await page.evaluate("document.documentElement.scrollWidth")) <= 390
         with lone.frozen_console():
-            await _until(page, "s.phase === 'unknown' && s.robots.every((x) => x.picture !== 'live')")
+            await until(page, "s.phase === 'unknown' && s.robots.every((x) => x.picture !== 'live')")
             await expect(page.get_by_role("article").first).to_contain_text("Unknown since")
             await expect(page.locator(".banner")).to_contain_text("What stands here was so at")
             await page.get_by_role("button", name="Stop all robots").tap()
             await expect(page.get_by_role("alert")).to_contain_text("stopped")
-            assert await _in_view(page, "Stop all robots")
-        await _until(page, "s.phase === 'live' && s.stop && s.stop.tone === 'done'")
+            assert await in_view(page, "Stop all robots")
+        await until(page, "s.phase === 'live' && s.stop && s.stop.tone === 'done'")
 
 
 async def test_a_link_that_is_no_good_says_what_to_do_and_can_be_replaced(lone: Stack, chromium: Browser) -> None:
     bad = re.sub("token=.*", "token=not-a-token", lone.observer)
     async with open_page(chromium, bad) as page:
         await expect(page.get_by_role("heading", name="This link is not valid")).to_be_visible()
-        assert await _in_view(page, "Stop all robots")
+        assert await in_view(page, "Stop all robots")
         await page.get_by_label("Your link").fill("hello")
         await page.get_by_role("button", name="Open").click()
         await expect(page.get_by_role("alert").first).to_contain_text("no link of a console")
         await page.get_by_label("Your link").fill(lone.observer)
         await page.get_by_role("button", name="Open").click()
-        await _until(page, "s.robots.length === 1")
+        await until(page, "s.robots.length === 1")
         await page.goto(lone.console)
         await expect(page.get_by_role("heading", name="Open the link")).to_be_visible()
