@@ -72,10 +72,12 @@ async def _spell(stack: Stack, console: Console, seconds: float) -> Cost:
     began, before = time.monotonic(), _spent(stack)
     await asyncio.sleep(seconds)
     ended, after = time.monotonic(), _spent(stack)
-    shares = [100 * (late - early) / (ended - began) for early, late in zip(before, after, strict=True)]
+    drawing, bridge, encoding, server = (
+        100 * (late - early) / (ended - began) for early, late in zip(before, after, strict=True)
+    )
     events = len(robot_times(log)) - driven
     pictures = sum(began <= each < ended for each in capture_times(log, console.description.cameras[0].name))
-    return Cost(*shares, pictures / (ended - began), events / (ended - began))
+    return Cost(drawing, bridge, encoding, server, pictures / (ended - began), events / (ended - began))
 
 
 def _spent(stack: Stack) -> tuple[float, float, float, float]:
