@@ -13,6 +13,8 @@ from typing import Literal
 
 import msgspec
 
+from robot_bridge.thread_name import name_thread
+
 __all__ = ["EventKind", "EventLog"]
 
 EventKind = Literal[
@@ -54,6 +56,7 @@ class EventLog:
             self._writer.join()
 
     def _write(self) -> None:
+        name_thread("event-log")
         works = True
         while (line := self._waiting.get()) is not None:
             if works:

@@ -1,11 +1,12 @@
 """Drives the holonomic base: velocities in the base frame in, wheel motors and a parking brake out."""
 
+import math
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from robot_bridge.robots.mobile_manipulator.simulation import BASE, base_from_world
+from robot_bridge.robots.mobile_manipulator.simulation import BASE
 
 __all__ = ["BaseDrive"]
 
@@ -28,10 +29,15 @@ class BaseDrive:
 
     def drive(self, data: Any, velocity: Array) -> None:
         """Use `velocity` (vx, vy, wz in the base frame) for the coming step."""
-        data.ctrl[BASE] = base_from_world(data.qpos[2]).T @ velocity
-        data.qfrc_applied[BASE] = self._brake(data.qpos[BASE], data.qvel[BASE]) if not velocity.any() else 0.0
-        if velocity.any():
+        yaw = data.qpos[2]
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        forward, left, turn = velocity.tolist()
+        data.ctrl[BASE] = (cosine * forward - sine * left, sine * forward + cosine * left, turn)
+        if forward or left or turn:
             self._parked = None
+            data.qfrc_applied[BASE] = 0.0
+        else:
+            data.qfrc_applied[BASE] = self._brake(data.qpos[BASE], data.qvel[BASE])
 
     def _brake(self, pose: Array, speed: Array) -> Array:
         if self._parked is None:

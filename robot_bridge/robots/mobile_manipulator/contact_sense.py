@@ -6,6 +6,7 @@ with the tool and bumping the base into a wall are both felt, against the direct
 of the robot with itself and its own weight and inertia are no part of it.
 """
 
+import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ __all__ = ["ContactReading", "ContactSense"]
 Array = npt.NDArray[np.float64]
 
 TIME_CONSTANT: Final = 0.03  # s of the wrench's low-pass
+FELT: Final = 1e-6  # N and N m, below which nothing is left of a contact
+NOTHING: Final = np.zeros(6)
+NOTHING.flags.writeable = False
 
 
 class ContactReading(NamedTuple):
@@ -36,6 +40,8 @@ class ContactSense:
         moving = model.body_treeid >= 0
         masses = np.bincount(model.body_treeid[moving], model.body_mass[moving], model.ntree)
         self._weights = masses * float(np.linalg.norm(model.opt.gravity))  # N, of each thing that moves by itself
+        self._asleep = b""  # which of them slept at the last look
+        self._resting = 0.0  # N, what those weigh
         self.wrench: Array = np.zeros(6)
 
     def clear(self) -> None:
@@ -44,18 +50,24 @@ class ContactSense:
     def update(self, data: Any, seconds: float) -> ContactReading:
         """Read the contacts of the last step, `seconds` after the reading before."""
         reading = self.read(data)
-        self.wrench = self.wrench + (reading.wrench - self.wrench) * -np.expm1(-seconds / TIME_CONSTANT)
+        if reading.wrench is not self.wrench:  # else nothing touches, and nothing did for a while
+            self.wrench = self.wrench + (reading.wrench - self.wrench) * -math.expm1(-seconds / TIME_CONSTANT)
+            if reading.wrench is NOTHING and np.abs(self.wrench).max() < FELT:
+                self.wrench = NOTHING
         return reading
 
     def read(self, data: Any) -> ContactReading:
+        # What sleeps has no contacts: without its weight, waking it would be heard as a blow.
+        resting = self._resting_weight(data.tree_asleep)
+        if not data.ncon:  # the robot stands on nothing but its own drives
+            return ContactReading(NOTHING, resting, 0.0)
         contact = data.contact
         rows = contact.efc_address  # of the normal force; -1 for a contact that is not active
-        # What sleeps has no contacts: without its weight, waking it would be heard as a blow.
-        normal = float(data.efc_force[rows[rows >= 0]].sum() + self._weights @ (data.tree_asleep >= 0))
+        normal = float(data.efc_force[rows[rows >= 0]].sum()) + resting
         robot = self._is_robot[contact.geom]
         felt = np.flatnonzero((rows >= 0) & (robot[:, 0] != robot[:, 1]))  # equal: none or both are the robot's
         if not felt.size:
-            return ContactReading(np.zeros(6), normal, 0.0)
+            return ContactReading(NOTHING, normal, 0.0)
         # With elliptic cones a contact's rows are its force along the contact frame: normal, then two tangents.
         local = data.efc_force[rows[felt][:, None] + np.arange(3)]
         sign = np.where(robot[felt, 1], 1.0, -1.0)  # the force acts on the second geom
@@ -65,3 +77,9 @@ class ContactSense:
         force, torque = world.sum(axis=0) @ rotation, np.cross(lever, world).sum(axis=0) @ rotation
         rubbing = float(np.hypot(local[:, 1], local[:, 2]).sum())
         return ContactReading(np.concatenate((force, torque)), normal, rubbing)
+
+    def _resting_weight(self, asleep: Array) -> float:
+        """N; asked for in every tick, and another one only now and then."""
+        if (now := asleep.tobytes()) != self._asleep:
+            self._asleep, self._resting = now, float(self._weights @ (asleep >= 0))
+        return self._resting

@@ -6,7 +6,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from robot_bridge.robots.mobile_manipulator.contact_sense import ContactReading
-from robot_bridge.robots.mobile_manipulator.simulation import ARM, BASE, JOINTS
+from robot_bridge.robots.mobile_manipulator.simulation import JOINTS
 
 __all__ = ["Heard", "Hearing"]
 
@@ -32,18 +32,21 @@ class Hearing:
     def __init__(self, model: Any) -> None:
         free = [index for index in range(model.njnt) if index >= JOINTS]
         self._objects = model.jnt_dofadr[free][:, None] + np.arange(3)  # the linear velocity of each movable object
-        self._sums = np.zeros(4)
+        self._sums = [0.0] * 4  # wheels, arm, wrist, rubbing
         self._knocks = 0.0
         self._ticks = 0
         self._pressure: float | None = None  # N, of all contacts at the last tick
 
     def listen(self, data: Any, contacts: ContactReading) -> None:
-        (vx, vy, wz), arm = data.qvel[BASE].tolist(), np.abs(data.qvel[ARM])
-        wheels = math.hypot(vx, vy) + DRUM_RADIUS * abs(wz)
-        large, small = float(arm[:3].sum()), float(arm[3:].sum())
-        objects = float(np.sqrt((data.qvel[self._objects] ** 2).sum(axis=1)).sum())
-        rubbing = contacts.rubbing * (wheels + ARM_LENGTH * (large + small)) + OBJECT_FRICTION * objects
-        self._sums += (wheels, large, small, rubbing)
+        speeds = data.qvel
+        vx, vy, wz, *arm = map(abs, speeds[:JOINTS].tolist())
+        wheels = math.hypot(vx, vy) + DRUM_RADIUS * wz
+        large, small = sum(arm[:3]), sum(arm[3:])
+        rubbing = contacts.rubbing * (wheels + ARM_LENGTH * (large + small))
+        if (objects := speeds[self._objects]).any():
+            rubbing += OBJECT_FRICTION * float(np.sqrt((objects**2).sum(axis=1)).sum())
+        for index, level in enumerate((wheels, large, small, rubbing)):
+            self._sums[index] += level
         self._ticks += 1
         if self._pressure is not None:
             rise = contacts.normal - self._pressure
@@ -54,7 +57,7 @@ class Hearing:
         """What was heard since the last call; nothing when there was no tick in between."""
         if not self._ticks:
             return Heard()
-        wheels, arm, wrist, rubbing = (self._sums / self._ticks).tolist()
+        wheels, arm, wrist, rubbing = (each / self._ticks for each in self._sums)
         heard = Heard(wheels, arm, wrist, rubbing, self._knocks)
-        self._sums, self._knocks, self._ticks = np.zeros(4), 0.0, 0
+        self._sums, self._knocks, self._ticks = [0.0] * 4, 0.0, 0
         return heard

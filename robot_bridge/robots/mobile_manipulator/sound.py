@@ -42,6 +42,9 @@ class Motor:
 
     def play(self, speed: float, steps: Signal, seconds: float) -> Signal:
         share = min(1.0, speed / self._full_speed)
+        if share == self._last == 0.0:
+            self._phase = (self._phase + 2 * math.pi * seconds * self._rest_pitch) % (2 * math.pi)
+            return np.zeros(len(steps), np.float32)
         glide = self._last + (share - self._last) * steps
         travelled = (self._last + glide) / 2 * steps  # integral of the glide
         phase = self._phase + 2 * np.pi * seconds * (self._rest_pitch * steps + self._pitch * travelled)
