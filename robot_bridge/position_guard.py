@@ -24,6 +24,7 @@ class PositionGuard:
         self._joint = [joint.name for joint in description.joints].index(limit.joint)
         self._gains = tuple(0.0 if each.gain is None else each.gain for each in limit.axes)
         self._brakes = tuple(description.axes[number].brake for number in self.axes)
+        self._brake_of = dict(zip(self.axes, self._brakes, strict=True))
         self._minimum = -math.inf if limit.minimum is None else limit.minimum + limit.margin
         self._maximum = math.inf if limit.maximum is None else limit.maximum - limit.margin
         self._reaction = tick_seconds + limit.latency
@@ -62,11 +63,7 @@ class PositionGuard:
         rate = math.nan if rates is None or self._joint >= len(rates) else rates[self._joint]
         if not math.isfinite(rate):
             return doubt(self.name, tuple(moving))
-        braking = max(
-            abs(offsets[number]) / brake
-            for number, brake in zip(self.axes, self._brakes, strict=True)
-            if number in moving
-        )
+        braking = max([abs(offsets[number]) / self._brake_of[number] for number in moving])
         room = self._maximum - position if rate > 0 else position - self._minimum
         speed = abs(rate)
         return Demand(self.name, tuple(moving) if speed else (), speed * self._reaction, speed * braking / 2, room)
