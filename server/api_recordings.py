@@ -251,12 +251,13 @@ class _Head(msgspec.Struct, frozen=True, omit_defaults=True):
     captured: int
     keyframe: bool
     size: int
-    format: str = ""  # of a picture: "h264", "vp8"
+    format: str = ""  # of a picture: "h264", "vp8"; of sound: "opus", "g711-ulaw"
 
 
 def _framed(record: Record) -> bytes:
     picture = record.picture
-    payload = record.payload if picture is None else picture.data
+    medium = picture or record.sound
+    payload = record.payload if medium is None else medium.data
     head = msgspec.json.encode(
         _Head(
             record.topic,
@@ -265,7 +266,7 @@ def _framed(record: Record) -> bytes:
             record.captured // 1000,
             picture is None or picture.keyframe,
             len(payload),
-            "" if picture is None else picture.format,
+            "" if medium is None else medium.format,
         )
     )
     return len(head).to_bytes(4, "big") + head + payload

@@ -88,7 +88,7 @@ def _sounds(microphone: str, seconds: int) -> Iterator[Entry]:
     noise = os.urandom(SOUND_BYTES)
     for number in range(seconds * SOUND_RATE):
         at = START + number * SECOND // SOUND_RATE + 2_000_000
-        data = sound_message("opus", at, noise, 48_000, 1)
+        data = sound_message("opus", at, noise)
         yield Entry(MICROPHONE + microphone, _event_at(at), at, at, data)
 
 

@@ -132,11 +132,12 @@ class MediaPlane:
                 None
                 if self._recorder is None
                 else RecordedOutput(
-                    stream.codecs if video else (_recorded_codec(stream),),
+                    _recorded_codecs(stream),
                     "high" if video else "operator",
                     self._recorder,
                     keyframe_seconds=self._record_keyframes,
                     attached=stream.name in attached,
+                    sound=not video,
                 )
             )
 
@@ -146,8 +147,8 @@ class MediaPlane:
             stream.record_keyframe()
 
     def recorded_codecs(self) -> dict[str, str]:
-        """What each stream is recorded as, by its name: "H264" (VP8 where all take that), "opus" or "PCMU"."""
-        return {each.name: _recorded_codec(each) for each in self._streams.values()}
+        """What each stream is recorded as where nobody takes another codec, by its name: "H264", "opus" or "PCMU"."""
+        return {each.name: _recorded_codecs(each)[0] for each in self._streams.values()}
 
     def _attached_stream(self, spec: SourceSpec, name: str) -> AnyStream:
         """What the source really gives shows when it comes."""
@@ -387,11 +388,9 @@ def _msid(name: str) -> str:
     return re.sub(r"[^0-9A-Za-z!#$%&'*+.^_`{|}~-]", "_", name)[:64] or "_"
 
 
-def _recorded_codec(stream: AnyStream) -> str:
-    """One for good: a file says once what it holds."""
-    if stream.kind == "video":
-        return "H264"
-    return "opus" if "opus" in stream.codecs else stream.codecs[0]
+def _recorded_codecs(stream: AnyStream) -> tuple[str, ...]:
+    """The best first."""
+    return tuple(sorted(stream.codecs, key=lambda codec: codec not in ("H264", "opus")))
 
 
 def _free_name(wanted: str, taken: Container[str]) -> str:

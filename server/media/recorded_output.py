@@ -12,6 +12,8 @@ from server.media.quality.plan import PicturePlan
 __all__ = ["FrameTaker", "RecordedOutput", "RecordedStream"]
 
 TIERS: tuple[Tier, ...] = ("operator", "high", "low")
+HALF_A_PACKET = 0.010  # s of sound
+CLOCK_JUMPED = 1.0  # s; what is that much older than what was taken is no repetition
 
 
 class FrameTaker(Protocol):
@@ -41,11 +43,14 @@ class RecordedOutput:
     the first codec it is what they take of the next one; one is made only where nothing is encoded. Another one is
     taken from its next keyframe on. A camera cannot be asked for one: ours is recorded until it comes.
 
+    Of sound every packet is a keyframe. Where its codec changes, what the codec before brought is not taken again.
+
     Args:
         codecs: in which it can be recorded; in the first one, where that is encoded or nothing is
         own_tier: what is made for a recording alone
         keyframe_seconds: longest time between two keyframes; twice that on a path without room
         attached: whether the source is the console's own, and not the robot's
+        sound: whether it is a microphone's
     """
 
     def __init__(
@@ -56,12 +61,15 @@ class RecordedOutput:
         *,
         keyframe_seconds: float,
         attached: bool,
+        sound: bool = False,
     ) -> None:
         self._codecs = codecs
         self._own_tier = own_tier
         self._take = take
         self._keyframe_seconds = keyframe_seconds
         self._attached = attached
+        self._sound = sound
+        self._last: tuple[Output, float] | None = None  # what was taken, and its time
         self._current: Output | None = None
         self._next: Output | None = None  # from its next keyframe on
         self._meanwhile: Output | None = None  # ours, until the camera's own first keyframe
@@ -109,9 +117,16 @@ class RecordedOutput:
             self._current, self._next, self._meanwhile = output, None, None
         elif frame.keyframe and output is self._meanwhile:
             self._current, self._meanwhile = output, None
-        if output is self._current:
+        if output is self._current and not self._was_taken(output, frame):
+            self._last = output, frame.time
             codec = self._codecs[0] if output.codec == PASSED else output.codec
             self._take(stream, codec, frame, attached=self._attached)
+
+    def _was_taken(self, output: Output, frame: EncodedFrame) -> bool:
+        """Whether this sound is recorded already, in another codec."""
+        if not self._sound or self._last is None or self._last[0] is output:
+            return False
+        return 0 < self._last[1] + HALF_A_PACKET - frame.time < CLOCK_JUMPED
 
     def request_keyframe(self) -> None:
         """A new file begins."""

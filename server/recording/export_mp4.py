@@ -14,9 +14,8 @@ import av
 from av.container import OutputContainer
 
 from server.recording.errors import RecordingDamaged
-from server.recording.event_index import TopicEntry
-from server.recording.export_sound import CopiedOpus, EncodedG711
-from server.recording.payload import RecordedPicture
+from server.recording.export_sound import sound_writer
+from server.recording.payload import SOUND, RecordedPicture, RecordedSound
 from server.recording.pictures import RecordedPictures, picture_size
 from server.recording.reader import RecordingReader
 from server.recording.topics import CAMERA
@@ -26,14 +25,14 @@ __all__ = ["export"]
 VIDEO_BASE = Fraction(1, 90_000)
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
-OPUS, G711 = "foxglove.CompressedAudio", "foxglove.RawAudio"  # how sound is recorded
 
 
 class Timed(NamedTuple):
     topic: str
     captured: int  # ns since 1970
     data: bytes
-    picture: RecordedPicture | None  # None: it is sound
+    picture: RecordedPicture | None
+    sound: RecordedSound | None
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
@@ -61,10 +60,10 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         return written
 
 
-def _first_sound(reader: RecordingReader) -> TopicEntry | None:
-    """Of the microphones the first one that was heard."""
-    found = (each for each in reader.index.topics if each.schema in (OPUS, G711))
-    return next((each for each in found if reader.index.counts.get(each.topic)), None)
+def _first_sound(reader: RecordingReader) -> str | None:
+    """Of the microphones the topic of the first one that was heard."""
+    found = (each.topic for each in reader.index.topics if each.schema in SOUND)
+    return next((topic for topic in found if reader.index.counts.get(topic)), None)
 
 
 def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
@@ -73,31 +72,28 @@ def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
     return (out or path.parent) / f"{path.stem}-{camera}.mp4"
 
 
-def _write(reader: RecordingReader, topic: str, sound: TopicEntry | None, target: Path) -> None:
+def _write(reader: RecordingReader, topic: str, sound: str | None, target: Path) -> None:
     keyframes = (each.picture for each in _timed(reader, topic) if each.picture is not None and each.picture.keyframe)
     kinds = {(each.format, size) for each in keyframes if (size := picture_size(each)) is not None}
     sizes = {size for _, size in kinds}
     first = next(_timed(reader, topic), None)
     if first is None or not sizes:
         raise RecordingDamaged(f"{topic}: there is no picture that can be decoded")
-    packet = None if sound is None else next(_timed(reader, sound.topic), None)
+    packet = None if sound is None else next(_timed(reader, sound), None)
+    heard = (each.sound for each in _timed(reader, sound) if each.sound is not None) if sound is not None else ()
     began = min(each.captured for each in (first, packet) if each is not None)
     with av.open(str(target), "w", format="mp4", options={"movflags": "+faststart"}) as output:
         copied = kinds == {("h264", *sizes)}
         video = _Copied(output, first.data) if copied else _Encoded(output, max(sizes))
-        audio = None if packet is None or sound is None else _sound_writer(output, sound.schema, packet.data)
-        for each in _timed(reader, topic, *([] if sound is None else [sound.topic])):
+        audio = sound_writer(output, heard)
+        for each in _timed(reader, topic, *([] if sound is None else [sound])):
             if each.topic == topic:
                 video.take(each, began)
-            elif audio is not None:
-                audio.take(each.data, each.captured - began)
+            elif audio is not None and each.sound is not None:
+                audio.take(each.sound, each.captured - began)
         video.close()
         if audio is not None:
             audio.close()
-
-
-def _sound_writer(output: OutputContainer, schema: str, packet: bytes) -> CopiedOpus | EncodedG711:
-    return CopiedOpus(output, packet) if schema == OPUS else EncodedG711(output)
 
 
 class _Copied:
@@ -150,9 +146,12 @@ def _timed(reader: RecordingReader, *topics: str) -> Iterator[Timed]:
     """In the order of arrival; pictures from the first keyframe on, times of each topic increasing."""
     newest: dict[str, int] = {}
     for record in reader.records(topics=topics):
-        picture = record.picture
+        picture, sound = record.picture, record.sound
+        medium = picture or sound
+        if medium is None:
+            continue
         if record.topic not in newest and picture is not None and not picture.keyframe:
             continue
         captured = max(record.captured, newest.get(record.topic, 0) + MILLISECOND)
         newest[record.topic] = captured
-        yield Timed(record.topic, captured, record.payload if picture is None else picture.data, picture)
+        yield Timed(record.topic, captured, medium.data, picture, sound)

@@ -13,7 +13,6 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.Pose_pb2 import Pose
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
-from foxglove_schemas_protobuf.RawAudio_pb2 import RawAudio
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
@@ -38,13 +37,9 @@ def camera_message(stream: str, captured: int, picture: bytes, picture_format: s
     return found.SerializeToString()
 
 
-def sound_message(sound_format: str, captured: int, packet: bytes, rate: int, channels: int) -> bytes:
-    """A packet of "opus" or "g711-ulaw"."""
-    if sound_format == "opus":
-        return CompressedAudio(timestamp=_stamp(captured), data=packet, format="opus").SerializeToString()
-    return RawAudio(
-        timestamp=_stamp(captured), data=packet, format=sound_format, sample_rate=rate, number_of_channels=channels
-    ).SerializeToString()
+def sound_message(sound_format: str, captured: int, packet: bytes) -> bytes:
+    """A packet of "opus", or of "g711-ulaw": 8 kHz, mono."""
+    return CompressedAudio(timestamp=_stamp(captured), data=packet, format=sound_format).SerializeToString()
 
 
 def log_message(arrived: int, text: str, *, warning: bool = False) -> bytes:

@@ -10,12 +10,10 @@ from robot_bridge.protocol.messages import Feedback
 from server.recording.foxglove import camera_message, feedback_messages, log_message, sound_message
 from server.recording.records import FeedbackRecord, OwnRecord, RobotRecord
 from server.recording.records_in_words import in_words
-from server.recording.topics import LOG, OWN_TOPICS, PICTURE_FORMATS, media_topic
+from server.recording.topics import LOG, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS, media_topic
 from server.recording.writer import Entry
 
 __all__ = ["FeedbackItem", "Item", "MediaItem", "OwnItem", "RobotItem", "entries_of"]
-
-PCMU_RATE = 8_000  # Hz
 
 
 class RobotItem(NamedTuple):
@@ -80,6 +78,5 @@ def _media(item: MediaItem) -> Entry:
     if picture_format is not None:
         data = camera_message(item.stream, item.captured, item.data, picture_format)
         return Entry(topic, item.stamp, item.arrived, item.captured, data, keyframe=item.keyframe)
-    sound_format = "opus" if item.codec == "opus" else "g711-ulaw"
-    data = sound_message(sound_format, item.captured, item.data, PCMU_RATE, 1)
+    data = sound_message(SOUND_FORMATS[item.codec], item.captured, item.data)
     return Entry(topic, item.stamp, item.arrived, item.captured, data)

@@ -11,15 +11,24 @@ from google.protobuf.message import DecodeError
 from server.recording.errors import RecordingDamaged
 from server.recording.records import OWN_RECORDS, OwnRecord
 
-__all__ = ["VIDEO", "RecordedPicture", "own_record", "own_record_of", "payload_of", "picture_of"]
+__all__ = [
+    "SOUND",
+    "VIDEO",
+    "RecordedPicture",
+    "RecordedSound",
+    "own_record",
+    "own_record_of",
+    "payload_of",
+    "picture_of",
+    "sound_of",
+]
 
 VIDEO = "foxglove.CompressedVideo"
-
-MEDIA: dict[str, type[CompressedVideo | CompressedAudio | RawAudio]] = {
-    VIDEO: CompressedVideo,
+SOUND: dict[str, type[CompressedAudio | RawAudio]] = {
     "foxglove.CompressedAudio": CompressedAudio,
-    "foxglove.RawAudio": RawAudio,
+    "foxglove.RawAudio": RawAudio,  # G.711 in earlier files
 }
+MEDIA: dict[str, type[CompressedVideo | CompressedAudio | RawAudio]] = {VIDEO: CompressedVideo, **SOUND}
 IDR, SLICE = 5, 1  # ITU-T H.264 table 7-1
 NAL_KIND = 0x1F
 START_CODE = b"\x00\x00\x01"
@@ -57,6 +66,20 @@ def picture_of(data: bytes) -> RecordedPicture:
     except DecodeError as error:
         raise RecordingDamaged(f"not a {VIDEO}") from error
     return RecordedPicture(found.format, found.data, _is_keyframe(found.format, found.data))
+
+
+class RecordedSound(NamedTuple):
+    format: str  # "opus", "g711-ulaw"
+    data: bytes
+
+
+def sound_of(schema: str, data: bytes) -> RecordedSound:
+    """What a message of one of the schemas SOUND holds. Raises RecordingDamaged."""
+    try:
+        found = SOUND[schema].FromString(data)
+    except DecodeError as error:
+        raise RecordingDamaged(f"not a {schema}") from error
+    return RecordedSound(found.format, found.data)
 
 
 def _is_keyframe(picture_format: str, picture: bytes) -> bool:

@@ -17,7 +17,16 @@ from robot_bridge.protocol.serial import is_newer
 from server.recording.errors import RecordingDamaged, RecordingTampered
 from server.recording.event_index import INDEX_NAME, EventEntry, EventIndex, decode_index
 from server.recording.info import METADATA_NAME, RecordingInfo
-from server.recording.payload import VIDEO, RecordedPicture, own_record, payload_of, picture_of
+from server.recording.payload import (
+    SOUND,
+    VIDEO,
+    RecordedPicture,
+    RecordedSound,
+    own_record,
+    payload_of,
+    picture_of,
+    sound_of,
+)
 from server.recording.records import RobotRecord
 from server.recording.scan import scan_file
 from server.recording.topics import OWN_TOPICS
@@ -50,6 +59,11 @@ class Record(NamedTuple):
     def picture(self) -> RecordedPicture | None:
         """None: it is none. Raises RecordingDamaged."""
         return picture_of(self.data) if self.schema == VIDEO else None
+
+    @property
+    def sound(self) -> RecordedSound | None:
+        """As `picture`."""
+        return sound_of(self.schema, self.data) if self.schema in SOUND else None
 
     @property
     def keyframe(self) -> bool:

@@ -12,7 +12,6 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
-from foxglove_schemas_protobuf.RawAudio_pb2 import RawAudio
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import Message
 
@@ -43,6 +42,7 @@ __all__ = [
     "PICTURE_FORMATS",
     "POSE",
     "SCAN",
+    "SOUND_FORMATS",
     "Topic",
     "media_topic",
     "own_schema",
@@ -53,8 +53,9 @@ __all__ = [
 CAMERA, MICROPHONE = "/camera/", "/microphone/"  # and the stream's name
 JOINTS, SCAN, POSE, LOG = "/joint_states", "/scan", "/pose", "/log"
 
-PICTURE_FORMATS = {"H264": "h264", "VP8": "vp8"}  # in CompressedVideo, by codec; one topic can have both
-MEDIA_SCHEMAS: dict[str, type[Message]] = {"H264": CompressedVideo, "opus": CompressedAudio, "PCMU": RawAudio}
+# What a message says of itself, by codec. One topic can have several.
+PICTURE_FORMATS = {"H264": "h264", "VP8": "vp8"}  # in CompressedVideo
+SOUND_FORMATS = {"opus": "opus", "PCMU": "g711-ulaw"}  # in CompressedAudio
 
 OWN_TOPICS: dict[type[OwnRecord], str] = {
     RobotRecord: "/lockstep/robot",
@@ -86,7 +87,9 @@ def topics_of(description: RobotDescription, codecs: Mapping[str, str]) -> list[
     if description.wrench is not None:
         found.append(_own(OWN_TOPICS[WrenchRecord], WrenchRecord))
     for stream, codec in codecs.items():
-        found.append(_foxglove(media_topic(stream, codec), MEDIA_SCHEMAS[codec]))
+        found.append(
+            _foxglove(media_topic(stream, codec), CompressedVideo if codec in PICTURE_FORMATS else CompressedAudio)
+        )
     if description.joints:
         found.append(_foxglove(JOINTS, JointStates))
     if description.ranges is not None:

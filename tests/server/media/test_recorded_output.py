@@ -1,6 +1,7 @@
 """Which of a stream's encodings is recorded: the operator's, a camera's own, the observers', else one made for it."""
 
 import asyncio
+from itertools import groupby, pairwise
 
 import av
 import pytest
@@ -12,19 +13,20 @@ from server.media.packetise import split_nal_units
 from server.media.plane import MediaPlane
 from tests.server.media.camera_h264 import camera_pictures
 from tests.server.media.feeding import timestamps, value
-from tests.server.media.viewer import TIMEOUT, description, picture, running_plane, viewing
+from tests.server.media.viewer import TIMEOUT, description, picture, running_plane, sound, viewing
 
 
 class Taken:
     """What a recorder got."""
 
-    def __init__(self) -> None:
+    def __init__(self, stream: str = "camera0") -> None:
+        self._stream = stream
         self.frames: list[EncodedFrame] = []
         self.codecs: list[str] = []
         self._news = asyncio.Event()
 
     def __call__(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
-        assert (stream, attached) == ("camera0", False)
+        assert (stream, attached) == (self._stream, False)
         self.codecs.append(codec)
         self.frames.append(frame)
         self._news.set()
@@ -33,13 +35,27 @@ class Taken:
     def stamps(self) -> list[int]:
         return [frame.stamp for frame in self.frames]
 
-    async def feed(self, plane: MediaPlane, pictures: list[Media]) -> None:
+    @property
+    def steps(self) -> list[float]:
+        """s from one to the next."""
+        return [round(after.time - before.time, 4) for before, after in pairwise(self.frames)]
+
+    async def feed(self, plane: MediaPlane, media: list[Media]) -> None:
         """One by one, each when the one before was recorded."""
-        for medium in pictures:
+        for medium in media:
             self._news.clear()
             plane.feed(medium, medium.time)
             async with asyncio.timeout(TIMEOUT):
                 await self._news.wait()
+
+    async def hear(self, plane: MediaPlane, media: list[Media]) -> None:
+        """As `feed`. A resampler holds some sound back, so that the newest packets come later."""
+        for medium in media:
+            plane.feed(medium, medium.time)
+            async with asyncio.timeout(TIMEOUT):
+                while medium.stamp > 2 and (not self.frames or self.stamps[-1] < medium.stamp - 2):
+                    self._news.clear()
+                    await self._news.wait()
 
 
 def encoded(plane: MediaPlane, codec: str) -> float:
@@ -202,3 +218,92 @@ async def test_a_camera_that_gives_other_pictures_is_recorded_on() -> None:
         plane.record(None)
         plane.feed(picture(8, 8 / 30), 8 / 30)
         assert len(taken.frames) == 7
+
+
+def heard(first: int, last: int) -> list[Media]:
+    """20 ms each."""
+    return [sound(stamp, stamp * 0.02) for stamp in range(first, last + 1)]
+
+
+def encoded_sound(plane: MediaPlane, codec: str) -> float:
+    return value(plane, "frames_encoded_total", stream="microphone0", codec=codec)
+
+
+async def test_where_all_take_pcmu_that_is_recorded_and_no_opus_is_encoded_for_it() -> None:
+    """As it was sent, byte for byte."""
+    taken = Taken("microphone0")
+    async with (
+        running_plane(description(cameras=0)) as plane,
+        viewing(plane, ["audio"], codecs=["PCMU"]) as viewer,
+    ):
+        plane.record(taken)
+        await taken.hear(plane, heard(1, 6))
+        await viewer.until(lambda: timestamps(viewer, "audio") == len(taken.frames))
+        assert (taken.stamps, set(taken.codecs)) == (list(range(1, len(taken.frames) + 1)), {"PCMU"})
+        assert (encoded_sound(plane, "opus"), encoded_sound(plane, "PCMU")) == (0, len(taken.frames))
+        assert viewer.frames("audio") == [frame.data for frame in taken.frames]
+
+
+@pytest.mark.parametrize("offered", [("opus", "PCMU"), ("PCMU", "opus")])
+async def test_opus_is_recorded_where_somebody_takes_it_and_encoded_once(offered: tuple[str, ...]) -> None:
+    taken = Taken("microphone0")
+    async with (
+        running_plane(description(cameras=0), sound_codecs=offered) as plane,
+        viewing(plane, ["audio"], codecs=["PCMU"]),
+        viewing(plane, ["audio"], codecs=["opus"]),
+    ):
+        plane.record(taken)
+        await taken.hear(plane, heard(1, 5))
+        assert (set(taken.steps), set(taken.codecs)) == ({0.02}, {"opus"})
+        assert encoded_sound(plane, "opus") == len(taken.frames)
+
+
+async def test_the_codec_of_sound_changes_with_who_listens_and_nothing_is_lost_or_there_twice() -> None:
+    taken = Taken("microphone0")
+    async with running_plane(description(cameras=0)) as plane:
+        plane.record(taken)
+        await taken.hear(plane, heard(1, 5))
+        assert set(taken.codecs) == {"opus"}  # made for the recording
+        async with viewing(plane, ["audio"], codecs=["PCMU"]):
+            await taken.hear(plane, heard(6, 12))
+            before = encoded_sound(plane, "opus")
+            await taken.hear(plane, heard(13, 15))
+            assert encoded_sound(plane, "opus") == before
+            async with viewing(plane, ["audio"], codecs=["opus"]):
+                await taken.hear(plane, heard(16, 25))
+                assert taken.codecs[-1] == "opus"
+            await taken.hear(plane, heard(26, 35))
+            assert taken.codecs[-1] == "PCMU"
+        await taken.hear(plane, heard(36, 45))
+        assert taken.codecs[-1] == "opus"
+    assert set(taken.steps) == {0.02}
+    assert [codec for codec, _ in groupby(taken.codecs)] == ["opus", "PCMU", "opus", "PCMU", "opus"]
+
+
+async def test_sound_in_long_segments_is_there_once_where_its_codec_changes() -> None:
+    """Several packets of each codec come from one segment."""
+    taken = Taken("microphone0")
+    segments = [sound(stamp, stamp * 0.1, payload=sound(stamp, 0.0).payload * 5) for stamp in range(1, 13)]
+    async with (
+        running_plane(description(cameras=0)) as plane,
+        viewing(plane, ["audio"], codecs=["PCMU"]),
+    ):
+        async with viewing(plane, ["audio"], codecs=["opus"]):
+            plane.record(taken)
+            await taken.hear(plane, segments[:4])
+        await taken.hear(plane, segments[4:8])
+        async with viewing(plane, ["audio"], codecs=["opus"]):
+            await taken.hear(plane, segments[8:])
+    assert [codec for codec, _ in groupby(taken.codecs)] == ["opus", "PCMU", "opus"]
+    assert set(taken.steps) == {0.02}
+
+
+async def test_a_clock_that_jumped_back_where_the_codec_changes_does_not_end_the_record() -> None:
+    taken = Taken("microphone0")
+    async with running_plane(description(cameras=0)) as plane:
+        plane.record(taken)
+        await taken.hear(plane, [sound(1, 5000.0), sound(2, 5000.02)])
+        async with viewing(plane, ["audio"], codecs=["PCMU"]):
+            await taken.hear(plane, heard(3, 10))
+    assert taken.codecs[-1] == "PCMU"
+    assert taken.steps[-3:] == [0.02] * 3

@@ -22,7 +22,7 @@ from robot_bridge.protocol.description import (
 from robot_bridge.protocol.messages import StopState
 from robot_bridge.protocol.serial import event_after
 from server.media.picture_encoder import create_picture_encoder
-from server.media.sound_encoder import OpusEncoder, Segment
+from server.media.sound_encoder import Segment, create_sound_encoder
 from server.recording.foxglove import camera_message, feedback_messages, sound_message
 from server.recording.info import RecordingInfo
 from server.recording.records import (
@@ -33,7 +33,7 @@ from server.recording.records import (
     RobotRecord,
     SeatRecord,
 )
-from server.recording.topics import CAMERA, MICROPHONE, OWN_TOPICS, PICTURE_FORMATS
+from server.recording.topics import CAMERA, MICROPHONE, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS
 from server.recording.writer import Entry, RecordingWriter
 
 __all__ = ["CODECS", "DESCRIPTION", "EPOCH", "INFO", "SECOND", "START", "Story", "own_entry", "rewritten"]
@@ -78,6 +78,7 @@ class Story:
         stopped: numbers of the events whose feedback says that the robot is stopped
         real: pictures and sound that can be decoded; the pictures' brightness is 2 x the event
         codecs: of real pictures; the next one, over and over, with each keyframe
+        sounds: codecs of real sound, a tone; the next one, over and over, with each keyframe
     """
 
     def __init__(
@@ -89,6 +90,7 @@ class Story:
         stopped: range = range(0),
         real: bool = False,
         codecs: tuple[str, ...] = ("H264",),
+        sounds: tuple[str, ...] = ("opus",),
     ) -> None:
         self.first_event = first_event
         self.events = events
@@ -96,7 +98,8 @@ class Story:
         self.stopped = stopped
         self._codecs = codecs
         self._pictures = {codec: _real_pictures(codec) if real else _false_pictures for codec in codecs}
-        self._sounds = _real_sounds() if real else _false_sounds
+        self._heard = sounds
+        self._sounds = {codec: _real_sounds(codec) if real else _false_sounds for codec in sounds}
 
     def entries(self) -> list[Entry]:
         """In the order of arrival."""
@@ -104,8 +107,8 @@ class Story:
 
     def _entries(self) -> Iterator[Entry]:
         event, at = self.first_event, START
-        codecs = cycle(self._codecs)
-        codec = ""
+        codecs, sounds = cycle(self._codecs), cycle(self._heard)
+        codec = heard = ""
         yield own_entry(RobotRecord(epoch=EPOCH, event=event, link="up", description=DESCRIPTION), START)
         yield own_entry(SeatRecord(epoch=EPOCH, event=event, holder="p1", name="Ada", why="request"), START)
         yield from self._feedback(event, at, 0)
@@ -115,12 +118,12 @@ class Story:
             yield from self._feedback(event, at, number)
             key = number % KEYFRAMES == 1
             captured = at + 1_000_000
-            codec = next(codecs) if key else codec
+            codec, heard = (next(codecs), next(sounds)) if key else (codec, heard)
             picture = camera_message("front", captured, self._pictures[codec](number, key), PICTURE_FORMATS[codec])
             yield Entry(CAMERA + "front", event, at + 5_000_000, captured, picture, key)
             for part in (0, 1):
                 moment = at + part * 20_000_000
-                sound = sound_message("opus", moment, self._sounds(number, part), 48_000, 1)
+                sound = sound_message(SOUND_FORMATS[heard], moment, self._sounds[heard](number, part))
                 yield Entry(MICROPHONE + "ear", event, moment + 6_000_000, moment, sound)
             if number % 25 == 0:
                 yield own_entry(self._report(event), at + 7_000_000)
@@ -201,13 +204,14 @@ def _real_pictures(codec: str) -> Callable[[int, bool], bytes]:
     return picture
 
 
-def _real_sounds() -> Callable[[int, int], bytes]:
-    encoder = OpusEncoder(32_000, 0)
-    tone = (8000 * np.sin(np.arange(960) * 2 * np.pi * 440 / 48_000)).astype(np.int16)
+def _real_sounds(codec: str) -> Callable[[int, int], bytes]:
+    encoder = create_sound_encoder(codec, 32_000, 0)
+    rate = encoder.rate
+    tone = (8000 * np.sin(np.arange(rate // 50) * 2 * np.pi * 400 / rate)).astype(np.int16)
 
     def sound(number: int, part: int) -> bytes:
         time = number * 0.04 + part * 0.02
-        (packet,) = encoder.encode(Segment(tone, 48_000, 1, number + 1, time, time))
+        (packet,) = encoder.encode(Segment(tone, rate, 1, number + 1, time, time))
         return packet.data
 
     return sound

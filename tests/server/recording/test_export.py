@@ -10,10 +10,13 @@ import av
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from foxglove_schemas_protobuf.RawAudio_pb2 import RawAudio
 
 from server.recording import export_csv, export_lerobot, export_mp4, export_parquet
 from server.recording.errors import RecordingDamaged
 from server.recording.foxglove import sound_message
+from server.recording.payload import sound_of
+from server.recording.reader import RecordingReader
 from server.recording.topics import CAMERA, MICROPHONE
 from server.recording.writer import RecordingWriter
 from tests.server.recording.makers import CODECS, DESCRIPTION, INFO, Story, rewritten
@@ -76,7 +79,7 @@ def test_mp4_has_g711_sound_as_aac_with_silence_where_packets_are_missing(tmp_pa
     tone = (12_000 * np.sin(np.arange(160) * 2 * np.pi * 400 / rate)).astype(np.int16)
     (packet,) = mulaw(tone)
     entries = [
-        each._replace(data=sound_message("g711-ulaw", each.captured, packet, rate, 1))
+        each._replace(data=sound_message("g711-ulaw", each.captured, packet))
         if each.topic == MICROPHONE + "ear"
         else each
         for each in Story(events=EVENTS, real=True).entries()
@@ -95,6 +98,35 @@ def test_mp4_has_g711_sound_as_aac_with_silence_where_packets_are_missing(tmp_pa
     assert min(levels[2:6]) > 0.3
     assert max(levels[9:15]) < 0.02
     assert min(levels[17:-1]) > 0.3
+
+
+def test_mp4_has_sound_in_both_codecs_as_opus_all_of_it_and_opus_as_it_is(tmp_path: Path) -> None:
+    """A recording in which the codec of the sound changed on the way, twice."""
+    source = tmp_path / "a.mcap"
+    Story(events=151, real=True, sounds=("opus", "PCMU", "opus")).write(source)
+    with RecordingReader(source) as reader:
+        sounds = [found for each in reader.records(topics=[MICROPHONE + "ear"]) if (found := each.sound)]
+    assert [each.format for each in sounds] == ["opus"] * 100 + ["g711-ulaw"] * 100 + ["opus"] * 100
+    (target,) = export_mp4.export(source, tmp_path / "a.mp4", "")
+    with av.open(str(target)) as video:
+        packets = [bytes(packet) for packet in video.demux(video.streams.audio[0]) if packet.size]
+    assert len(packets) == 300
+    assert packets[:100] + packets[200:] == [each.data for each in sounds if each.format == "opus"]
+    with av.open(str(target)) as video:
+        assert video.streams.audio[0].codec_context.name == "opus"
+        frames = [frame.to_ndarray().ravel() for frame in video.decode(audio=0)]
+    levels = [float(np.abs(frame).max()) for frame in frames[5:-5]]
+    assert min(levels) > 0.1
+    heard = np.concatenate(frames[120:180])  # what was G.711
+    strongest = np.abs(np.fft.rfft(heard)).argmax() * 48_000 / len(heard)
+    assert strongest == pytest.approx(400, abs=5)
+
+
+def test_g711_of_earlier_files_is_read(tmp_path: Path) -> None:
+    """It was in Foxglove's RawAudio."""
+    message = RawAudio(data=b"\xff" * 160, format="g711-ulaw", sample_rate=8000, number_of_channels=1)
+    found = sound_of("foxglove.RawAudio", message.SerializeToString())
+    assert found == ("g711-ulaw", b"\xff" * 160)
 
 
 def mulaw(samples: np.typing.NDArray[np.int16]) -> list[bytes]:

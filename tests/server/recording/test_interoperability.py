@@ -56,11 +56,11 @@ def test_schemas_are_those_of_the_foxglove_sdk(file: Path) -> None:
     assert [joint.name for joint in JointStates.FromString(message.data).joints] == ["x", "y", "yaw"]
 
 
-@pytest.mark.parametrize("codec", ["H264", "VP8"])
-def test_rerun_loads_it(codec: str, tmp_path: Path) -> None:
-    """With pictures in VP8 all the rest: it knows no VP8."""
+@pytest.mark.parametrize(("codec", "sounds"), [("H264", ("opus",)), ("VP8", ("opus", "PCMU"))])
+def test_rerun_loads_it(codec: str, sounds: tuple[str, ...], tmp_path: Path) -> None:
+    """With pictures in VP8, or sound in G.711, all the rest: it knows neither."""
     file = tmp_path / "a.mcap"
-    Story(events=EVENTS, real=True, codecs=(codec,)).write(file)
+    Story(events=EVENTS, real=True, codecs=(codec,), sounds=sounds).write(file)
     rerun = pytest.importorskip("rerun")
     target = tmp_path / "a.rrd"
     recording = rerun.RecordingStream("lockstep-test")

@@ -11,6 +11,7 @@ from server.recording.reader import RecordingReader
 from server.recording.records import CommandRecord, FeedbackRecord
 from server.recording.scan import complete_file
 from server.recording.topics import OWN_TOPICS
+from server.recording.verify_file import verify_file
 from tests.server.recording.makers import DESCRIPTION, INFO, SECOND, START, Story
 
 COMMAND, FEEDBACK = OWN_TOPICS[CommandRecord], OWN_TOPICS[FeedbackRecord]
@@ -54,6 +55,22 @@ def test_pictures_in_vp8_say_so_and_are_found_from_their_keyframe_also_after_an_
     with RecordingReader(path) as reader:
         assert reader.interrupted
         assert reader.index.keyframes == index.keyframes
+
+
+def test_sound_says_of_each_packet_in_which_codec_it_is_also_after_an_interruption(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=101, real=True, sounds=("opus", "PCMU")).write(path)
+    verdict = verify_file(path)
+    assert (verdict.ok, verdict.pictures_and_sounds) == (True, 300)
+    with RecordingReader(path) as reader:
+        index = reader.index
+    path.write_bytes(path.read_bytes()[:-1])
+    with RecordingReader(path) as reader:
+        assert reader.interrupted
+        assert (reader.index.topics, reader.index.counts) == (index.topics, index.counts)
+        sounds = [record.sound for record in reader.records(50, 53, {"/microphone/ear"})]
+    assert [each.format for each in sounds if each] == ["opus"] * 4 + ["g711-ulaw"] * 4
+    assert [len(each.data) for each in sounds if each][4:] == [160] * 4
 
 
 def test_the_index_has_the_description_the_marks_and_no_more_than_a_second_in_a_chunk(file: Path) -> None:

@@ -8,7 +8,7 @@ export interface ReplayRecord {
   readonly arrived: number;
   readonly captured: number;
   readonly keyframe: boolean;
-  readonly format: string; // of a picture: "h264", "vp8"; else ""
+  readonly format: string; // of a picture: "h264", "vp8"; of sound: "opus", "g711-ulaw"; else ""
   readonly payload: Uint8Array;
 }
 

@@ -29,7 +29,6 @@ export interface ReplayIndex {
   readonly firstEvent: number; // 0: no feedback yet
   readonly lastEvent: number;
   readonly topics: readonly string[];
-  readonly encodings: ReadonlyMap<string, string>; // schema by topic
   readonly chunks: readonly ReplayChunk[];
   readonly events: readonly ReplayEntry[];
   readonly keyframes: ReadonlyMap<string, readonly ReplayEntry[]>;
@@ -51,7 +50,6 @@ export function parseIndex(value: unknown): ReplayIndex | null {
     firstEvent: numberOf(value["first_event"]),
     lastEvent: numberOf(value["last_event"]),
     topics: topics.map((each) => String(each["topic"])),
-    encodings: new Map(topics.map((each) => [String(each["topic"]), String(each["schema"])])),
     chunks: listOf(value["chunks"]).flatMap(parseChunk),
     events: listOf(value["events"]).filter(isEntry),
     keyframes: new Map(

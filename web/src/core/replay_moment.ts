@@ -27,6 +27,21 @@ export interface ReplaySegment {
   readonly before: readonly ReplayRecord[];
 }
 
+/** The segment in parts that one decoder takes each: the codec of sound can change from packet to packet. */
+export function soundRuns({ packets, before }: ReplaySegment): ReplaySegment[] {
+  const runs: { packets: ReplayRecord[]; before: readonly ReplayRecord[] }[] = [];
+  for (const each of packets) {
+    const run = runs.at(-1);
+    if (run?.packets[0]?.format === each.format) {
+      run.packets.push(each);
+    } else {
+      const other = before.findLastIndex((one) => one.format !== each.format);
+      runs.push({ packets: [each], before: run === undefined ? before.slice(other + 1) : [] });
+    }
+  }
+  return runs;
+}
+
 /** Everything that belongs to one event. */
 export interface ReplayMoment {
   readonly place: ReplayPlace;

@@ -9,6 +9,21 @@ export function decodeMuLaw(bytes: Uint8Array): Float32Array<ArrayBuffer> {
   });
 }
 
+/** At a higher rate, each sample drawn to the next in a straight line. */
+export function atRate(
+  samples: Float32Array<ArrayBuffer>,
+  rate: number,
+  wanted: number,
+): Float32Array<ArrayBuffer> {
+  if (rate === wanted) return samples;
+  return Float32Array.from({ length: Math.round((samples.length * wanted) / rate) }, (_, at) => {
+    const place = (at * rate) / wanted;
+    const left = samples[Math.floor(place)] ?? 0;
+    const right = samples[Math.floor(place) + 1] ?? left;
+    return left + (right - left) * (place % 1);
+  });
+}
+
 /** Channels of an Opus packet, from its first byte (RFC 6716 3.1). */
 export function opusChannels(packet: Uint8Array): 1 | 2 {
   return ((packet[0] ?? 0) & 0x04) === 0 ? 1 : 2;

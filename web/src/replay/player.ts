@@ -64,11 +64,7 @@ export class Player {
     this.place = { event: this.index.firstEvent, until: null };
     this.store = new ChunkStore((number, signal) => api.chunk(details.entry.id, number, signal));
     this.loader = new MomentLoader(this.store);
-    this.sound = new SoundPlayer(
-      this.store,
-      microphonesOf(this.index),
-      (topic) => this.index.encodings.get(topic) === "foxglove.CompressedAudio",
-    );
+    this.sound = new SoundPlayer(this.store, microphonesOf(this.index));
     if (this.isRunning) this.followLater();
   }
 
@@ -271,9 +267,11 @@ export class Player {
       this.index = grownIndex(this.index, more.index, from);
       this.description ??= more.description;
       this.isRunning = more.entry.running;
+      const failed = this.trouble !== null;
       this.trouble = null;
       this.followMs = FOLLOW_MS;
       if (this.follows && !this.isPlaying) await this.show({ event: this.index.lastEvent, until: null });
+      else if (failed && this.shown?.moment.place !== this.place) await this.show(this.place);
     } catch (error) {
       this.fail(error);
       this.followMs = Math.min(MOST_FOLLOW_MS, 2 * this.followMs);

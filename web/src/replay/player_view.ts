@@ -7,6 +7,7 @@ import { clampedEvent, timeOf } from "../core/replay_index";
 import { replayHash, type ReplayLink } from "../core/replay_link";
 import { roleOf } from "../core/fragment";
 import { eventGap } from "../core/serial";
+import { ConsoleError } from "../rtc/console_api";
 import { troubleWords } from "../rtc/session_api";
 import { button, grouped, h, setData, setHidden, setText } from "../ui/dom";
 import { createForceGauge } from "../ui/force_gauge";
@@ -72,7 +73,7 @@ export class PlayerView {
       ]),
     );
     const microphones = index.topics.filter((topic) => topic.startsWith(MICROPHONE));
-    this.sounds = new SoundCard(microphones, index.encodings, labels);
+    this.sounds = new SoundCard(microphones, labels);
     this.marks = new MarkList(
       (mark) => void this.player.seekMark(mark),
       () => this.update(),
@@ -199,8 +200,10 @@ export class PlayerView {
   }
 
   private troubleNow(): string {
-    const { trouble, index, isGone } = this.player;
+    const { trouble, index, isGone, isRunning } = this.player;
     if (isGone) return "This recording was deleted. What the page has loaded can still be looked at.";
+    if (isRunning && trouble instanceof ConsoleError && trouble.status === 0)
+      return "The console does not answer. The page keeps trying by itself.";
     if (trouble !== null) return troubleWords(trouble);
     return index.lastEvent === 0 ? "Nothing of it is on disk yet." : "";
   }

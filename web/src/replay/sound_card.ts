@@ -14,11 +14,7 @@ export class SoundCard {
   private readonly rows = new Map<string, { canvas: HTMLCanvasElement; words: HTMLElement }>();
   private turn = 0;
 
-  constructor(
-    topics: readonly string[],
-    private readonly encodings: ReadonlyMap<string, string>,
-    labels: ReadonlyMap<string, string>,
-  ) {
+  constructor(topics: readonly string[], labels: ReadonlyMap<string, string>) {
     for (const topic of topics) {
       const canvas = h("canvas", "wave", {
         width: String(2 * WIDTH),
@@ -45,24 +41,20 @@ export class SoundCard {
         draw(canvas, new Float32Array(0));
         continue;
       }
-      const decoded = await decodeSound([...segment.before, ...segment.packets], this.isOpus(topic));
+      const decoded = await decodeSound(segment);
       if (turn !== this.turn) return; // another event is shown by now
       const length = `s ${stamp} · ${segment.packets.length} packet${segment.packets.length === 1 ? "" : "s"}`;
       if (decoded === null) {
         setText(words, `${length} · this browser cannot decode it`);
+        draw(canvas, new Float32Array(0));
         continue;
       }
-      const share = segment.packets.length / (segment.packets.length + segment.before.length);
-      const samples = decoded.samples.subarray(Math.round(decoded.samples.length * (1 - share)));
+      const { samples } = decoded;
       const level = levelOf(samples);
       this.levels.set(topic, level);
       setText(words, `${length} · ${level === -Infinity ? "silent" : `${level.toFixed(0)} dB`}`);
       draw(canvas, samples);
     }
-  }
-
-  private isOpus(topic: string): boolean {
-    return this.encodings.get(topic) === "foxglove.CompressedAudio";
   }
 }
 

@@ -1,5 +1,5 @@
-import type { ReplayRecord } from "../core/replay_chunk";
-import { decodeMuLaw, opusChannels } from "../core/sound_packets";
+import { soundRuns, type ReplaySegment } from "../core/replay_moment";
+import { atRate, decodeMuLaw, opusChannels } from "../core/sound_packets";
 
 const OPUS_RATE = 48_000;
 const MU_LAW_RATE = 8000; // RFC 3551 4.5.14
@@ -9,20 +9,24 @@ export interface DecodedSound {
   readonly rate: number;
 }
 
-/** Whether this browser can decode what a recording says of its sound. */
-export function canHear(encoding: string): boolean {
-  return encoding === "g711-ulaw" || "AudioDecoder" in globalThis;
+/** The packets of a segment, also where their codec changes on the way; null: this browser cannot. */
+export async function decodeSound(segment: ReplaySegment): Promise<DecodedSound | null> {
+  const runs = await Promise.all(soundRuns(segment).map(decodeRun));
+  const rate = Math.max(MU_LAW_RATE, ...runs.map((run) => run?.rate ?? 0));
+  const parts: Float32Array<ArrayBuffer>[] = [];
+  for (const run of runs) {
+    if (run === null) return null;
+    parts.push(atRate(run.samples, run.rate, rate));
+  }
+  return { samples: joined(parts), rate };
 }
 
-/** Packets that follow each other; null: this browser cannot. */
-export async function decodeSound(
-  packets: readonly ReplayRecord[],
-  isOpus: boolean,
-): Promise<DecodedSound | null> {
-  if (packets.length === 0) return { samples: new Float32Array(0), rate: OPUS_RATE };
-  if (!isOpus)
+/** Packets of one codec. */
+async function decodeRun({ packets, before }: ReplaySegment): Promise<DecodedSound | null> {
+  const format = packets[0]?.format;
+  if (format === "g711-ulaw")
     return { samples: joined(packets.map((each) => decodeMuLaw(each.payload))), rate: MU_LAW_RATE };
-  if (!("AudioDecoder" in globalThis)) return null;
+  if (format !== "opus" || !("AudioDecoder" in globalThis)) return null;
   const parts: Float32Array<ArrayBuffer>[] = [];
   let failed = false;
   const decoder = new AudioDecoder({
@@ -37,14 +41,17 @@ export async function decodeSound(
   try {
     const channels = opusChannels(packets[0]?.payload ?? new Uint8Array(0));
     decoder.configure({ codec: "opus", sampleRate: OPUS_RATE, numberOfChannels: channels });
-    for (const each of packets)
+    for (const each of [...before, ...packets])
       decoder.decode(new EncodedAudioChunk({ type: "key", timestamp: each.captured, data: each.payload }));
     await decoder.flush();
   } catch {
     failed = true;
   }
   if (decoder.state !== "closed") decoder.close();
-  return failed ? null : { samples: joined(parts), rate: OPUS_RATE };
+  if (failed) return null;
+  const samples = joined(parts);
+  const share = packets.length / (before.length + packets.length);
+  return { samples: samples.slice(Math.round(samples.length * (1 - share))), rate: OPUS_RATE };
 }
 
 function joined(parts: readonly Float32Array<ArrayBuffer>[]): Float32Array<ArrayBuffer> {

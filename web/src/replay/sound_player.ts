@@ -6,7 +6,6 @@ import { decodeSound } from "./sound_decoder";
 const AHEAD_US = 400_000; // how far ahead of the pictures sound is decoded
 const PREROLL = 4; // packets that a decoder has to have heard (RFC 7845 4.6)
 const LEAD_S = 0.05;
-const PACKET_US = 20_000;
 
 /** Plays the sound along with the pictures, at normal speed only; it follows them and never leads. */
 export class SoundPlayer {
@@ -20,7 +19,6 @@ export class SoundPlayer {
   constructor(
     private readonly store: ChunkStore,
     private readonly topics: readonly string[],
-    private readonly isOpus: (topic: string) => boolean,
   ) {}
 
   /** From here on; call it for each picture. `time` in µs. */
@@ -35,7 +33,7 @@ export class SoundPlayer {
     const turn = this.turn;
     try {
       const packets = await this.packets(index, topic, Math.max(time, this.until), time + AHEAD_US);
-      if (turn === this.turn) await this.play(topic, packets, turn);
+      if (turn === this.turn) await this.play(packets, turn);
     } finally {
       this.busy = false;
     }
@@ -78,18 +76,17 @@ export class SoundPlayer {
     return found.filter((each) => each.arrived > after && each.arrived <= until);
   }
 
-  private async play(topic: string, packets: readonly ReplayRecord[], turn: number): Promise<void> {
+  private async play(packets: readonly ReplayRecord[], turn: number): Promise<void> {
     const first = packets[0];
     if (first === undefined) return;
     const before = this.heard;
     this.heard = packets.slice(-PREROLL);
-    const decoded = await decodeSound([...before, ...packets], this.isOpus(topic));
+    const decoded = await decodeSound({ packets, before });
     const { context, zero } = this;
     if (decoded === null || context === null || zero === null || turn !== this.turn) return;
-    const skip = Math.round((before.length * PACKET_US * decoded.rate) / 1e6);
-    const samples = decoded.samples.slice(skip);
+    const { samples, rate } = decoded;
     if (samples.length === 0) return;
-    const buffer = context.createBuffer(1, samples.length, decoded.rate);
+    const buffer = context.createBuffer(1, samples.length, rate);
     buffer.copyToChannel(samples, 0);
     const source = new AudioBufferSourceNode(context, { buffer });
     source.connect(context.destination);

@@ -2,7 +2,7 @@ import { expect, it } from "vitest";
 import { avcCodec } from "../../src/core/h264";
 import { parseList, searched } from "../../src/core/recording_list";
 import { readReplayLink, replayHash, tokenIn } from "../../src/core/replay_link";
-import { decodeMuLaw, opusChannels } from "../../src/core/sound_packets";
+import { atRate, decodeMuLaw, opusChannels } from "../../src/core/sound_packets";
 
 it("a link names a recording and an event", () => {
   const link = { token: "a.b.c", recording: "20270115-planar", event: 12 };
@@ -40,4 +40,10 @@ it("µ-law is decoded as in G.711", () => {
   expect(most).toBeCloseTo(32124 / 32768);
   expect(least).toBeCloseTo(-32124 / 32768);
   expect([opusChannels(Uint8Array.of(0x78)), opusChannels(Uint8Array.of(0x7c))]).toEqual([1, 2]);
+});
+
+it("sound keeps its length and its shape at a higher rate", () => {
+  const ramp = Float32Array.of(0, 0.5, 1);
+  expect([...atRate(ramp, 8000, 16_000)]).toEqual([0, 0.25, 0.5, 0.75, 1, 1]);
+  expect(atRate(ramp, 8000, 8000)).toBe(ramp);
 });

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { brokenChunk, ChunkBroken, parseChunkBody } from "../../src/core/replay_chunk";
+import { brokenChunk, ChunkBroken, parseChunkBody, type ReplayRecord } from "../../src/core/replay_chunk";
 import {
   chunksOf,
   grownIndex,
@@ -7,13 +7,14 @@ import {
   parseIndex,
   type ReplayIndex,
 } from "../../src/core/replay_index";
-import { eventAtTime, momentOf } from "../../src/core/replay_moment";
+import { eventAtTime, momentOf, soundRuns } from "../../src/core/replay_moment";
 
 interface Part {
   readonly topic: string;
   readonly event: number;
   readonly arrived: number;
   readonly keyframe?: boolean;
+  readonly format?: string;
   readonly payload: string;
 }
 
@@ -174,5 +175,40 @@ describe("a damaged chunk", () => {
     const key = parseChunkBody(2, bodyOf([picture(4, 4, true), feedback(4, 1, 4)]));
     const moment = momentOf([first, brokenChunk(1), key], place);
     expect(moment.pictures.get("/camera/front")?.record.event).toBe(4);
+  });
+});
+
+describe("sound whose codec changes", () => {
+  const packets = (formats: readonly string[]): ReplayRecord[] => {
+    const parts = formats.map((format, at) => ({
+      topic: "/microphone/ear",
+      event: 1,
+      arrived: at,
+      format,
+      payload: `${at}`,
+    }));
+    return [...(parseChunkBody(0, bodyOf(parts)).media.get("/microphone/ear") ?? [])];
+  };
+  const runsOf = (before: readonly string[], formats: readonly string[]): string[][] =>
+    soundRuns({ before: packets(before), packets: packets(formats) }).map((run) => [
+      run.before.map((each) => `${each.format} ${each.arrived}`).join(", "),
+      run.packets.map((each) => `${each.format} ${each.arrived}`).join(", "),
+    ]);
+
+  it("is decoded in parts of one codec each", () => {
+    expect(runsOf([], ["opus", "opus", "g711-ulaw", "opus"])).toEqual([
+      ["", "opus 0, opus 1"],
+      ["", "g711-ulaw 2"],
+      ["", "opus 3"],
+    ]);
+    expect(runsOf(["opus"], [])).toEqual([]);
+  });
+
+  it("has before it what its own decoder has to have heard, and nothing of another codec", () => {
+    expect(runsOf(["opus", "g711-ulaw", "opus", "opus"], ["opus"])).toEqual([["opus 2, opus 3", "opus 0"]]);
+    expect(runsOf(["opus", "opus"], ["g711-ulaw", "opus"])).toEqual([
+      ["", "g711-ulaw 0"],
+      ["", "opus 1"],
+    ]);
   });
 });
