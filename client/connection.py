@@ -61,6 +61,7 @@ class ConnectionOptions:
     audio: bool
     decode: bool
     codec: str | None
+    sound_codec: str | None
     event_rate: float | None
     name: str
     connect_seconds: float
@@ -107,6 +108,7 @@ class Connection:
             relay_only=options.relay_only,
             on_message=self._received,
             relay=relay,
+            sound_codec=options.sound_codec,
         )
 
     # Its life

@@ -42,6 +42,7 @@ class Console:
         audio: whether to receive sound
         decode: False only counts RTP packets and frames: no pictures, no sound, next to no cost
         codec: "VP8" or "H264"; None: what the console prefers
+        sound_codec: "opus" or "PCMU"; None: the same
         event_rate: most events per second; None: what the robot's description says. Never more than that
         name: what other participants see
         connect_seconds: allowed for connecting, waiting for the robot included
@@ -65,6 +66,7 @@ class Console:
         audio: bool = True,
         decode: bool = True,
         codec: str | None = None,
+        sound_codec: str | None = None,
         event_rate: float | None = None,
         name: str = "script",
         connect_seconds: float = 15.0,
@@ -88,6 +90,7 @@ class Console:
             audio=audio,
             decode=decode,
             codec=codec,
+            sound_codec=sound_codec,
             event_rate=event_rate,
             name=name,
             connect_seconds=connect_seconds,

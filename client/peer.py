@@ -50,6 +50,7 @@ ChannelName = Literal["control", "session", "stop"]
 CHANNELS: tuple[ChannelName, ...] = ("control", "session", "stop")
 CONTROL_BACKLOG = 4096  # bytes; a message on `control` is worth nothing behind so many others
 CLOSE_SECONDS = 3.0
+CODECS = {"video": ("VP8", "H264"), "audio": ("opus", "PCMU")}
 EXTENSION_URIS: dict[Carrier, str] = {"native": EVENT_REFERENCE_URI, "capture-time": CAPTURE_TIME_URI}
 
 
@@ -82,6 +83,7 @@ class Peer:
         relay_only: bool,
         on_message: Callable[[str | bytes], None],
         relay: str = "",
+        sound_codec: str | None = None,
     ) -> None:
         self.ended = asyncio.Event()
         self.why = ""  # the connection ended
@@ -102,9 +104,11 @@ class Peer:
         for _ in range(video):
             transceiver = self._pc.addTransceiver("video", direction="recvonly")
             if codec is not None:
-                transceiver.setCodecPreferences(_preferred(codec))
+                transceiver.setCodecPreferences(_preferred("video", codec))
         if audio:
-            self._pc.addTransceiver("audio", direction="recvonly")
+            transceiver = self._pc.addTransceiver("audio", direction="recvonly")
+            if sound_codec is not None:
+                transceiver.setCodecPreferences(_preferred("audio", sound_codec))
         self._channels = {name: self._create_channel(name) for name in CHANNELS}
         self._pc.on("connectionstatechange", self._state_changed)
 
@@ -251,12 +255,11 @@ class Peer:
             await self._whep.aclose()
 
 
-def _preferred(codec: str) -> list[RTCRtpCodecCapability]:
+def _preferred(kind: Literal["video", "audio"], codec: str) -> list[RTCRtpCodecCapability]:
     """The capabilities with `codec` alone, and its retransmissions."""
-    capabilities = RTCRtpReceiver.getCapabilities("video")
+    if codec not in CODECS[kind]:
+        raise ValueError(f"no codec {codec}; there are {' and '.join(CODECS[kind])}")
+    capabilities = RTCRtpReceiver.getCapabilities(kind)
     known = capabilities.codecs if capabilities is not None else []
-    names = {f"video/{codec}".lower(), "video/rtx"}
-    chosen = [capability for capability in known if capability.mimeType.lower() in names]
-    if len(chosen) < 2:
-        raise ValueError(f"no codec {codec}; there are VP8 and H264")
-    return chosen
+    names = {f"{kind}/{codec}".lower(), f"{kind}/rtx"}
+    return [capability for capability in known if capability.mimeType.lower() in names]
