@@ -1,6 +1,8 @@
-"""The player in Chromium when what it plays is damaged, is deleted, or cannot be asked for; and pictures in VP8."""
+"""The player in Chromium when what it plays is damaged, is deleted, or cannot be asked for; VP8 and PCMU."""
 
 import asyncio
+import re
+from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,8 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
 EVENTS = 100  # to drive for: about five chunks
 CAMERAS = ("overview", "front")
+PCMU_BYTES = 160  # of 20 ms
+HEARD = re.compile(r"packets? · (silent|\S+ dB)")  # it was decoded
 
 
 def _token(link: str) -> str:
@@ -33,13 +37,18 @@ async def _ask(stack: Stack, method: str, path: str) -> dict[str, Any]:
         return found
 
 
-async def _record_a_drive_in_vp8(stack: Stack) -> str:
-    """Its id."""
-    async with Console(stack.operator, codec="VP8", name="Ada") as console:
+async def _record_a_drive_in_vp8_and_pcmu(stack: Stack) -> str:
+    """Its id. In its second half somebody takes Opus."""
+    async with (
+        Console(stack.operator, codec="VP8", sound_codec="PCMU", name="Ada") as console,
+        AsyncExitStack() as others,
+    ):
         await console.take_seat()
         await console.drive([0.3, 0.0, 0.2])
         await _ask(stack, "POST", "/api/recordings")
         for number in range(EVENTS):
+            if number == EVENTS // 2:
+                await others.enter_async_context(Console(stack.observer, video=False, sound_codec="opus", name="Bo"))
             await console.drive([0.3 if number // 25 % 2 == 0 else -0.3, 0.0, 0.2])
         await _ask(stack, "POST", "/api/recordings/stop")
     (recording,) = (await _ask(stack, "GET", "/api/recordings"))["recordings"]
@@ -69,15 +78,15 @@ async def _fits(page: Page) -> None:
         await page.set_viewport_size({"width": 1280, "height": 800})
 
 
-async def test_pictures_in_vp8_are_played_and_damage_and_deletion_are_said_and_leave_the_rest(
+async def test_vp8_and_pcmu_are_played_and_damage_and_deletion_are_said_and_leave_the_rest(
     stack: Stack, chromium: Browser, tmp_path: Path
 ) -> None:
-    recording = await _record_a_drive_in_vp8(stack)
+    recording = await _record_a_drive_in_vp8_and_pcmu(stack)
     path = tmp_path / "state" / "recordings" / f"{recording}.mcap"
     await asyncio.to_thread(_damage_the_last_chunk, path)
     with RecordingReader(path) as reader:
         chunks = reader.index.chunks
-        whole, damaged = chunks[0].last_event - 2, chunks[-1].last_event - 1
+        whole, later, damaged = chunks[0].last_event - 2, chunks[-1].first_event - 1, chunks[-1].last_event
     link = f"{stack.console}/recordings#token={_token(stack.observer)}&recording={recording}&event={whole}"
     async with open_page(chromium, link) as page:
         replay = ConsolePage(page)
@@ -85,6 +94,13 @@ async def test_pictures_in_vp8_are_played_and_damage_and_deletion_are_said_and_l
         for camera in CAMERAS:
             strip = await page.evaluate(READ_STRIP, camera)
             assert strip["event"] == strip["stamp"] <= whole
+        sound = page.get_by_role("region", name="Sound")
+        assert set((await replay.stats())["sounds"]["microphone"]["sizes"]) == {PCMU_BYTES}
+        await expect(sound).to_contain_text(HEARD)
+        await _seek(page, later)
+        await replay.until(f"s.ready && s.event === {later}")
+        assert PCMU_BYTES not in (await replay.stats())["sounds"]["microphone"]["sizes"]
+        await expect(sound).to_contain_text(HEARD)
         await _seek(page, damaged)
         await replay.until(f"s.ready && s.event === {damaged} && s.unreadable.damaged === 1")
         await expect(page.get_by_text("1 damaged part", exact=True)).to_be_visible()
@@ -106,7 +122,7 @@ async def test_a_player_of_a_running_recording_outlives_the_loss_of_its_console_
         await replay.until("s.ready && s.running && s.pictures.front !== undefined")
         alert = page.get_by_role("alert")
         await page.context.set_offline(True)
-        await expect(alert).to_be_visible(timeout=15_000)
+        await expect(alert).to_contain_text("keeps trying by itself", timeout=15_000)
         await _fits(page)
         assert (await replay.stats())["pictures"]["front"] is not None
         known = (await replay.stats())["ended"]
