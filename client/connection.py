@@ -9,7 +9,7 @@ from pathlib import Path
 from client.command_gate import CommandGate, Pacing
 from client.driving import Driver
 from client.errors import ConnectFailed, ConsoleError, ConsoleLost, SignallingRefused
-from client.finish import finish
+from client.finish import cancel_all, finish
 from client.link import ConsoleLink
 from client.media_gate import GateMode
 from client.newest_queue import NewestQueue
@@ -167,8 +167,7 @@ class Connection:
                 if self._relay is not None:
                     tasks += [group.create_task(self._relay.run()), group.create_task(self._end_with(self._relay))]
                 await self._peer.ended.wait()
-                for task in tasks:
-                    task.cancel()
+                await cancel_all(tasks)
         finally:
             self._end(ConsoleLost(self._peer.why or "closed"))
 

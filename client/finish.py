@@ -1,10 +1,12 @@
 """Waiting for what has to come to its end."""
 
 import asyncio
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterable
 from typing import Any
 
-__all__ = ["finish"]
+__all__ = ["cancel_all", "finish"]
+
+ASK_AGAIN = 1.0  # s
 
 
 async def finish(coroutine: Coroutine[Any, Any, None]) -> None:
@@ -25,3 +27,16 @@ async def finish(coroutine: Coroutine[Any, Any, None]) -> None:
             task.exception()  # the cancellation matters more
         raise cancelled
     task.result()
+
+
+async def cancel_all(tasks: Iterable[asyncio.Task[None]]) -> None:
+    """Cancel them, and wait until all have ended.
+
+    A task may swallow the cancellation: aioice does so, and `asyncio.wait_for` before Python 3.12, when what it waits
+    for comes at the same moment. So who goes on is asked again.
+    """
+    left = set(tasks)
+    while left:
+        for task in left:
+            task.cancel()
+        _, left = await asyncio.wait(left, timeout=ASK_AGAIN)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from client import Console
-from client.finish import finish
+from client.finish import cancel_all, finish
 from tests.support.stack import Stack
 
 
@@ -57,3 +57,22 @@ async def test_somebody_who_is_cancelled_while_a_connection_closes_ends(stack: S
         with pytest.raises(asyncio.CancelledError):
             await guest
     assert not left.is_set()
+
+
+async def test_who_swallows_a_cancellation_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("client.finish.ASK_AGAIN", 0.01)
+    swallowed = asyncio.Event()
+
+    async def stubborn() -> None:
+        try:
+            await asyncio.Event().wait()
+        except asyncio.CancelledError:
+            swallowed.set()
+        await asyncio.Event().wait()
+
+    tasks = [asyncio.create_task(stubborn()), asyncio.create_task(asyncio.sleep(60))]
+    await asyncio.sleep(0)
+    async with asyncio.timeout(5):
+        await cancel_all(tasks)
+    assert swallowed.is_set()
+    assert all(task.cancelled() for task in tasks)

@@ -55,8 +55,8 @@ async def consoles(tmp_path: Path) -> AsyncIterator[Consoles]:
             for name, robot in (("one", "left"), ("two", "crane"))
         ]
         one, two = await asyncio.gather(*map(opened.enter_async_context, started))
-        addresses = (f"127.0.0.1:{each}" for each in ports.values())
-        await opened.enter_async_context(running_entry(tmp_path, *addresses, port, tls=False))
+        at_one, at_two = (f"127.0.0.1:{each}" for each in ports.values())
+        await opened.enter_async_context(running_entry(tmp_path, at_one, at_two, port, tls=False))
         yield Consoles(entry, redis, one, two)
 
 
