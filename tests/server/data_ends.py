@@ -6,15 +6,13 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
-from aiortc.rtcsctptransport import DataChunk, parse_packet
+from aiortc.rtcsctptransport import DataChunk, SackChunk, parse_packet
 
-from server.data_transport_private import (
-    tune_data_transport,
-)
+from server.data_transport_private import tune_data_transport
 from server.media.aiortc_private import create_peer_connection
 from tests.server.rig import PATIENCE
 
-__all__ = ["Ends", "connected", "lose"]
+__all__ = ["Ends", "acknowledgements_of", "connected", "lose", "packets_of"]
 
 
 class Ends:
@@ -74,3 +72,31 @@ def lose(sctp: Any, first: int) -> list[bytes]:
 
     dtls._send_data = send_or_lose
     return lost
+
+
+def packets_of(sctp: Any) -> list[bytes]:
+    """The packets that `sctp` sends from now on."""
+    left: list[bytes] = []
+    dtls = sctp.transport
+    send = dtls._send_data
+
+    async def watch(data: bytes) -> None:
+        left.append(data)
+        await send(data)
+
+    dtls._send_data = watch
+    return left
+
+
+def acknowledgements_of(sctp: Any) -> list[int]:
+    """What `sctp` acknowledges from now on in packets of their own: the last number of each."""
+    sent: list[int] = []
+    send = sctp._send_chunk
+
+    async def watch(chunk: Any) -> None:
+        if isinstance(chunk, SackChunk):
+            sent.append(chunk.cumulative_tsn)
+        await send(chunk)
+
+    sctp._send_chunk = watch
+    return sent

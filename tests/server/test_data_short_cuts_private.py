@@ -11,7 +11,7 @@ from aiortc import RTCSctpTransport
 from aiortc.rtcdtlstransport import State
 from aiortc.rtcsctptransport import USERDATA_MAX_LENGTH, DataChunk, SackChunk, parse_packet, serialize_packet
 
-from tests.server.data_ends import Ends, connected, lose
+from tests.server.data_ends import Ends, connected, lose, packets_of
 from tests.server.rig import PATIENCE
 
 MOVED = "aiortc moved a private part: see server/data_short_cuts_private.py"
@@ -41,19 +41,9 @@ def test_aiortc_does_what_is_cut_short(caller: Callable[..., Any], call: str) ->
 
 
 @pytest.mark.parametrize(("length", "packets"), [(1, 1), (USERDATA_MAX_LENGTH, 1), (USERDATA_MAX_LENGTH + 1, 2)])
-async def test_a_message_leaves_in_the_turn_that_it_is_sent_in(
-    ends: Ends, monkeypatch: pytest.MonkeyPatch, length: int, packets: int
-) -> None:
+async def test_a_message_leaves_in_the_turn_that_it_is_sent_in(ends: Ends, length: int, packets: int) -> None:
     await ends.exchange()
-    left: list[bytes] = []
-    dtls: Any = ends.server.transport.transport
-    send = dtls._send_data
-
-    async def watch(data: bytes) -> None:
-        left.append(data)
-        await send(data)
-
-    monkeypatch.setattr(dtls, "_send_data", watch)
+    left = packets_of(ends.server.transport)
     text = "n" * length
     ends.server.send(text)
     assert len(left) == packets
@@ -77,15 +67,7 @@ async def test_what_a_listener_sends_in_answer_leaves_in_order(ends: Ends) -> No
 
 async def test_an_acknowledgement_travels_with_the_answer(ends: Ends) -> None:
     await ends.exchange()
-    left: list[bytes] = []
-    dtls: Any = ends.server.transport.transport
-    send = dtls._send_data
-
-    async def watch(data: bytes) -> None:
-        left.append(data)
-        await send(data)
-
-    dtls._send_data = watch
+    left = packets_of(ends.server.transport)
     ends.server.on("message", lambda text: ends.server.send(f"answer to {text}"))
     for number in range(5):
         ends.client.send(str(number))

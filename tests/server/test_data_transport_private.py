@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 from aiortc import RTCSctpTransport
 from aiortc.rtcdtlstransport import RTCDtlsTransport
-from aiortc.rtcsctptransport import SackChunk
 
 from server.data_transport_private import (
     DRIVING_WINDOW_FLOOR,
@@ -18,7 +17,7 @@ from server.data_transport_private import (
     tune_data_transport,
 )
 from server.media.aiortc_private import create_peer_connection
-from tests.server.data_ends import Ends, connected, lose
+from tests.server.data_ends import Ends, acknowledgements_of, connected, lose
 from tests.server.rig import PATIENCE, running_rig
 
 MOVED = "aiortc moved a private part: see server/data_transport_private.py"
@@ -114,15 +113,7 @@ async def test_every_second_packet_is_acknowledged_and_a_single_one_after_a_whil
     await ends.exchange()
     server: Any = ends.server.transport
     client: Any = ends.client.transport
-    sent: list[int] = []
-    send = server._send_chunk
-
-    async def watch(chunk: Any) -> None:
-        if isinstance(chunk, SackChunk):
-            sent.append(chunk.cumulative_tsn)
-        await send(chunk)
-
-    server._send_chunk = watch
+    sent = acknowledgements_of(server)
     for number in range(10):
         ends.client.send(str(number))
         assert await ends.at_server.get() == str(number)
@@ -145,15 +136,7 @@ async def test_who_drives_has_an_acknowledgement_for_each_packet() -> None:
     async with connected(observes=False) as ends:
         await ends.exchange()
         server: Any = ends.server.transport
-        sent: list[int] = []
-        send = server._send_chunk
-
-        async def watch(chunk: Any) -> None:
-            if isinstance(chunk, SackChunk):
-                sent.append(chunk.cumulative_tsn)
-            await send(chunk)
-
-        server._send_chunk = watch
+        sent = acknowledgements_of(server)
         for number in range(10):
             ends.client.send(str(number))
             assert await ends.at_server.get() == str(number)
