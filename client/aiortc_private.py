@@ -4,6 +4,7 @@ are in client/ice_restart_private.py; nothing else in client/ touches any.
 Why each is needed:
 
 - aiortc neither offers nor reads foreign header extensions, and gives no packet to its user;
+- it does not note the SSRCs of retransmissions: with two sections of one codec it drops them all (RFC 4588 8.1);
 - its receiver decodes in a thread that is no daemon, into queues without bound, and gives out a frame only when
   the next one begins;
 - aioice takes data for a STUN message by their length alone, and then raises what its caller does not expect;
@@ -186,6 +187,10 @@ def _tap(receiver: Any, tap: _PacketTap, sink: PacketSink) -> None:
     async def receive(self: RTCRtpReceiver, parameters: Any) -> None:
         await begin(parameters)
         receiver._handle_disconnect()  # ends the decoder thread, which has had nothing to do
+        # Sections of one codec share the payload type of retransmissions, so that only the SSRC tells whose they are.
+        for encoding in parameters.encodings:
+            if encoding.rtx is not None:
+                receiver.transport._rtp_router.ssrc_table[encoding.rtx.ssrc] = receiver
 
     receiver._RTCRtpReceiver__jitter_buffer = tap
     receiver._handle_rtp_packet = handle_and_ask

@@ -21,6 +21,7 @@ from aiortc import (
 from aiortc.mediastreams import AudioStreamTrack, VideoStreamTrack
 from aiortc.rtcsctptransport import SackChunk
 from aiortc.rtp import RtcpRrPacket, RtpPacket
+from aiortc.sdp import SessionDescription
 
 from client import aiortc_private
 from client.aiortc_private import (
@@ -182,6 +183,26 @@ async def test_packets_reach_their_sink_and_nothing_is_decoded() -> None:
     assert any(packet.marker for packet in video.packets)
     assert all(packet.stamp is None for packet in video.packets)
     assert all(packet.data for packet in audio.packets)
+
+
+async def test_a_retransmission_finds_its_section_among_several_of_one_codec() -> None:
+    pc = new_peer("video", "video")
+    sinks = {"0": Sink(), "1": Sink()}
+
+    def take(pc: RTCPeerConnection) -> None:
+        take_packets(pc, dict(sinks), None, unpack_event_reference)
+
+    async with connected(pc, VideoStreamTrack(), VideoStreamTrack(), before_answer=take):
+        for sink in sinks.values():
+            await sink.enough.wait()
+        router: Any = transport_of(pc)._rtp_router
+        for transceiver in pc.getTransceivers():
+            description = next(
+                m for m in SessionDescription.parse(pc.remoteDescription.sdp).media if m.rtp.muxId == transceiver.mid
+            )
+            rtx = next(codec.payloadType for codec in description.rtp.codecs if codec.name == "rtx")
+            packet = RtpPacket(payload_type=rtx, ssrc=description.ssrc[1].ssrc, payload=b"\x00\x01")
+            assert router.route_rtp(packet) is transceiver.receiver
 
 
 async def test_raw_packets_come_without_threads_or_receivers_and_can_be_reported(
