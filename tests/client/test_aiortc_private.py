@@ -200,7 +200,7 @@ async def test_a_retransmission_finds_its_section_among_several_of_one_codec() -
             description = next(
                 m for m in SessionDescription.parse(pc.remoteDescription.sdp).media if m.rtp.muxId == transceiver.mid
             )
-            rtx = next(codec.payloadType for codec in description.rtp.codecs if codec.name == "rtx")
+            rtx = next(codec.payloadType or 0 for codec in description.rtp.codecs if codec.name == "rtx")
             packet = RtpPacket(payload_type=rtx, ssrc=description.ssrc[1].ssrc, payload=b"\x00\x01")
             assert router.route_rtp(packet) is transceiver.receiver
 
