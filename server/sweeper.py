@@ -2,20 +2,25 @@
 
 A connection is a knot of objects that refer to each other, a few hundred kilobytes that only Python's collector unties.
 By itself it would come after hundreds of them; it holds everything up for some milliseconds, a command included.
+
+What was freed goes back to the system more often: people who come and go, and encoders that open for a bad path, leave
+holes that glibc keeps, and the process would seem to grow. That takes less than a millisecond, on a thread.
 """
 
 import asyncio
 import ctypes
 import gc
+import itertools
 import time
 from collections.abc import Callable
 
-__all__ = ["SweepPlan", "sweep", "sweep_forever"]
+__all__ = ["SweepPlan", "sweep_forever", "trim"]
 
 ENOUGH = 5  # connections that have ended
 INTERVAL = 10.0  # s between two sweeps
 PATIENCE = 30.0  # s that a sweep waits for a robot that moves all the time
 LOOK = 2.0  # s
+TRIM_LOOKS = 5  # looks between two times that memory is given back
 
 
 class SweepPlan:
@@ -34,20 +39,22 @@ class SweepPlan:
         self._swept_at, self._swept = now, ended
 
 
-def sweep() -> None:
-    """Untie what has ended, and give the memory back: glibc keeps what lies between blocks still in use."""
-    gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc's own
-    if trim is not None:
-        trim(0)
+def trim() -> None:
+    """Give memory back: glibc keeps what lies between blocks still in use. Does nothing with another C library."""
+    malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if malloc_trim is not None:
+        malloc_trim(0)
 
 
 async def sweep_forever(ended: Callable[[], int], moving: Callable[[], bool]) -> None:
     """Until cancelled."""
     plan = SweepPlan(time.monotonic())
-    while True:
+    for look in itertools.count(1):
         await asyncio.sleep(LOOK)
         now, count = time.monotonic(), ended()
-        if plan.due(count, moving(), now):
-            sweep()
+        swept = plan.due(count, moving(), now)
+        if swept:
+            gc.collect()
             plan.swept(count, now)
+        if swept or look % TRIM_LOOKS == 0:
+            await asyncio.to_thread(trim)
