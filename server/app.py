@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 from fastapi import FastAPI, Response
 from starlette.types import Lifespan
 
-from server import api, api_access, api_ice, api_recordings, api_relay, scene_proxy, whep
+from server import api, api_access, api_ice, api_recordings, api_relay, scene_proxy, watch, whep
 from server.bare_app import bare_app, guard_app, open_house
 from server.json_answer import json_answer
 from server.log_context import LogContext
@@ -59,6 +59,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     app.include_router(api_recordings.router)
     app.include_router(api_relay.router)
     app.include_router(scene_proxy.router)
+    app.include_router(watch.router)
     app.add_middleware(LogContext)
     return app
 

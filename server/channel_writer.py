@@ -20,6 +20,11 @@ class ChannelWriter:
         self.too_large = 0
         channel.on("bufferedamountlow", self._flush)
 
+    @property
+    def lost(self) -> int:
+        """Messages that did not fit."""
+        return self.outbox.dropped + self.too_large
+
     def send(self, text: str) -> None:
         self.outbox.put(text)
         self._flush()

@@ -1,4 +1,4 @@
-"""Parses what clients send on data channels. Every failure is a named ChannelError; nothing else comes out."""
+"""Parses what clients send, on data channels and on lines. A failure is a named ChannelError; nothing else comes out."""
 
 from typing import Literal
 
@@ -18,7 +18,7 @@ from robot_bridge.protocol.errors import MessageError
 from robot_bridge.protocol.messages import Command, Ping, Reset, Rest, Stop
 from server.errors import BinaryMessage, Flood, MalformedMessage, MessageTooLarge, UnknownChannel, WrongChannel
 
-__all__ = ["CHANNELS", "MAX_MESSAGE", "ChannelName", "MessageBudget", "channel_name", "parse_message"]
+__all__ = ["CHANNELS", "MAX_MESSAGE", "ChannelName", "MessageBudget", "channel_name", "channel_of", "parse_message"]
 
 ChannelName = Literal["control", "session", "stop"]
 
@@ -27,6 +27,9 @@ CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
     "session": (SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, Rename, Note, Stop),
     "stop": (Stop, Reset),
 }
+
+# Where one line carries all channels, the kind says which it is; a stop is for `stop`, the last that takes it.
+CHANNEL_OF: dict[type[ClientMessage], ChannelName] = {kind: name for name in CHANNELS for kind in CHANNELS[name]}
 
 MAX_MESSAGE = 16 * 1024  # bytes; a report of 32 streams is the largest, about 7 kB
 
@@ -43,8 +46,12 @@ def channel_name(label: str) -> ChannelName:
     raise UnknownChannel(f"the channels are {', '.join(CHANNELS)}")
 
 
-def parse_message(channel: ChannelName, data: object) -> ClientMessage:
-    """What a client sent on `channel`.
+def channel_of(message: ClientMessage) -> ChannelName:
+    return CHANNEL_OF[type(message)]
+
+
+def parse_message(channel: ChannelName | None, data: object) -> ClientMessage:
+    """What a client sent on `channel`; None: on a line, which carries all of them.
 
     Raises:
         BinaryMessage: not text.
@@ -60,7 +67,7 @@ def parse_message(channel: ChannelName, data: object) -> ClientMessage:
         message = decode_client_message(data)
     except MessageError as error:
         raise MalformedMessage(error.detail) from error
-    if not isinstance(message, CHANNELS[channel]):
+    if channel is not None and not isinstance(message, CHANNELS[channel]):
         raise WrongChannel(f"{type(message).__name__.lower()} does not belong on {channel}")
     return message
 

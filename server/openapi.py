@@ -51,6 +51,7 @@ from server.errors import (
 )
 from server.ice_servers import IceServers
 from server.relay.tickets import RelayAnswer
+from server.watch import WatchTicket
 
 __all__ = ["OPERATIONS", "Operation", "openapi_document"]
 
@@ -102,6 +103,8 @@ RESOURCE = Parameter("resource", "path", {"type": "string"}, required=True)
 MATCH = Parameter("If-Match", "header", {"type": "string", "pattern": r'^(\*|"[0-9a-f]{16}")$'}, required=True)
 STAMP = Parameter("stamp", "query", {"type": "string", "enum": ["trailer"]})
 RELAY = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{0,3}$"})
+WATCHED = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{1,3}$"}, required=True)
+WATCH_TICKET = Parameter("ticket", "path", {"type": "string"}, required=True)
 VIEW = Parameter("view", "query", {"type": "string", "enum": ["thumbnail"]})
 PEER = Parameter("peer", "query", {"type": "string", "maxLength": 16})
 LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
@@ -143,6 +146,15 @@ OPERATIONS: tuple[Operation, ...] = (
         *("get", "/api/relay", "Where an observer gets its media: null, from the console.", 200, RelayAnswer),
         errors=(BadParameter,),
         parameters=(PEER, LOST),
+    ),
+    Operation(
+        *("post", "/api/watch", "A ticket for the WebSocket of an observer behind a relay.", 201, WatchTicket),
+        errors=(NotAllowed, NotFound, BadParameter, RobotUnreachable, TooManyPeers, ShuttingDown),
+        parameters=(WATCHED,),
+    ),
+    Operation(
+        *("delete", "/watch/{ticket}", "Give a ticket back.", 200, None, (NotFound,)),
+        parameters=(WATCH_TICKET,),
     ),
     Operation(
         *("post", "/api/stop", "Stop the robot, latched. From every role.", 200, Delivered),

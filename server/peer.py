@@ -1,12 +1,12 @@
-"""One WebRTC peer: its data channels, its heartbeat, its end."""
+"""One peer: what it may say, its heartbeat, its end. `WebRtcPeer` and `Watcher` are the two ways it comes."""
 
 import asyncio
 import secrets
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
 import structlog
-from aiortc import RTCDataChannel, RTCPeerConnection
 
 from robot_bridge.protocol.console import (
     ClientMessage,
@@ -22,23 +22,20 @@ from robot_bridge.protocol.console import (
 from robot_bridge.protocol.messages import Stop
 from server.access import Identity
 from server.audit import Actor
-from server.channel_writer import ChannelWriter
-from server.channels import ChannelName, MessageBudget, channel_name, parse_message
-from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests, TransportRefused
-from server.ice_restart_private import IceSession
+from server.channels import ChannelName, MessageBudget, channel_of, parse_message
+from server.errors import ChannelError, Flood, TransportRefused
 from server.names import clean_name
 from server.rate_limits import RateLimits
 from server.token_bucket import TokenBucket
 
-__all__ = ["Peer", "PeerHost", "PeerLimits", "PeerStreams"]
+__all__ = ["MessageWriter", "Peer", "PeerHost", "PeerLimits", "PeerStreams"]
 
 log = structlog.get_logger(__name__)
 
 ASK_RATE = 2.0  # Hz, of requests that everyone is told of: seat, name, reset
 ASK_BURST = 10.0
-CLOSE_TIMEOUT = 5.0  # s; aiortc says goodbye to the remote, which may not answer
+CLOSE_TIMEOUT = 5.0  # s; goodbye is said to the remote, which may not answer
 FORGIVEN_RATE = 2.0  # Hz, of bad messages
-MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
 
 
 class PeerLimits(Protocol):
@@ -84,7 +81,19 @@ class PeerHost(Protocol):
     def peer_ended(self, peer: "Peer") -> None: ...
 
 
-class Peer:
+class MessageWriter(Protocol):
+    """One way to the remote, which never waits."""
+
+    @property
+    def lost(self) -> int:
+        """Messages that did not fit."""
+        ...
+
+    def send(self, text: str) -> None: ...
+    def send_newest(self, text: str) -> None: ...
+
+
+class Peer(ABC):
     """A session: await `run`; it returns when the peer has ended and everything of it is closed.
 
     `end` asks for the end from outside, with the reason that logs and metrics show.
@@ -92,17 +101,16 @@ class Peer:
 
     def __init__(
         self,
-        pc: RTCPeerConnection,
         media: PeerStreams,
-        ice: IceSession,
         identity: Identity,
         host: PeerHost,
         limits: PeerLimits,
+        *,
+        connect_seconds: float | None = None,
+        silence_seconds: float | None = None,
     ) -> None:
+        """The last two instead of the limits' own."""
         self.id = secrets.token_hex(4)  # public: the others see it
-        self.resource = secrets.token_urlsafe(16)  # secret: the path of the WHEP resource
-        self.pc = pc
-        self.ice = ice
         self.identity = identity
         self.wanted_name = clean_name(identity.name, identity.role)
         self.name = ""  # what others see; `Peers` gives it
@@ -113,20 +121,18 @@ class Peer:
         self.relay = ""  # the relay that it watches through; "": media and feedback come from here
         self._media = media
         self._host = host
-        self._limits = limits
+        self._connect_seconds = limits.peer_connect_timeout if connect_seconds is None else connect_seconds
+        self._silence_seconds = limits.peer_silence if silence_seconds is None else silence_seconds
         self._loop = asyncio.get_running_loop()
-        self._writers: dict[ChannelName, ChannelWriter] = {}
+        self._writers: dict[ChannelName, MessageWriter] = {}
         rate = limits.max_observer_rate if identity.role == "observer" else limits.max_message_rate
         self._budget = MessageBudget(rate, self._loop.time())
         self._patience = RateLimits(FORGIVEN_RATE, limits.max_bad_messages)
-        self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
         self.asks = TokenBucket(ASK_RATE, ASK_BURST, self._loop.time())  # for what concerns everybody
         self._heard_at = self._loop.time()
         self._connected = asyncio.Event()
         self._end = asyncio.Event()
         media.on_quality(self._quality_decided)
-        pc.on("datachannel", self._channel_offered)
-        pc.on("connectionstatechange", self._connection_changed)
 
     @property
     def connected(self) -> bool:
@@ -162,13 +168,6 @@ class Peer:
             self._end.set()
             self._connected.set()
             self._host.peer_ended(self)
-
-    def take_request(self) -> None:
-        """Count a PATCH. Raises TooManyRequests."""
-        try:
-            self._requests.spend(self._loop.time())
-        except Flood as error:
-            raise TooManyRequests(f"more than {MAX_REQUESTS:g} requests a second for one session") from error
 
     @property
     def actor(self) -> Actor:
@@ -214,11 +213,11 @@ class Peer:
 
     def dropped(self) -> int:
         """Messages that did not fit."""
-        return sum(writer.outbox.dropped + writer.too_large for writer in self._writers.values())
+        return sum(writer.lost for writer in set(self._writers.values()))
 
     async def _wait_until_connected(self) -> None:
         try:
-            async with asyncio.timeout(self._limits.peer_connect_timeout):
+            async with asyncio.timeout(self._connect_seconds):
                 await self._connected.wait()
         except TimeoutError:
             self.end("never connected")
@@ -226,7 +225,7 @@ class Peer:
     async def _wait_until_ended(self) -> None:
         while not self.ended:
             try:
-                async with asyncio.timeout_at(self._heard_at + self._limits.peer_silence):
+                async with asyncio.timeout_at(self._heard_at + self._silence_seconds):
                     await self._end.wait()
             except TimeoutError:
                 self._check_silence()
@@ -235,63 +234,54 @@ class Peer:
         now = self._loop.time()
         if not self._writers:
             self._heard_at = now  # a plain WHEP player has no channel to speak on; ICE consent watches it
-        elif now - self._heard_at >= self._limits.peer_silence:
+        elif now - self._heard_at >= self._silence_seconds:
             self.end("silent")
 
     async def _close(self) -> None:
         try:
             async with asyncio.timeout(CLOSE_TIMEOUT):
                 await self._media.close()
-                await self.ice.close()
-                await self.pc.close()
+                await self._close_transport()
         except TimeoutError:
             log.warning("peer did not close in time", peer=self.id)
 
-    # aiortc's events
+    # what the two ways say
 
-    def _connection_changed(self) -> None:
-        state = self.pc.connectionState
-        if state == "connected":
-            self._heard_at = self._loop.time()
-            self._connected.set()
-        elif state in ("failed", "closed"):
-            self.end(f"connection {state}")
+    @abstractmethod
+    async def _close_transport(self) -> None: ...
 
-    def _channel_offered(self, channel: RTCDataChannel) -> None:
-        try:
-            name = channel_name(channel.label)
-            if name in self._writers:
-                raise DuplicateChannel(name)
-        except ChannelError as error:
-            self._host.input_refused(self, "other", error)
-            self._lose_patience(self._loop.time())
-            channel.close()
-            return
-        self._writers[name] = ChannelWriter(channel)
-        channel.on("message", lambda data: self._received(name, data))
-        channel.on("close", lambda: self.end("channel closed"))
-        self._host.channel_opened(self, name)
-        if name == "session" and self._quality is not None:
+    def _connection_made(self) -> None:
+        self._heard_at = self._loop.time()
+        self._connected.set()
+
+    def _open(self, channel: ChannelName, writer: MessageWriter) -> None:
+        """From now on the remote can be told things."""
+        self._writers[channel] = writer
+        self._host.channel_opened(self, channel)
+        if channel == "session" and self._quality is not None:
             self.send("session", self._quality)
 
-    def _received(self, channel: ChannelName, data: object) -> None:
-        """Only a valid message counts as life."""
+    def _received(self, channel: ChannelName | None, data: object) -> None:
+        """`channel`: None where one way carries all. Only a valid message counts as life."""
         if self.ended:
             return
         now = self._loop.time()
         try:
             message = self._parse(channel, data, now)
         except ChannelError as error:
-            self._host.input_refused(self, channel, error)
-            self._lose_patience(now)
+            self._refused(channel or "line", error)
             return
         self._heard_at = now
         if isinstance(message, Report):
             self.report = message
             self._media.report(message, now)
-        self._host.message_received(self, channel, message)
+        self._host.message_received(self, channel or channel_of(message), message)
 
-    def _parse(self, channel: ChannelName, data: object, now: float) -> ClientMessage:
+    def _refused(self, channel: str, error: ChannelError) -> None:
+        self._host.input_refused(self, channel, error)
+        self._lose_patience(self._loop.time())
+
+    def _parse(self, channel: ChannelName | None, data: object, now: float) -> ClientMessage:
         try:
             message = parse_message(channel, data)
         except ChannelError:
@@ -306,7 +296,7 @@ class Peer:
         return message
 
     def transport_refused(self, name: str) -> None:
-        """What came was more than fits, below the channels. SCTP cannot leave a message out."""
+        """What came was more than fits, below the messages. SCTP and TCP cannot leave one out."""
         self._host.input_refused(self, "transport", TransportRefused(name))
         self.end("too much")
 

@@ -16,6 +16,9 @@ from server.feedback_fanout import FeedbackReceiver
 from server.metrics import Metrics
 from server.names import unique_names
 from server.peer import Peer
+from server.request_turns import RequestTurns
+from server.watcher import Watcher
+from server.webrtc_peer import WebRtcPeer
 
 __all__ = ["Peers"]
 
@@ -60,6 +63,7 @@ class Peers:
         self._closing = False
         self.ended = 0  # connections, ever
         self.relays: list[FeedbackReceiver] = []
+        self.turns = RequestTurns()  # in which watchers are written to
         self.further_bounds: list[Callable[[Identity], None]] = []  # raise TooManyPeers where there is no place
 
     def __iter__(self) -> Iterator[Peer]:
@@ -143,12 +147,19 @@ class Peers:
     def by_id(self, peer_id: str) -> Peer | None:
         return next((peer for peer in self._sessions if peer.id == peer_id), None)
 
-    def by_resource(self, resource: str) -> Peer:
+    def by_resource(self, resource: str) -> WebRtcPeer:
         """Raises NotFound when no peer has this WHEP resource."""
         for peer in self._sessions:
-            if peer.resource == resource:
+            if isinstance(peer, WebRtcPeer) and peer.resource == resource:
                 return peer
         raise NotFound("no such WHEP resource")
+
+    def by_ticket(self, ticket: str) -> Watcher:
+        """Raises NotFound when nobody is waited for with this ticket."""
+        for peer in self._sessions:
+            if isinstance(peer, Watcher) and not peer.ended and peer.ticket == ticket != "":
+                return peer
+        raise NotFound("no such ticket")
 
     def tell(self, channel: ChannelName, message: ServerMessage) -> None:
         """Everyone."""

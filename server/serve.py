@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager
 import uvicorn
 from starlette.applications import Starlette
 
+from server.guarded_websocket import GuardedWebSocket
 from server.tls import Certificate
 
 __all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
@@ -17,7 +18,7 @@ __all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
 BACKLOG = 128
 SHUTDOWN_TIMEOUT = 3  # s for HTTP requests under way
 MAX_HEAD = 16 * 1024  # bytes of a request's head
-MAX_WEBSOCKET_MESSAGE = 64 * 1024  # bytes from a viewer of the scene
+MAX_WEBSOCKET_MESSAGE = 64 * 1024  # bytes from a viewer of the scene, or from a watcher
 
 
 class PortTaken(Exception):
@@ -90,7 +91,7 @@ async def running(
         access_log=False,  # a path can hold a ticket
         log_level="error",  # uvicorn warns of every request that is not HTTP; we count them
         lifespan="on",
-        ws="websockets-sansio",
+        ws=GuardedWebSocket,
         ws_max_size=MAX_WEBSOCKET_MESSAGE,
         timeout_graceful_shutdown=SHUTDOWN_TIMEOUT,
         server_header=False,

@@ -27,9 +27,9 @@ from server.ice_restart_private import IceSession
 from server.ice_servers import IceServers, for_aiortc, link_headers
 from server.media.aiortc_private import create_peer_connection
 from server.offer import Fragment, FragmentCandidate, format_fragment, parse_fragment, prepare_offer
-from server.peer import Peer
 from server.peer_guards_private import guard_data
 from server.services import Services, authorized, services
+from server.webrtc_peer import WebRtcPeer
 
 __all__ = ["candidates_of", "router"]
 
@@ -143,7 +143,7 @@ async def delete(resource: str, request: Request, identity: Annotated[Identity, 
     return Response(status_code=200)
 
 
-def _own(here: Services, resource: str, identity: Identity) -> Peer:
+def _own(here: Services, resource: str, identity: Identity) -> WebRtcPeer:
     """The peer of this resource; somebody else's is as good as none."""
     peer = here.console.peers.by_resource(resource)
     if peer.identity.token_id != identity.token_id:
@@ -153,7 +153,7 @@ def _own(here: Services, resource: str, identity: Identity) -> Peer:
 
 async def _negotiate(
     here: Services, identity: Identity, offer: str, ice: IceServers, *, trailer: bool, thumbnail: bool
-) -> tuple[Peer, str]:
+) -> tuple[WebRtcPeer, str]:
     # No STUN server unless asked for: our host candidates are a setting, the peer's address is learnt from its checks.
     own_servers = for_aiortc(ice) if here.settings.relay_console else []
     pc = create_peer_connection(own_servers)
@@ -180,7 +180,7 @@ async def _negotiate(
                     here.settings.peer_connect_timeout,
                     lambda name: refused("transport", name).inc(),
                 )
-                peer = Peer(pc, media, session, identity, here.console, here.settings)
+                peer = WebRtcPeer(pc, media, session, identity, here.console, here.settings)
                 peer.thumbnail = thumbnail
                 if line is not None:
                     line.peer = peer

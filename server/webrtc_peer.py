@@ -1,0 +1,69 @@
+"""A peer on WebRTC: its connection and its data channels."""
+
+import secrets
+
+from aiortc import RTCDataChannel, RTCPeerConnection
+
+from server.access import Identity
+from server.channel_writer import ChannelWriter
+from server.channels import MessageBudget, channel_name
+from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
+from server.ice_restart_private import IceSession
+from server.peer import Peer, PeerHost, PeerLimits, PeerStreams
+
+__all__ = ["WebRtcPeer"]
+
+MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
+
+
+class WebRtcPeer(Peer):
+    def __init__(
+        self,
+        pc: RTCPeerConnection,
+        media: PeerStreams,
+        ice: IceSession,
+        identity: Identity,
+        host: PeerHost,
+        limits: PeerLimits,
+    ) -> None:
+        super().__init__(media, identity, host, limits)
+        self.resource = secrets.token_urlsafe(16)  # secret: the path of the WHEP resource
+        self.pc = pc
+        self.ice = ice
+        self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
+        pc.on("datachannel", self._channel_offered)
+        pc.on("connectionstatechange", self._connection_changed)
+
+    def take_request(self) -> None:
+        """Count a PATCH. Raises TooManyRequests."""
+        try:
+            self._requests.spend(self._loop.time())
+        except Flood as error:
+            raise TooManyRequests(f"more than {MAX_REQUESTS:g} requests a second for one session") from error
+
+    async def _close_transport(self) -> None:
+        await self.ice.close()
+        await self.pc.close()
+
+    # aiortc's events
+
+    def _connection_changed(self) -> None:
+        state = self.pc.connectionState
+        if state == "connected":
+            self._connection_made()
+        elif state in ("failed", "closed"):
+            self.end(f"connection {state}")
+
+    def _channel_offered(self, channel: RTCDataChannel) -> None:
+        try:
+            name = channel_name(channel.label)
+            if name in self._writers:
+                raise DuplicateChannel(name)
+        except ChannelError as error:
+            self._refused("other", error)
+            channel.close()
+            return
+        writer = ChannelWriter(channel)
+        channel.on("message", lambda data: self._received(name, data))
+        channel.on("close", lambda: self.end("channel closed"))
+        self._open(name, writer)
