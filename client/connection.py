@@ -22,6 +22,7 @@ from client.render_log import LIMIT, FeedbackArrival
 from client.sdp import Section
 from client.session import Session
 from client.statistics import ConsoleStatistics, EventRate, percentiles
+from client.watch_line import LineBlocked, WatchLine
 from robot_bridge.protocol.carriers import Carrier
 from robot_bridge.protocol.console import (
     Participants,
@@ -42,6 +43,7 @@ __all__ = ["Connection", "ConnectionOptions"]
 HEARTBEAT = 0.5  # s between two reports, and between two pings
 OBSERVER_HEARTBEAT = 1.0  # s, of somebody who cannot drive; there may be hundreds
 RELAYED_HEARTBEAT = 5.0  # s, of an observer that nobody waits for
+LINE_HEARTBEAT = 15.0  # s, of one with a line, which loses nothing
 EARLY_PINGS = 5  # to know the path before the first command
 EARLY_PING = 0.05  # s between them
 STOP_SECONDS = 0.3  # for the stop to be confirmed before HTTP is tried as well
@@ -91,8 +93,8 @@ class Connection:
         self._pings = PingLedger()
         self._heard_at = self._loop.time()
         self._running: asyncio.Task[None] | None = None
-        self._peer = self._new_peer()
         self._relay: RelayMedia | None = None
+        self._peer: Peer | WatchLine = self._new_peer()
         self.session = Session(lambda channel, message: self._peer.send(channel, message), self._until)
 
     def _new_peer(self, relay: str = "") -> Peer:
@@ -120,7 +122,7 @@ class Connection:
         if ticket is not None:
             await self._go_through(ticket)
         sections = await self._negotiate(deadline)
-        if self._relay is None:
+        if isinstance(self._peer, Peer) and self._relay is None:
             self.media.prepare(self._peer, sections, self.options.decode)
         await self._peer.connect(deadline - self._loop.time())
         if self._relay is not None:
@@ -137,27 +139,30 @@ class Connection:
             raise ConnectFailed(error.detail) from error
 
     async def _go_through(self, ticket: RelayTicket) -> None:
-        """Media and feedback come from the relay; the console's connection keeps the data channels alone."""
+        """Media and feedback come from the relay; everything else goes by a line to the console."""
         wanted = {"video": self.options.video, "audio": int(self.options.audio)}
         relay = self._relay = RelayMedia(ticket, self._received_from_relay)
         self.options = options = replace(self.options, video=0, audio=False, carrier="trailer")
         self.media = Reception("trailer", options.tolerance, options.gate, self._rendered)
         await self._peer.close()
-        self._peer = self._new_peer(ticket.relay)
+        self._peer = WatchLine(options.link, ticket.relay, options.tls_ca, self._received)
         first = [each for kind in wanted for each in [s for s in ticket.streams if s.kind == kind][: wanted[kind]]]
         self.media.prepare(relay, await relay.negotiate(lambda stream: stream in first), options.decode)
 
     async def _negotiate(self, deadline: float) -> list[Section]:
-        """Try again while the console does not reach its robot."""
+        """Try again while the console does not reach its robot, and without a line where no WebSocket passes."""
         while True:
             try:
                 return await self._peer.negotiate()
+            except LineBlocked:
+                wait = 0.0
             except SignallingRefused as error:
-                if error.error != "robot_unreachable" or self._loop.time() + RETRY_SECONDS > deadline:
+                wait = RETRY_SECONDS
+                if error.error != "robot_unreachable" or self._loop.time() + wait > deadline:
                     raise
             await self._peer.close()
-            await asyncio.sleep(RETRY_SECONDS)
-            self._peer = self._new_peer()
+            await asyncio.sleep(wait)
+            self._peer = self._new_peer(self.relay)
 
     async def _run(self) -> None:
         """The session: returns when the connection ended or was closed."""
@@ -231,7 +236,7 @@ class Connection:
 
     def _beat(self) -> float:
         if self._relay is not None:
-            return RELAYED_HEARTBEAT
+            return LINE_HEARTBEAT if isinstance(self._peer, WatchLine) else RELAYED_HEARTBEAT
         welcome = self.session.welcome
         return OBSERVER_HEARTBEAT if welcome is not None and welcome.role == "observer" else HEARTBEAT
 

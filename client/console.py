@@ -206,7 +206,8 @@ class Console:
 
         Raises:
             SignallingRefused: the console has given up this connection.
-            ConnectFailed: no new path was found in time; the old one is as it was.
+            ConnectFailed: no new path was found in time; the old one is as it was. An observer's line beside a relay
+                is TCP and has no other path.
         """
         await self._live().restart_ice()
 

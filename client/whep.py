@@ -34,6 +34,10 @@ class _IceServers(msgspec.Struct):
     ice_servers: list[_IceServer]
 
 
+class _WatchTicket(msgspec.Struct):
+    ticket: str
+
+
 class _RelayAnswer(msgspec.Struct):
     relay: RelayTicket | None
 
@@ -84,6 +88,18 @@ class Whep:
             return msgspec.json.decode(response.content, type=_RelayAnswer).relay
         except msgspec.DecodeError as error:
             raise SignallingRefused(response.status_code, "", "not an answer about relays") from error
+
+    async def watch(self, relay: str) -> str:
+        """A ticket for a line to the console, of an observer that has its media from `relay`. Raises as `offer`."""
+        response = await self._request("POST", f"{self._base}/api/watch?relay={relay}")
+        try:
+            return msgspec.json.decode(response.content, type=_WatchTicket).ticket
+        except msgspec.DecodeError as error:
+            raise SignallingRefused(response.status_code, "", "not a ticket") from error
+
+    async def decline(self, ticket: str) -> None:
+        """Give a ticket back; raises as `offer`."""
+        await self._request("DELETE", f"{self._base}/watch/{ticket}")
 
     async def offer(self, sdp: str, *, trailer: bool, relay: str = "") -> Answer:
         """Offer, and get the answer. `relay`: the relay that media come from.
