@@ -41,6 +41,7 @@ from server.cli_recordings import add_recording_commands
 from server.fleet.robot_names import BadFleet, is_named
 from server.fleet.robots import robot_settings
 from server.fleet.simulated import own_event_log, simulated_robots
+from server.heap import share_arenas
 from server.link_access import link_access
 from server.logs import LogFormat, configure_logs
 from server.run_console import run_console, say
@@ -297,6 +298,7 @@ def _settings(**flags: object) -> Settings:
 def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool, quiet: bool) -> None:
     configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
     sys.setswitchinterval(SWITCH_INTERVAL)
+    share_arenas()
     try:
         _check_files(settings)
         check_board(settings, settings.public_url)

@@ -8,19 +8,20 @@ holes that glibc keeps, and the process would seem to grow. That takes less than
 """
 
 import asyncio
-import ctypes
 import gc
 import itertools
 import time
 from collections.abc import Callable
 
-__all__ = ["SweepPlan", "sweep_forever", "trim"]
+from server.heap import give_back
+
+__all__ = ["SweepPlan", "sweep_forever"]
 
 ENOUGH = 5  # connections that have ended
 INTERVAL = 10.0  # s between two sweeps
 PATIENCE = 30.0  # s that a sweep waits for a robot that moves all the time
 LOOK = 2.0  # s
-TRIM_LOOKS = 5  # looks between two times that memory is given back
+GIVE_BACK_LOOKS = 5  # looks between two times that memory is given back
 
 
 class SweepPlan:
@@ -39,13 +40,6 @@ class SweepPlan:
         self._swept_at, self._swept = now, ended
 
 
-def trim() -> None:
-    """Give memory back: glibc keeps what lies between blocks still in use. Does nothing with another C library."""
-    malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if malloc_trim is not None:
-        malloc_trim(0)
-
-
 async def sweep_forever(ended: Callable[[], int], moving: Callable[[], bool]) -> None:
     """Until cancelled."""
     plan = SweepPlan(time.monotonic())
@@ -56,5 +50,5 @@ async def sweep_forever(ended: Callable[[], int], moving: Callable[[], bool]) ->
         if swept:
             gc.collect()
             plan.swept(count, now)
-        if swept or look % TRIM_LOOKS == 0:
-            await asyncio.to_thread(trim)
+        if swept or look % GIVE_BACK_LOOKS == 0:
+            await asyncio.to_thread(give_back)
