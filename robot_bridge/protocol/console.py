@@ -226,6 +226,7 @@ class StreamQuality(msgspec.Struct, frozen=True, kw_only=True):
     height: int
     frames_per_second: float
     bits_per_second: float  # what the encoder aims at
+    camera_frames_per_second: float = 0.0  # of which those are some or all; 0: not known
 
 
 class Quality(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="quality"):
@@ -233,6 +234,7 @@ class Quality(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
 
     streams: list[StreamQuality]
     reason: str = ""  # "loss", "gap", "bandwidth", "round trip", "" when nothing limits
+    crowd: int = 0  # more than so many watch, so that each gets fewer pictures; 0: no crowd
 
 
 class SpeedCapState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="speed_cap"):

@@ -21,6 +21,7 @@ class MediaMetrics:
         self.frames_in = counter("frames_in", "Pictures and sound segments from the robot", "stream")
         self.taken = counter("pictures_taken", "Pictures that were encoded for some tier", "stream")
         self.encoded = counter("frames_encoded", "Frames that an encoder put out", "stream", "codec")
+        self.tier_frames = counter("tier_frames_encoded", "The same, by what they are made for", "stream", "tier")
         self.dropped = counter("frames_dropped", "Frames that went no further than a stage", "stream", "stage")
         self.packets = counter("packets_sent", "RTP packets sent", "stream", "carrier")
         self.octets = counter("bytes_sent", "Bytes of SRTP packets sent", "stream", "carrier")

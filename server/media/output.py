@@ -1,12 +1,11 @@
 """One tier of one codec of one stream: who gets it, how it is encoded, and when it needs a keyframe."""
 
-from robot_bridge.protocol.console import Tier
 from server.media.frame import EncodedFrame
 from server.media.keyframes import KeyframeScheduler
 from server.media.metrics import MediaMetrics
 from server.media.peer_stream import PeerStream
 from server.media.quality.cadence import Cadence
-from server.media.quality.plan import PicturePlan
+from server.media.quality.plan import PicturePlan, PictureTier
 
 __all__ = ["KEYFRAME_CAUSES", "Output"]
 
@@ -24,7 +23,7 @@ class Output:
         self,
         stream: str,
         codec: str,
-        tier: Tier,
+        tier: PictureTier,
         plan: PicturePlan,
         keyframes: KeyframeScheduler,
         metrics: MediaMetrics,
@@ -41,6 +40,7 @@ class Output:
         self.encoded_at = 0.0  # when the last picture was taken, on the same clock
         self._last_capture_time = 0.0
         self._encoded = metrics.encoded.labels(stream, codec)
+        self._of_tier = metrics.tier_frames.labels(stream, tier)
         self._keyframes_served = metrics.keyframes.labels(stream, codec)
         self._requests = {cause: metrics.keyframe_requests.labels(stream, cause) for cause in KEYFRAME_CAUSES}
         self.encode_seconds = metrics.encode_seconds.labels(stream, codec)
@@ -94,5 +94,6 @@ class Output:
 
     def count(self, frame: EncodedFrame) -> None:
         self._encoded.inc()
+        self._of_tier.inc()
         if frame.keyframe:
             self._keyframes_served.inc()

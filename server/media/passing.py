@@ -11,11 +11,11 @@
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from robot_bridge.protocol.console import Tier
 from robot_bridge.protocol.messages import Media
 from server.media.h264 import Profile, accepts, inspect
 from server.media.output import Output
 from server.media.peer_stream import PeerStream
+from server.media.quality.plan import PictureTier
 
 __all__ = ["PASSED", "Passing"]
 
@@ -26,12 +26,12 @@ PASSED = "H264-passed"  # the codec that counts what goes on as it came
 class Passing:
     """Who gets the camera's own pictures. Part of one stream, which tells of joins, moves and leaves."""
 
-    def __init__(self, output: Output, encoded: Callable[[Tier], Output]) -> None:
+    def __init__(self, output: Output, encoded: Callable[[PictureTier], Output]) -> None:
         """`output`: of the camera's own pictures. `encoded`: ours in H.264, of a tier."""
         self.output = output
         self.profile: Profile | None = None  # of the camera's pictures; None while it gives no H.264
         self._encoded = encoded
-        self._tiers: dict[PeerStream, Tier] = {}  # in which each gets ours
+        self._tiers: dict[PeerStream, PictureTier] = {}  # in which each gets ours
         self._held_back: set[PeerStream] = set()
         self._recent: deque[tuple[float, int]] = deque()  # time of capture and bytes
 
@@ -52,7 +52,7 @@ class Passing:
             return 0.0, 0.0
         return (len(self._recent) - 1) / span, 8 * sum(size for _, size in self._recent) / span
 
-    def place(self, target: PeerStream, tier: Tier) -> None:
+    def place(self, target: PeerStream, tier: PictureTier) -> None:
         """Where `target` gets ours."""
         self._tiers[target] = tier
 

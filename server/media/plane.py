@@ -237,6 +237,7 @@ class MediaPlane:
         self._guard(pc, self._turns)
         deliveries: list[Delivery] = []
         peer = PeerMedia(deliveries, self._peer_quality(pc, priority=False), self._detached)
+        peer.quality.relays = True
         for stream, codec, transceiver in sections:
             deliveries.append(self._deliver(peer, transceiver, stream, codec, "trailer", priority=False))
         return self._joined(peer, deliveries)
@@ -246,6 +247,7 @@ class MediaPlane:
         deliveries: list[Delivery] = []
         cameras = sum(isinstance(stream, VideoStream) for stream in self._streams.values())
         peer = PeerMedia(deliveries, self._quality_of(cameras, priority=False), self._detached)
+        peer.quality.relays = True
         for index, stream in enumerate(self._streams.values()):
             video = isinstance(stream, VideoStream)
             codec = stream.codec_in_use(camera_codec if video else "")

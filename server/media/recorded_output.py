@@ -3,15 +3,14 @@
 from collections.abc import Mapping
 from typing import Protocol
 
-from robot_bridge.protocol.console import Tier
 from server.media.frame import EncodedFrame
 from server.media.output import Output
 from server.media.passing import PASSED
-from server.media.quality.plan import PicturePlan
+from server.media.quality.plan import PicturePlan, PictureTier
 
 __all__ = ["FrameTaker", "RecordedOutput", "RecordedStream"]
 
-TIERS: tuple[Tier, ...] = ("operator", "high", "low")
+TIERS: tuple[PictureTier, ...] = ("operator", "high", "crowd", "low")
 HALF_A_PACKET = 0.010  # s of sound
 CLOCK_JUMPED = 1.0  # s; what is that much older than what was taken is no repetition
 
@@ -30,10 +29,10 @@ class RecordedStream(Protocol):
     @property
     def full_plan(self) -> PicturePlan: ...
     @property
-    def outputs(self) -> Mapping[tuple[str, Tier], Output]: ...
+    def outputs(self) -> Mapping[tuple[str, PictureTier], Output]: ...
     @property
     def passed(self) -> Output | None: ...
-    def output(self, codec: str, tier: Tier) -> Output: ...
+    def output(self, codec: str, tier: PictureTier) -> Output: ...
 
 
 class RecordedOutput:
@@ -56,7 +55,7 @@ class RecordedOutput:
     def __init__(
         self,
         codecs: tuple[str, ...],
-        own_tier: Tier,
+        own_tier: PictureTier,
         take: FrameTaker,
         *,
         keyframe_seconds: float,
@@ -107,7 +106,7 @@ class RecordedOutput:
             for tier in TIERS:
                 found = stream.outputs.get((codec, tier))
                 if found is not None and found.targets:
-                    return found
+                    return stream.output(codec, "high") if tier == "crowd" else found  # all pictures, not a crowd's
         return stream.output(self._codecs[0], self._own_tier)
 
     def published(self, stream: str, output: Output, frame: EncodedFrame) -> None:

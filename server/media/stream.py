@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Generic, Literal, TypeVar
 
-from robot_bridge.protocol.console import Tier
 from robot_bridge.protocol.messages import Media
 from robot_bridge.protocol.serial import event_gap
 from robot_bridge.thread_name import name_thread
@@ -18,7 +17,7 @@ from server.media.keyframes import KeyframeScheduler
 from server.media.metrics import MediaMetrics
 from server.media.output import Output
 from server.media.peer_stream import PeerStream
-from server.media.quality.plan import PicturePlan
+from server.media.quality.plan import PicturePlan, PictureTier
 from server.media.recorded_output import RecordedOutput
 from server.media.settings import MediaSettings
 
@@ -66,7 +65,7 @@ class Stream(ABC, Generic[Job]):
         )
         self._peers = metrics.peers.labels(name)
         self._frames_in = metrics.frames_in.labels(name)
-        self._outputs: dict[tuple[str, Tier], Output] = {}
+        self._outputs: dict[tuple[str, PictureTier], Output] = {}
         self._members: dict[PeerStream, None] = {}  # an ordered set
         self._recorded: RecordedOutput | None = None  # None: nothing is recorded
 
@@ -76,7 +75,7 @@ class Stream(ABC, Generic[Job]):
         return PicturePlan(self._settings.video_bitrate_bps, 1.0)
 
     @property
-    def outputs(self) -> Mapping[tuple[str, Tier], Output]:
+    def outputs(self) -> Mapping[tuple[str, PictureTier], Output]:
         """By codec and tier, as far as they exist."""
         return self._outputs
 
@@ -96,7 +95,7 @@ class Stream(ABC, Generic[Job]):
         if self._recorded is not None:
             self._recorded.request_keyframe()
 
-    def output(self, codec: str, tier: Tier) -> Output:
+    def output(self, codec: str, tier: PictureTier) -> Output:
         """Made when it is first asked for; it costs nothing while nobody is in it."""
         found = self._outputs.get((codec, tier))
         if found is None:
@@ -112,16 +111,16 @@ class Stream(ABC, Generic[Job]):
             return wanted
         return next((output.codec for output in self._outputs.values() if output.targets), self.codecs[0])
 
-    def outputs_of(self, tier: Tier) -> list[Output]:
+    def outputs_of(self, tier: PictureTier) -> list[Output]:
         """Of all codecs, as far as they exist."""
         return [output for output in self._outputs.values() if output.tier == tier]
 
-    def join(self, codec: str, target: PeerStream, tier: Tier = "operator") -> None:
+    def join(self, codec: str, target: PeerStream, tier: PictureTier = "operator") -> None:
         self.output(codec, tier).join(target)
         self._members[target] = None
         self._peers.inc()
 
-    def move(self, codec: str, target: PeerStream, tier: Tier) -> None:
+    def move(self, codec: str, target: PeerStream, tier: PictureTier) -> None:
         """Give `target` another tier, from that one's next keyframe on. Nothing for who is not here, or there already.
 
         One that changes its mind on the way stays where it is.

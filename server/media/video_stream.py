@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import av
 
-from robot_bridge.protocol.console import Tier
 from robot_bridge.protocol.description import Camera
 from robot_bridge.protocol.messages import Media
 from server.media.errors import MediaError, PayloadError
@@ -21,7 +20,7 @@ from server.media.passing import PASSED, Passing
 from server.media.peer_stream import PeerStream
 from server.media.picture import PictureDecoder
 from server.media.picture_encoder import VIDEO_CODECS, PictureEncoder, create_picture_encoder
-from server.media.quality.plan import PicturePlan
+from server.media.quality.plan import PicturePlan, PictureTier
 from server.media.settings import MediaSettings
 from server.media.stream import Encoded, Stream
 
@@ -162,11 +161,11 @@ class VideoStream(Stream[PictureJob]):
         passed = self._passing.output
         return [each for each in self._outputs.values() if each is not passed and codec in (None, each.codec)]
 
-    def join(self, codec: str, target: PeerStream, tier: Tier = "operator") -> None:
+    def join(self, codec: str, target: PeerStream, tier: PictureTier = "operator") -> None:
         self._passing.place(target, tier)
         super().join(codec, target, tier)
 
-    def move(self, codec: str, target: PeerStream, tier: Tier) -> None:
+    def move(self, codec: str, target: PeerStream, tier: PictureTier) -> None:
         self._passing.place(target, tier)
         if not self._passing.holds(target):
             super().move(codec, target, tier)

@@ -209,6 +209,7 @@ export interface Quality {
   readonly type: "quality";
   readonly streams: readonly (StreamQuality)[];
   readonly reason: string;
+  readonly crowd: number;
 }
 
 /** Range sensors in a plane, with the field names of sensor_msgs/LaserScan. */
@@ -428,6 +429,7 @@ export interface StreamQuality {
   readonly height: number;
   readonly frames_per_second: number;
   readonly bits_per_second: number;
+  readonly camera_frames_per_second: number;
 }
 
 /** How one stream does at a client, since it connected. */

@@ -9,6 +9,9 @@
 While the operator's pictures are whole and their path shows no limit, the high tier gets the same pictures: one
 encoder serves both. As soon as that ends it has an encoder of its own. So there are at most three encoders for a camera
 and codec, and one where the network is good.
+
+In a crowd (`Crowd`) the observers of the high tier get every second or third picture, from one more encoder, with as
+many bits for each picture as before. Who may drive, relays, recordings and thumbnails get what they got.
 """
 
 import asyncio
@@ -18,10 +21,11 @@ from collections.abc import Callable, Iterable
 from robot_bridge.protocol.console import StreamQuality, Tier
 from server.media.audio_stream import AudioStream
 from server.media.quality.budget import CameraNeed, share_out
+from server.media.quality.crowd import Crowd
 from server.media.quality.ladder import PictureLadder
 from server.media.quality.metrics import QualityMetrics
 from server.media.quality.peer_quality import PeerQuality
-from server.media.quality.plan import PicturePlan
+from server.media.quality.plan import PicturePlan, PictureTier
 from server.media.settings import MediaSettings
 from server.media.video_stream import VideoStream
 
@@ -47,6 +51,7 @@ class QualityDesk:
         self._peers: dict[PeerQuality, None] = {}  # an ordered set
         self._ladders: dict[tuple[Tier, str], PictureLadder] = {}
         self._plans: dict[tuple[Tier, str], PicturePlan] = {}
+        self._crowd = Crowd(settings.crowd_observers)
         self._ticks = 0
         self._whole_since: float | None = None  # the operator's pictures; None: they are not
 
@@ -89,11 +94,12 @@ class QualityDesk:
                 peer.decide(now)
                 peer.tier = "low" if peer.stays_low else peer.choice.decide(peer.path, self._needs(peer), now)
         self._plan_low([peer for peer in observers if peer.tier == "low"], now)
+        self._thin(observers, now)
         shared = self._whole_since is not None and now - self._whole_since >= SHARE_AFTER
         for peer in leaders:
             self._settle(peer, "operator", "operator")
         for i, peer in enumerate(observers):
-            self._settle(peer, peer.tier, "operator" if shared and peer.tier == "high" else peer.tier)
+            self._settle(peer, peer.tier, self._encoded_as(peer, shared))
             if (i + self._ticks) % OBSERVER_TICKS == 0:
                 self._tell(peer)
         for peer in self._peers:
@@ -104,6 +110,22 @@ class QualityDesk:
                 self._tell(peer)
             self._protect_sound(leaders or observers, now)
             self._measure(leaders, observers)
+
+    def _thin(self, observers: list[PeerQuality], now: float) -> None:
+        """Look whether there is a crowd, and what it gets."""
+        members = [peer for peer in observers if peer.in_crowd]
+        if self._crowd.watch(len(members), now) > 1:
+            for stream in _streams(members):
+                for output in stream.outputs_of("crowd"):
+                    output.plan = self._plan_of(stream, "crowd")
+
+    def _encoded_as(self, peer: PeerQuality, shared: bool) -> PictureTier:
+        """Whose pictures an observer gets; `shared`: the operator's serve the high tier."""
+        if peer.tier != "high":
+            return peer.tier
+        if peer.in_crowd and self._crowd.divisor > 1:
+            return "crowd"
+        return "operator" if shared else "high"
 
     def leaders(self) -> list[PeerQuality]:
         """Whom the operator's tier is for."""
@@ -116,7 +138,8 @@ class QualityDesk:
         peer.tier = peer.choice.decide(peer.path, self._needs(peer), now)
 
     def _needs(self, peer: PeerQuality) -> float:
-        return len(peer.cameras) * float(self._settings.video_bitrate_bps)
+        whole = len(peer.cameras) * float(self._settings.video_bitrate_bps)
+        return whole / self._crowd.divisor if peer.in_crowd else whole
 
     def _plan_operator(self, leaders: list[PeerQuality], now: float) -> None:
         if not leaders:
@@ -158,7 +181,7 @@ class QualityDesk:
             for output in stream.outputs_of(tier):
                 output.plan = plan
 
-    def _settle(self, peer: PeerQuality, tier: Tier, encoded_as: Tier) -> None:
+    def _settle(self, peer: PeerQuality, tier: Tier, encoded_as: PictureTier) -> None:
         peer.tier = tier
         if peer.encoded_as == encoded_as:
             return
@@ -168,17 +191,21 @@ class QualityDesk:
             for output in camera.stream.outputs_of(encoded_as):
                 output.plan = self._plan_of(camera.stream, encoded_as)
 
-    def _plan_of(self, stream: VideoStream, tier: Tier) -> PicturePlan:
+    def _plan_of(self, stream: VideoStream, tier: PictureTier) -> PicturePlan:
+        if tier == "crowd":
+            return stream.full_plan.thinned(self._crowd.divisor)
         return stream.full_plan if tier == "high" else self._plans.get((tier, stream.name), stream.full_plan)
 
     def _tell(self, peer: PeerQuality) -> None:
-        streams = []
+        streams, thinned = [], False
         for camera in peer.cameras:
             plan = self._plan_of(camera.stream, peer.encoded_as)
             width, height = plan.size(*camera.stream.size)
             rate, bps = plan.frame_rate, float(plan.bitrate_bps)
             if (passed := camera.stream.measured(camera.target)) is not None:  # as the camera made it
                 (width, height), (rate, bps) = camera.stream.size, passed
+            else:
+                thinned |= peer.encoded_as == "crowd"
             streams.append(
                 StreamQuality(
                     stream=camera.stream.name,
@@ -187,9 +214,10 @@ class QualityDesk:
                     height=height,
                     frames_per_second=round(rate, 2),
                     bits_per_second=bps,
+                    camera_frames_per_second=round(camera.stream.frame_rate, 2),
                 )
             )
-        peer.tell(streams)
+        peer.tell(streams, self._crowd.size if thinned else 0)
 
     @staticmethod
     def _protect_sound(peers: list[PeerQuality], now: float) -> None:
@@ -202,9 +230,10 @@ class QualityDesk:
             stream.measured_loss(loss, now)
 
     def _measure(self, leaders: list[PeerQuality], observers: list[PeerQuality]) -> None:
-        tiers: dict[Tier, list[PeerQuality]] = {
+        tiers: dict[PictureTier, list[PeerQuality]] = {
             "operator": leaders,
-            "high": [peer for peer in observers if peer.tier == "high"],
+            "high": [peer for peer in observers if peer.tier == "high" and peer.encoded_as != "crowd"],
+            "crowd": [peer for peer in observers if peer.encoded_as == "crowd"],
             "low": [peer for peer in observers if peer.tier == "low"],
         }
         for tier, peers in tiers.items():

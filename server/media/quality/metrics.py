@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 
 from prometheus_client import CollectorRegistry, Counter, Gauge
 
-from robot_bridge.protocol.console import Tier
 from server.media.quality.peer_quality import PeerQuality
-from server.media.quality.plan import PicturePlan
+from server.media.quality.plan import PicturePlan, PictureTier
 
 __all__ = ["QualityMetrics"]
 
@@ -39,14 +38,14 @@ class QualityMetrics:
     def lowered(self, reason: str) -> None:
         self._lowered.labels(reason).inc()
 
-    def plan(self, stream: str, tier: Tier, plan: PicturePlan, size: tuple[int, int]) -> None:
+    def plan(self, stream: str, tier: PictureTier, plan: PicturePlan, size: tuple[int, int]) -> None:
         width, height = plan.size(*size)
         self._bitrate.labels(stream, tier).set(plan.bitrate_bps)
         self._rate.labels(stream, tier).set(plan.frame_rate)
         self._width.labels(stream, tier).set(width)
         self._height.labels(stream, tier).set(height)
 
-    def paths(self, tier: Tier, peers: Sequence[PeerQuality]) -> None:
+    def paths(self, tier: PictureTier, peers: Sequence[PeerQuality]) -> None:
         self._members.labels(tier).set(len(peers))
         self._set(self._path, tier, min, [peer.path.rate for peer in peers])
         self._set(self._estimate, tier, min, [peer.estimate_bps for peer in peers])
@@ -63,7 +62,9 @@ class QualityMetrics:
         self._counted.pop(peer, None)
 
     @staticmethod
-    def _set(gauge: Gauge, tier: Tier, worst: Callable[[list[float]], float], values: Sequence[float | None]) -> None:
+    def _set(
+        gauge: Gauge, tier: PictureTier, worst: Callable[[list[float]], float], values: Sequence[float | None]
+    ) -> None:
         known = [value for value in values if value is not None]
         if known:
             gauge.labels(tier).set(worst(known))

@@ -11,6 +11,7 @@ from server.media.packet_stream import SenderStats
 from server.media.peer_stream import PeerStream
 from server.media.quality.observer_tier import ObserverTier
 from server.media.quality.path import PathController, RateLimits, Reason
+from server.media.quality.plan import PictureTier
 
 if TYPE_CHECKING:
     from server.media.aiortc_private import MediaSender
@@ -47,13 +48,14 @@ class PeerQuality:
         self.operator = operator
         self.drives = False  # holds the control seat
         self.stays_low = False  # a thumbnail: never more than the lowest tier
+        self.relays = False  # a relay, with many behind it
         self.cameras: list[CameraLink] = []  # the main one first
         self.sounds: list[AudioStream] = []
         self.pacer = Pacer()
         self.path = PathController(limits, clock())
         self.choice = ObserverTier(clock())
         self.tier = tier  # what its pictures are made for
-        self.encoded_as = tier  # whose pictures it gets: a tier may be served by another's encoder
+        self.encoded_as: PictureTier = tier  # whose pictures it gets: a tier may be served by another's encoder
         self.on_quality: Callable[[Quality], None] | None = None
         self.quality: Quality | None = None  # last one told
         self._clock = clock
@@ -63,6 +65,14 @@ class PeerQuality:
         """Nobody looks closely at this peer's pictures. Call before it joins."""
         self.stays_low = True
         self.tier = self.encoded_as = "low"
+
+    @property
+    def in_crowd(self) -> bool:
+        """Whether it is one of those who get fewer pictures when there are many of them, as long as it does not drive.
+
+        Who may drive at any moment, a relay and a thumbnail are not.
+        """
+        return bool(self.cameras) and not (self.operator or self.relays or self.stays_low)
 
     @property
     def estimate_bps(self) -> int | None:
@@ -111,9 +121,9 @@ class PeerQuality:
         self.pacer.limit(self.path.rate if self.path.limited else None)
         return self.path.reason if self.path.rate < before else None
 
-    def tell(self, streams: list[StreamQuality]) -> None:
-        """Say what was decided, if it is news to the peer."""
-        quality = Quality(streams=streams, reason=self.path.reason)
+    def tell(self, streams: list[StreamQuality], crowd: int) -> None:
+        """Say what was decided, if it is news to the peer; `crowd` as in `Quality`."""
+        quality = Quality(streams=streams, reason=self.path.reason, crowd=crowd)
         if self.on_quality is not None and _differs(self.quality, quality):
             self.quality = quality
             self.on_quality(quality)
@@ -121,7 +131,7 @@ class PeerQuality:
 
 def _differs(old: Quality | None, new: Quality) -> bool:
     """Whether a person would call it another quality."""
-    if old is None or old.reason != new.reason or len(old.streams) != len(new.streams):
+    if old is None or (old.reason, old.crowd) != (new.reason, new.crowd) or len(old.streams) != len(new.streams):
         return True
     return any(
         (a.stream, a.tier, a.width, a.height) != (b.stream, b.tier, b.width, b.height)

@@ -1,8 +1,12 @@
 """How the pictures of one camera are encoded for one tier."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-__all__ = ["PicturePlan", "scaled_size"]
+from robot_bridge.protocol.console import Tier
+
+__all__ = ["PicturePlan", "PictureTier", "scaled_size"]
+
+PictureTier = Tier | Literal["crowd"]  # what is encoded: "crowd" is the high tier with fewer pictures
 
 MIN_SIDE = 16  # pixels
 
@@ -13,6 +17,10 @@ class PicturePlan(NamedTuple):
     bitrate_bps: int
     frame_rate: float  # per second; at most the camera's
     scale: float = 1.0  # of both sides
+
+    def thinned(self, divisor: int) -> "PicturePlan":
+        """One of so many pictures, each with as many bits as before."""
+        return self._replace(bitrate_bps=self.bitrate_bps // divisor, frame_rate=self.frame_rate / divisor)
 
     def size(self, width: int, height: int) -> tuple[int, int]:
         """The size that a picture of `width` x `height` gets."""

@@ -10,16 +10,21 @@ const REASONS: Readonly<Record<string, string>> = {
   "round trip": "packets queue in the network",
 };
 
-/** One stream's pictures in words: "640×480 · 25 pictures/s · 1.2 Mbit/s". */
+/** One stream's pictures in words: "640×480 · 15 of 30 pictures/s · 1.2 Mbit/s"; all of them: "30 pictures/s". */
 export function streamQualityWords(stream: StreamQuality): string {
   const { width, height, frames_per_second: rate, bits_per_second: bits } = stream;
-  return `${width}×${height} · ${figure(rate)} pictures/s · ${bitRate(bits)}`;
+  const of =
+    rate < 0.95 * stream.camera_frames_per_second ? ` of ${figure(stream.camera_frames_per_second)}` : "";
+  return `${width}×${height} · ${figure(rate)}${of} pictures/s · ${bitRate(bits)}`;
 }
 
 /** What limits the quality; null when nothing does. */
 export function limitWords(quality: Quality | null): string | null {
-  if (quality === null || quality.reason === "") return null;
-  return `Limited: ${REASONS[quality.reason] ?? quality.reason}`;
+  if (quality === null) return null;
+  const reasons = quality.reason === "" ? [] : [REASONS[quality.reason] ?? quality.reason];
+  if (quality.crowd > 0)
+    reasons.push(`fewer pictures for each observer while more than ${quality.crowd} watch`);
+  return reasons.length === 0 ? null : `Limited: ${reasons.join("; ")}`;
 }
 
 function bitRate(bits: number): string {

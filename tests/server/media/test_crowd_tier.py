@@ -1,0 +1,205 @@
+"""A crowd's pictures, end to end: real peers on loopback. Three observers are a crowd here."""
+
+import asyncio
+from contextlib import AbstractAsyncContextManager, AsyncExitStack
+from typing import Any, cast
+
+from robot_bridge.protocol.carriers import EVENT_REFERENCE_URI
+from robot_bridge.protocol.console import Quality
+from server.media.frame import EncodedFrame
+from server.media.plane import MediaPlane
+from server.media.quality.crowd import AFTER
+from tests.server.media.camera_h264 import camera_pictures
+from tests.server.media.feeding import read_stamp, value
+from tests.server.media.test_recorded_output import Taken
+from tests.server.media.viewer import TIMEOUT, Viewer, description, noise, picture, running_plane, viewing
+
+PICTURES = 12
+
+
+def desk(plane: MediaPlane) -> Any:
+    return cast(Any, plane)._quality
+
+
+def feed(plane: MediaPlane, number: int) -> None:
+    plane.feed(noise(number, number / 30), number / 30)
+
+
+async def watching(
+    stack: AsyncExitStack, plane: MediaPlane, count: int, *, priority: bool = False, thumbnail: bool = False
+) -> list[Viewer]:
+    def one() -> AbstractAsyncContextManager[Viewer]:
+        uris = {EVENT_REFERENCE_URI: 5}
+        return viewing(plane, ["video"], uris=uris, priority=priority, thumbnail=thumbnail)
+
+    return [await stack.enter_async_context(one()) for _ in range(count)]
+
+
+def stamps(viewer: Viewer) -> list[int]:
+    """Of the whole pictures that came."""
+    found = [read_stamp("native", received) for received in viewer.of("video") if received.packet.marker]
+    return [stamp for stamp in found if stamp is not None]
+
+
+async def came(viewer: Viewer, number: int) -> None:
+    await viewer.until(lambda: stamps(viewer)[-1:] == [number])
+
+
+class Relay:
+    """Keeps what it is given."""
+
+    def __init__(self) -> None:
+        self.stamps: list[int] = []
+        self._news = asyncio.Event()
+
+    def __call__(self, frame: EncodedFrame) -> bool:
+        self.stamps.append(frame.stamp)
+        self._news.set()
+        return True
+
+    async def until(self, stamp: int) -> None:
+        async with asyncio.timeout(TIMEOUT):
+            while stamp not in self.stamps:
+                self._news.clear()
+                await self._news.wait()
+
+
+async def begin(plane: MediaPlane, everybody: list[Viewer], second: int) -> None:
+    """Feed pictures that come so seldom that a crowd gets them all, until everybody is in its tier."""
+    for number in range(30 * second, 30 * second + 90, 30):
+        feed(plane, number)
+        for viewer in everybody:
+            await came(viewer, number)
+
+
+async def show(
+    plane: MediaPlane, whole: list[Viewer], crowd: list[Viewer], second: int, relay: Relay | None = None
+) -> None:
+    """Feed pictures 30 times a second: `whole` and `relay` get all of them, and `crowd` the first of every two."""
+    for number in range(30 * second, 30 * second + PICTURES):
+        feed(plane, number)
+        if relay is not None:
+            await relay.until(number)
+        for viewer in whole if number % 2 else [*whole, *crowd]:
+            await came(viewer, number)
+    for viewer in crowd:
+        assert stamps(viewer)[-PICTURES // 2 :] == list(range(30 * second, 30 * second + PICTURES, 2))
+
+
+def disperse(plane: MediaPlane) -> None:
+    """Who left has been away for long enough."""
+    desk(plane).tick()
+    desk(plane)._crowd._fewer_since -= AFTER
+    desk(plane).tick()
+
+
+async def test_a_crowd_gets_every_second_picture_and_the_operator_and_a_relay_all() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(description(microphones=0), crowd_observers=2))
+        (operator,) = await watching(stack, plane, 1, priority=True)
+        crowd = await watching(stack, plane, 3)
+        relay = Relay()
+        relayed = plane.hand_over(lambda _: relay, "H264")
+        assert [viewer.media.tier for viewer in (operator, *crowd)] == ["operator", "high", "high", "high"]
+        await begin(plane, [operator, *crowd], 1)
+        before = value(plane, "tier_frames_encoded_total", stream="camera0", tier="crowd")
+        await show(plane, [operator], crowd, 10, relay)
+        assert value(plane, "tier_frames_encoded_total", stream="camera0", tier="crowd") == before + PICTURES / 2
+        desk(plane)._whole_since = float("-inf")  # the operator's serve the high tier
+        desk(plane).tick()
+        await begin(plane, [operator, *crowd], 20)
+        await show(plane, [operator], crowd, 30, relay)
+        assert len(cast(Any, plane)._streams["camera0"]._encoders) == 2
+        relayed.detach()
+
+
+async def test_when_a_crowd_has_dispersed_who_stays_gets_everything_and_has_missed_nothing() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+        stays, *leave = await watching(stack, plane, 3)
+        await begin(plane, [stays, *leave], 1)
+        for viewer in leave:
+            await viewer.media.close()
+        desk(plane).tick()
+        await show(plane, [], [stays], 10)
+        disperse(plane)
+        await begin(plane, [stays], 20)
+        await show(plane, [stays], [], 30)
+        numbers = [received.packet.sequence_number for received in stays.of("video")]
+        assert all((after - before) % 2**16 == 1 for before, after in zip(numbers, numbers[1:], strict=False))
+
+
+async def test_a_crowd_is_told_what_it_gets_and_why() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+        crowd = await watching(stack, plane, 3)
+        told: list[Quality] = []
+        crowd[0].media.on_quality(told.append)
+        for _ in range(10):
+            desk(plane).tick()
+        for viewer in crowd[1:]:
+            await viewer.media.close()
+        disperse(plane)
+        for _ in range(10):
+            desk(plane).tick()
+        assert [(each.crowd, each.reason) for each in told] == [(2, ""), (0, "")]
+        rates = [(each.streams[0].frames_per_second, each.streams[0].camera_frames_per_second) for each in told]
+        assert rates == [(15.0, 30.0), (30.0, 30.0)]
+        assert value(plane, "tier_peers", tier="crowd") == 0
+
+
+async def test_operators_thumbnails_and_relays_are_no_crowd() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+        first, second = await watching(stack, plane, 2, priority=True)
+        others = [second, *await watching(stack, plane, 1, thumbnail=True), *await watching(stack, plane, 2)]
+        first.media.drives(True)
+        relay = plane.hand_over(lambda _: lambda frame: True)
+        desk(plane).tick()
+        assert desk(plane)._crowd.divisor == 1
+        assert [viewer.media.quality.encoded_as for viewer in others] == ["high", "low", "high", "high"]
+        relay.detach()
+
+
+async def test_one_of_a_crowd_who_takes_control_gets_everything() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+        crowd = await watching(stack, plane, 4)
+        await begin(plane, crowd, 1)
+        await show(plane, [], crowd, 10)
+        crowd[0].media.drives(True)
+        desk(plane).tick()
+        await begin(plane, crowd, 20)
+        await show(plane, crowd[:1], crowd[1:], 30)
+
+
+async def test_what_is_recorded_is_not_thinned() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(description(microphones=0), crowd_observers=2))
+        taken = Taken()
+        plane.record(taken)
+        *crowd, far = await watching(stack, plane, 4)
+        far.media.quality.path.rate = 100_000
+        for _ in range(10):
+            desk(plane).tick()
+        assert [viewer.media.quality.encoded_as for viewer in (crowd[0], far)] == ["crowd", "low"]
+        await taken.feed(plane, [picture(i, i / 30) for i in range(1, 21)])
+        assert taken.stamps == list(range(1, 21))
+        assert len(cast(Any, plane)._streams["camera0"].output("H264", "high").targets) == 0
+        assert cast(Any, plane)._streams["camera0"].output("H264", "high").recorded
+
+
+async def test_pictures_that_the_camera_encoded_reach_a_crowd_as_they_come() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+        crowd = await watching(stack, plane, 3)
+        told: list[Quality] = []
+        crowd[0].media.on_quality(told.append)
+        for media in camera_pictures(20):
+            plane.feed(media, media.time)
+            for viewer in crowd:
+                await came(viewer, media.stamp)
+        for _ in range(10):
+            desk(plane).tick()
+        assert told[-1].crowd == 0
+        assert told[-1].streams[0].frames_per_second > 25
