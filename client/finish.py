@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Coroutine, Iterable
 from typing import Any
 
-__all__ = ["cancel_all", "finish"]
+__all__ = ["cancel_all", "finish", "within"]
 
 ASK_AGAIN = 1.0  # s
 
@@ -40,3 +40,13 @@ async def cancel_all(tasks: Iterable[asyncio.Task[None]]) -> None:
         for task in left:
             task.cancel()
         _, left = await asyncio.wait(left, timeout=ASK_AGAIN)
+
+
+async def within(seconds: float, coroutine: Coroutine[Any, Any, None]) -> None:
+    """Await it for at most so long. What hangs longer, as a connection that cannot close, is cancelled and left."""
+    task = asyncio.ensure_future(coroutine)
+    done, _ = await asyncio.wait({task}, timeout=seconds)
+    if done:
+        task.result()
+    else:
+        task.cancel()

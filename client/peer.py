@@ -30,6 +30,7 @@ from client.aiortc_private import (
     use_ice_servers,
 )
 from client.errors import ConnectFailed, ConsoleError
+from client.finish import within
 from client.ice_restart_private import IceRestart
 from client.link import ConsoleLink
 from client.relay import RelayTicket
@@ -251,7 +252,7 @@ class Peer:
         except (TimeoutError, ConsoleError):
             pass  # it ends the session by itself when nothing arrives any more
         finally:
-            await self._pc.close()
+            await within(CLOSE_SECONDS, self._pc.close())
             await self._whep.aclose()
 
 

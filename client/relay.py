@@ -14,6 +14,7 @@ from websockets.typing import Subprotocol
 
 from client.aiortc_private import PacketSink, drain_dtls, hasten_sctp, send_control, take_packets, take_raw_rtp
 from client.errors import ConnectFailed
+from client.finish import within
 from client.sdp import Section, read_sections
 from robot_bridge.protocol.console import StreamInfo
 from robot_bridge.protocol.errors import MessageError
@@ -29,6 +30,7 @@ from robot_bridge.protocol.janus import (
 __all__ = ["RelayMedia", "RelayTicket"]
 
 ANSWER_SECONDS = 5.0
+CLOSE_SECONDS = 3.0
 KEEPALIVE_SECONDS = 25.0  # Janus forgets a session after 60 s
 SILENCE_SECONDS = 1.5  # without a word on the feedback channel; the console says something there every 0.4 s
 MAX_MESSAGE = 256 * 1024  # bytes
@@ -144,7 +146,7 @@ class RelayMedia:
     async def close(self) -> None:
         """Idempotent."""
         self.ended.set()
-        await self._pc.close()
+        await within(CLOSE_SECONDS, self._pc.close())
         if self._socket is not None:
             await self._socket.close()
 

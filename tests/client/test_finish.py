@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from client import Console
-from client.finish import cancel_all, finish
+from client.finish import cancel_all, finish, within
 from tests.support.stack import Stack
 
 
@@ -37,6 +37,28 @@ async def test_what_it_raises_is_raised() -> None:
 
     with pytest.raises(ValueError, match="no"):
         await finish(fail())
+
+
+async def test_what_hangs_is_left_after_a_while() -> None:
+    cancelled = asyncio.Event()
+
+    async def hang() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            cancelled.set()
+
+    async with asyncio.timeout(10):
+        await within(0.01, hang())
+        await cancelled.wait()
+
+
+async def test_what_ends_in_time_may_raise() -> None:
+    async def fail() -> None:
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        await within(10, fail())
 
 
 @pytest.mark.asyncio(loop_scope="module")
