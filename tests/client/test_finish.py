@@ -67,8 +67,8 @@ async def test_somebody_who_is_cancelled_while_a_connection_closes_ends(stack: S
 
     async def attend() -> None:
         async with Console(stack.observer, video=1, audio=False) as console:
-            sctp: Any = console._live()._peer._pc.sctp
-            consent = sctp.transport.transport._connection._query_consent_task
+            peer: Any = console._live()._peer
+            consent = peer._pc.sctp.transport.transport._connection._query_consent_task
             # The worst moment: aioice has cancelled its task, and waits for the end of it.
             consent.add_done_callback(lambda _: guest.cancel())
         left.set()
