@@ -131,6 +131,11 @@ export class ConsoleApp {
     return this.state.welcome !== null && this.silentMs(now) < STALE_MS;
   }
 
+  /** Whether the console is connected by a WebSocket. */
+  get isOnLine(): boolean {
+    return this.peer?.isOnLine === true;
+  }
+
   /** Since the console's last message. */
   silentMs(now: number): number {
     return now - this.heardMs;
@@ -305,6 +310,7 @@ export class ConsoleApp {
     if (this.peer !== null) {
       this.peer.id = welcome.peer;
       this.pulse.isSlow = this.peer.isRelayed;
+      this.pulse.isOnLine = this.peer.isOnLine;
       this.room.open(this.peer, welcome.streams, this.heardMs);
     }
     this.voice.attach(this.peer?.voiceSender(welcome.voice) ?? null);

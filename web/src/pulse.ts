@@ -4,6 +4,7 @@ import type { ClientMessage, Report } from "./wire";
 const BEAT_MS = 500; // reports and pings
 const OBSERVER_BEAT_MS = 1000; // of somebody who cannot drive; there may be hundreds
 const SLOW_BEAT_MS = 5000; // of an observer whose media come from a relay: nobody waits for its reports
+const LINE_BEAT_MS = 15_000; // of one with a line, which loses nothing
 const EARLY_PINGS = 5; // to know the path before the first command
 const EARLY_PING_MS = 50; // between them
 
@@ -16,6 +17,7 @@ export interface PulseEvents {
 /** What one connection says on its own: reports and pings, once or twice a second, and a few pings at its beginning. */
 export class Pulse {
   isSlow = false;
+  isOnLine = false;
   observes = false;
   private readonly pings = createPingLedger();
   private early = 0; // pings still to send
@@ -35,7 +37,7 @@ export class Pulse {
 
   step(now: number): void {
     if (now >= this.beatMs) {
-      this.beatMs = now + (this.isSlow ? SLOW_BEAT_MS : this.observes ? OBSERVER_BEAT_MS : BEAT_MS);
+      this.beatMs = now + this.interval();
       this.ping(now, this.events.report());
     } else if (this.early > 0 && now >= this.earlyMs) {
       this.earlyMs = now + EARLY_PING_MS;
@@ -47,6 +49,11 @@ export class Pulse {
   /** The round trip, null when the ping is not known any more. */
   answered(id: number, now: number): number | null {
     return pingAnswered(this.pings, id, now);
+  }
+
+  private interval(): number {
+    if (this.isSlow) return this.isOnLine ? LINE_BEAT_MS : SLOW_BEAT_MS;
+    return this.observes ? OBSERVER_BEAT_MS : BEAT_MS;
   }
 
   /** With a report, in the same message; or alone. */

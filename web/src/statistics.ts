@@ -34,6 +34,7 @@ export interface Statistics {
   readonly peer: string | null;
   readonly role: string | null;
   readonly relay: string | null; // that media come through; null: from the console
+  readonly line: boolean; // messages go by a WebSocket; false: by data channels
   readonly connected: boolean;
   readonly event: number | null;
   readonly epoch: string | null;
@@ -77,6 +78,7 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     peer: state.welcome?.peer ?? null,
     role: state.welcome?.role ?? null,
     relay: app.room.relay,
+    line: app.isOnLine,
     connected: state.welcome !== null,
     event: state.feedback?.event ?? null,
     epoch: state.robot?.epoch ?? null,

@@ -80,6 +80,7 @@ export class Connection {
   /** The network changed. */
   alarm(): void {
     resumeAlarm(this.resume, performance.now());
+    this.peer?.probe();
     this.retryNow();
   }
 

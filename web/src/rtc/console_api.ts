@@ -61,6 +61,25 @@ export class ConsoleApi {
     return parseRelayAnswer(await this.json("GET", `/api/relay?${query}`, undefined, signal));
   }
 
+  /** A ticket for the line of an observer behind that relay; see `lineAddress`. */
+  async watch(relay: string, signal: AbortSignal): Promise<string> {
+    const query = new URLSearchParams({ relay });
+    const answer = await this.json("POST", `/api/watch?${query}`, undefined, signal);
+    const ticket = isRecord(answer) ? answer["ticket"] : undefined;
+    if (typeof ticket !== "string") throw new ConsoleError(200, "malformed", "no ticket", null);
+    return ticket;
+  }
+
+  /** Gives back a ticket that cannot be used. */
+  async declineLine(ticket: string): Promise<void> {
+    await this.fetch("DELETE", `/watch/${encodeURIComponent(ticket)}`, {}, undefined, undefined);
+  }
+
+  /** The WebSocket that a ticket opens. */
+  lineAddress(ticket: string): string {
+    return this.address(`/watch/${encodeURIComponent(ticket)}`).replace(/^http/, "ws");
+  }
+
   /** `query` of the URL: "stamp=trailer", "relay=0". */
   async offer(sdp: string, query: string, signal: AbortSignal): Promise<WhepAnswer> {
     const path = query === "" ? "/whep" : `/whep?${query}`;

@@ -7,6 +7,7 @@ import type { StreamInfo } from "../wire";
 import { RelayWatch } from "./relay_watch";
 import { preferH264 } from "./codec_preference";
 import { askForCaptureTime } from "./header_extensions";
+import { openLine, type WatchLine } from "./watch_line";
 import { receivedSection, type Section } from "./section";
 import type { StampReader } from "./stamp_reader";
 
@@ -47,12 +48,16 @@ const USUAL_MICROPHONES = 1;
 const CONNECT_LIMIT_MS = 10_000;
 const REQUEST_LIMIT_MS = 5000;
 
-/** One WebRTC connection to the console. It ends once; connecting again makes a new one. */
+/**
+ * One connection to the console: WebRTC, or for an observer behind a relay a WebSocket where one passes. It ends once;
+ * connecting again makes a new one.
+ */
 export class Peer {
   readonly sections: OfferedSection[] = [];
   isConnected = false; // once it was
   id = ""; // what the console calls it; "" before it has said so
   private relay: RelayWatch | null = null; // null: media come from the console
+  private line: WatchLine | null = null; // instead of the WebRTC connection, which is closed then
   private readonly connection: RTCPeerConnection;
   private readonly channels: Record<ChannelName, RTCDataChannel>;
   private readonly abort = new AbortController();
@@ -86,17 +91,16 @@ export class Peer {
     if (this.options.thumbnail === true) await this.connectSmall(signal);
     else if (ticket === null) await this.connectForMedia(signal);
     else await this.connectBeside(ticket, signal);
+    if (this.line !== null) return;
     this.connection.onicegatheringstatechange = () => this.sendCandidates();
     this.sendCandidates();
     this.endAfter(CONNECT_LIMIT_MS);
   }
 
-  /** For data channels alone: media come from the relay. */
+  /** Media come from the relay, everything else by a line, or by data channels where no WebSocket passes. */
   private async connectBeside(ticket: RelayTicket, signal: AbortSignal): Promise<void> {
     await this.refresh().catch(() => undefined);
-    await this.connection.setLocalDescription();
-    await this.exchange(`relay=${encodeURIComponent(ticket.relay)}`, signal);
-    this.relay = new RelayWatch(
+    const relay = new RelayWatch(
       this.api,
       this.reader,
       () => this.servers,
@@ -107,7 +111,21 @@ export class Peer {
         direct: () => this.finish(new PeerEnd("relay_lost", "")),
       },
     );
-    void this.relay.watch(ticket);
+    this.relay = relay; // before the welcome, whose reader asks
+    this.line = await openLine(this.api, ticket.relay, signal, {
+      message: (data) => this.events.message("session", data),
+      ended: (why) => this.finish(why === "closed" ? consoleClosed() : new PeerEnd("silent", ""), true),
+    });
+    if (this.line === null) {
+      await this.connection.setLocalDescription();
+      await this.exchange(`relay=${encodeURIComponent(ticket.relay)}`, signal);
+    } else {
+      this.isConnected = true;
+      for (const channel of Object.values(this.channels)) channel.onclose = null;
+      this.connection.close();
+      if (this.isOver) this.line.close();
+    }
+    void relay.watch(ticket);
   }
 
   /** For one picture. Nothing has to be asked first: a robot has a first camera or none. */
@@ -152,15 +170,32 @@ export class Peer {
     return this.relay !== null;
   }
 
+  /** Whether it is a WebSocket, on which nothing is lost. */
+  get isOnLine(): boolean {
+    return this.line !== null;
+  }
+
+  /** Looks whether the other side still hears, as after a change of networks. */
+  probe(): void {
+    this.line?.probe();
+  }
+
   /** Takes the console's STUN and TURN servers, for what is gathered from now on. Raises ConsoleError. */
   async refresh(): Promise<void> {
     const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]);
     this.servers = await this.api.iceServers(signal);
-    if (!this.isOver) this.connection.setConfiguration(this.configuration());
+    if (!this.isOver && this.line === null) this.connection.setConfiguration(this.configuration());
   }
 
-  /** Moves to another path by an ICE restart; everything else lives on. Raises ConsoleError when it is refused. */
+  /**
+   * Moves to another path by an ICE restart; everything else lives on. A line cannot move: it is asked whether it lives.
+   * Raises ConsoleError when it is refused.
+   */
   async restart(): Promise<void> {
+    if (this.line !== null) {
+      this.line.probe();
+      return;
+    }
     const offer = await this.connection.createOffer({ iceRestart: true });
     await this.connection.setLocalDescription(offer);
     const answer = await this.api.restart(this.location, iceFragment(this.localSdp(), false));
@@ -175,6 +210,7 @@ export class Peer {
 
   /** Says whether it could be sent. What cannot go out now is not kept: newer follows. */
   send(channel: ChannelName, text: string): boolean {
+    if (this.line !== null) return this.line.send(text);
     const target = this.channels[channel];
     if (target.readyState !== "open" || target.bufferedAmount > 100_000) return false;
     try {
@@ -219,7 +255,7 @@ export class Peer {
   private openChannel(name: ChannelName, options: RTCDataChannelInit): RTCDataChannel {
     const channel = this.connection.createDataChannel(name, options);
     channel.onmessage = (event: MessageEvent<unknown>) => this.events.message(name, event.data);
-    channel.onclose = () => this.finish(new PeerEnd("lost", "the console closed the connection"), true);
+    channel.onclose = () => this.finish(consoleClosed(), true);
     return channel;
   }
 
@@ -276,10 +312,15 @@ export class Peer {
     clearTimeout(this.timer);
     this.abort.abort();
     this.relay?.close();
+    this.line?.close();
     for (const { stamps } of this.sections) if (stamps !== null) this.reader?.detach(stamps);
     this.connection.close();
     // The console notices a lost peer by itself; asking it to end the session only makes that quicker.
     if (!gone) this.api.end(this.location).catch(() => undefined);
     if (end !== null) this.events.ended(end);
   }
+}
+
+function consoleClosed(): PeerEnd {
+  return new PeerEnd("lost", "the console closed the connection");
 }
