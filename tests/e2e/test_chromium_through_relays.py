@@ -5,9 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from bench.browsers.console_page import open_console
+from bench.browsers.console_page import ConsolePage, open_console
 from bench.emulator.errors import NamespacesUnavailable
 from bench.relay.stage import RelayStage, relay_stage
+
+# As behind a proxy that lets no WebSocket of the console pass; those of relays do.
+NO_LINES = """
+const Real = window.WebSocket;
+window.WebSocket = class extends Real {
+  constructor(url, ...more) { super(String(url).includes("/watch/") ? "ws://127.0.0.1:9/" : url, ...more); }
+};
+"""
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
 
@@ -35,6 +43,7 @@ async def test_pictures_keep_their_events_through_two_relays_and_come_back_when_
         await near.until("s.relay !== null && s.streams.overview?.rendered > 3", 40)
         await far.until("s.relay !== null && s.streams.overview?.rendered > 3", 40)
         before = [await page.stats() for page in (near, far)]
+        assert [each["line"] for each in before] == [True, True]
         relays = [each["relay"] for each in before]
         assert sorted(relays) == ["0", "1"]
         watching = near if relays[0] == "1" else far
@@ -52,3 +61,16 @@ async def test_pictures_keep_their_events_through_two_relays_and_come_back_when_
         assert [name for name, stream in each["streams"].items() if stream["violations"]] == []
         assert each["bad_messages"] == 0
     assert after["peer"] == statistics["peer"]  # the connection to the console lives on
+
+
+async def test_where_no_websocket_passes_the_page_goes_on_by_data_channels(stage: RelayStage) -> None:
+    async with stage.chromium("operator") as browser:
+        context = await browser.new_context()
+        await context.add_init_script(NO_LINES)
+        page = ConsolePage(await context.new_page())
+        await page.page.goto(stage.links["observer"])
+        await page.until("s.connected && s.relay !== null && !s.line && s.streams.overview?.rendered > 3", 40)
+        await page.page.get_by_role("button", name="Stop").first.click()
+        await page.until("s.stop.stopped", 10)
+        assert (await page.stats())["bad_messages"] == 0
+        await context.close()
