@@ -29,13 +29,16 @@ def fleet_soak_command(
     pictures: Annotated[
         bool, typer.Option(help="Whether the robots have cameras, and operators get their pictures.")
     ] = True,
+    picture_rate: Annotated[
+        float | None, typer.Option(min=1, max=30, help="Pictures a second of one camera, instead of all there are.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of the order in which they die.")] = 1,
     json_file: Annotated[
         str | None, typer.Option("--json", help="Write the verdict here; - is standard output.")
     ] = None,
 ) -> None:
     """Drive several robots on one console while their bridges are killed in turn; ends with 1 when another noticed."""
-    plan = FleetPlan(robots, seconds, kill_every, seed, rate, pictures)
+    plan = FleetPlan(robots, seconds, kill_every, seed, rate, picture_rate if pictures else 0.0)
     try:
         verdict = uvloop.run(fleet_soak(plan, lambda text: typer.echo(text, err=True)))
     except (ProcessFailed, TimeoutError) as error:

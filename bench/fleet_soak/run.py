@@ -26,7 +26,7 @@ class FleetPlan(NamedTuple):
     kill_every: float  # s
     seed: int
     rate: float  # events a second of each driver
-    pictures: bool  # whether the robots have cameras, and each driver gets their pictures
+    picture_rate: float | None  # Hz, of one camera, whose pictures the drivers get; 0: none; None: all that there is
 
 
 async def fleet_soak(plan: FleetPlan, say: Callable[[str], None]) -> dict[str, Any]:
@@ -37,7 +37,7 @@ async def fleet_soak(plan: FleetPlan, say: Callable[[str], None]) -> dict[str, A
         TimeoutError: somebody could not drive at the beginning.
     """
     with TemporaryDirectory(prefix="lockstep-fleet-") as folder:
-        async with FleetWorld(Path(folder), plan.robots, pictures=plan.pictures) as world:
+        async with FleetWorld(Path(folder), plan.robots, plan.picture_rate) as world:
             return await _Soak(plan, world, say).run()
 
 
@@ -47,7 +47,8 @@ class _Soak:
         self._world = world
         self._say = say
         self._drivers = {
-            name: FleetDriver(name, world.link(name), plan.rate, pictures=plan.pictures) for name in world.names
+            name: FleetDriver(name, world.link(name), plan.rate, pictures=plan.picture_rate != 0)
+            for name in world.names
         }
         self._kills: list[Span] = []
         self._never_back: list[str] = []

@@ -18,19 +18,19 @@ DOWN_SECONDS = 1.0  # between a bridge's death and its next life
 class _Bridge:
     """Keeps its port over its lives, so that the console finds it again."""
 
-    def __init__(self, name: str, folder: Path, *, pictures: bool) -> None:
+    def __init__(self, name: str, folder: Path, picture_rate: float | None) -> None:
         self.name = name
         self.event_log = folder / f"{name}.jsonl"
         self.port = 0
-        self._pictures = pictures
+        self._picture_rate = picture_rate
         self._life = AsyncExitStack()
         self._process: Running | None = None
 
     async def start(self) -> None:
         port, log = str(self.port), str(self.event_log)
         command = ["robot_bridge", "planar", "--port", port, "--event-log", log, "--json"]
-        if not self._pictures:
-            command = ["bench.fleet_soak.blind_planar", port, log]
+        if self._picture_rate is not None:
+            command = ["bench.fleet_soak.spare_planar", port, log, str(self._picture_rate)]
         life = AsyncExitStack()
         self._process, ready = await life.enter_async_context(running_process(sys.executable, "-m", *command))
         self._life = life
@@ -53,12 +53,12 @@ class FleetWorld:
         console: the console's process
     """
 
-    def __init__(self, folder: Path, robots: int, *, pictures: bool) -> None:
-        """`pictures`: whether the robots have cameras and microphones."""
+    def __init__(self, folder: Path, robots: int, picture_rate: float | None) -> None:
+        """`picture_rate` in Hz, of one camera; 0: none; None: both cameras and the microphone as they are."""
         self.names = [f"robot-{number}" for number in range(1, robots + 1)]
         self.operator = ""
         self._folder = folder
-        self._bridges = {name: _Bridge(name, folder, pictures=pictures) for name in self.names}
+        self._bridges = {name: _Bridge(name, folder, picture_rate) for name in self.names}
         self._stack = AsyncExitStack()
         self._console: Running | None = None
 

@@ -10,7 +10,7 @@ BY_THE_BRIDGES = ("executed_twice", "executed_late", "events_skipped")
 
 @pytest.mark.timeout(120)
 async def test_of_eight_robots_some_are_killed_and_the_others_go_on_undisturbed() -> None:
-    plan = FleetPlan(robots=8, seconds=9.0, kill_every=3.0, seed=1, rate=10.0, pictures=False)
+    plan = FleetPlan(robots=8, seconds=9.0, kill_every=3.0, seed=1, rate=10.0, picture_rate=2.0)
     told: list[str] = []
     verdict = await fleet_soak(plan, told.append)
     # Where the machine itself stands still for long, links break without anybody's fault.
