@@ -1,10 +1,14 @@
 """The headless client's line to the console, and what it does where none can be opened."""
 
 import asyncio
+import datetime
+from pathlib import Path
 from typing import Any
 
 import pytest
+from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import InvalidStatus
 
 from client.connection import Connection, ConnectionOptions
 from client.errors import ConnectFailed, SignallingRefused
@@ -14,7 +18,9 @@ from client.watch_line import LineBlocked, WatchLine
 from client.whep import Whep
 from robot_bridge.protocol.console import Welcome, decode_server_message
 from robot_bridge.protocol.messages import Ping, Pong, Stop
-from tests.server.rig import PATIENCE, eventually, running_rig
+from server.tls import self_signed
+from tests.server.fleet.rig import running_fleet_rig
+from tests.server.rig import PATIENCE, eventually, running_bridge, running_console, running_rig
 from tests.server.watch_lines import NOWHERE
 
 RELAYED: dict[str, Any] = {"relay": NOWHERE, "observers_direct": 0}
@@ -148,6 +154,50 @@ async def test_a_console_that_answers_no_ping_is_lost(monkeypatch: pytest.Monkey
             assert line.why.startswith("the console did not answer")
         finally:
             await line.close()
+
+
+async def test_a_line_goes_by_the_address_of_its_robot_in_a_fleet_and_opens_no_other_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("server.relay.desk.RelayDesk.arrived", lambda *_: True)
+    heard = _Heard()
+    async with running_fleet_rig("left", "right") as rig:
+        token = rig.state.access.issue("observer", "ann")
+        whep = Whep(parse_link(f"{rig.url}/robots/right/#token={token}"))
+        line = _line(parse_link(f"{rig.url}/robots/left/#token={token}"), heard)
+        try:
+            await line.negotiate()
+            await line.connect(PATIENCE)
+            await eventually(lambda: heard.has(Welcome))
+            ticket = await whep.watch("0")
+            with pytest.raises(InvalidStatus):
+                async with connect(f"{rig.url.replace('http', 'ws', 1)}/robots/left/watch/{ticket}", proxy=None):
+                    pass
+        finally:
+            await line.close()
+            await whep.aclose()
+
+
+async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate_is_trusted(tmp_path: Path) -> None:
+    certificate = self_signed(tmp_path, {"127.0.0.1"}, datetime.datetime.now(datetime.UTC))
+    heard = _Heard()
+    async with (
+        running_bridge() as bridge,
+        running_console(bridge.address[1], certificate=certificate, **RELAYED) as rig,
+    ):
+        await eventually(lambda: rig.services.console.robot.description is not None)
+        link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
+        line = WatchLine(link, "0", certificate.chain, heard.take)
+        doubting = WatchLine(link, "0", None, heard.take)
+        try:
+            await line.negotiate()
+            await line.connect(PATIENCE)
+            await eventually(lambda: heard.has(Welcome))
+            with pytest.raises(ConnectFailed):
+                await doubting.negotiate()
+        finally:
+            await line.close()
+            await doubting.close()
 
 
 class _Relay:

@@ -106,7 +106,8 @@ def test_the_description_names_every_route_and_no_other() -> None:
         (method.lower(), str(getattr(route, "path", "")))
         for route in _routes(create_app(Settings()))
         for method in getattr(route, "methods", None) or ()
-        if method != "HEAD" and getattr(route, "path", "").startswith(("/api", "/whep", "/healthz", "/metrics"))
+        if method != "HEAD"
+        and getattr(route, "path", "").startswith(("/api", "/whep", "/watch", "/healthz", "/metrics"))
     }
     assert routes == {(each.method, each.path) for each in OPERATIONS}
 
