@@ -38,6 +38,7 @@ from server.cli_options import (
     TurnSecret,
 )
 from server.cli_recordings import add_recording_commands
+from server.file_limit import raise_file_limit
 from server.fleet.robot_names import BadFleet, is_named
 from server.fleet.robots import robot_settings
 from server.fleet.simulated import own_event_log, simulated_robots
@@ -299,6 +300,7 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
     sys.setswitchinterval(SWITCH_INTERVAL)
     share_arenas()
+    raise_file_limit()
     try:
         _check_files(settings)
         check_board(settings, settings.public_url)
