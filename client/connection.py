@@ -145,7 +145,7 @@ class Connection:
         self.options = options = replace(self.options, video=0, audio=False, carrier="trailer")
         self.media = Reception("trailer", options.tolerance, options.gate, self._rendered)
         await self._peer.close()
-        self._peer = WatchLine(options.link, ticket.relay, options.tls_ca, self._received)
+        self._peer = WatchLine(options.link, ticket.relay, options.tls_ca, self._received, options.silence_seconds)
         first = [each for kind in wanted for each in [s for s in ticket.streams if s.kind == kind][: wanted[kind]]]
         self.media.prepare(relay, await relay.negotiate(lambda stream: stream in first), options.decode)
 

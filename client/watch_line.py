@@ -22,7 +22,7 @@ from robot_bridge.protocol.messages import Ping
 __all__ = ["LineBlocked", "WatchLine"]
 
 OPEN_SECONDS = 5.0
-ANSWER_SECONDS = 5.0  # for the console to say anything after a ping
+UNREAD_SECONDS = 0.5  # more for an answer: a client that was held up has it waiting and has not read it
 CLOSE_SECONDS = 3.0
 MAX_MESSAGE = 1024 * 1024  # bytes; the list of a thousand participants is the largest
 MAX_WAITING = 64  # messages that could not leave yet; then the oldest go
@@ -36,8 +36,14 @@ class WatchLine:
     """Used as `Peer` is. Order: `negotiate`, `connect`, then `send` until `ended` is set, then `close`."""
 
     def __init__(
-        self, link: ConsoleLink, relay: str, tls_ca: Path | None, on_message: Callable[[str | bytes], None]
+        self,
+        link: ConsoleLink,
+        relay: str,
+        tls_ca: Path | None,
+        on_message: Callable[[str | bytes], None],
+        silence_seconds: float,
     ) -> None:
+        """`silence_seconds`: in which the console says something after a ping."""
         self.ended = asyncio.Event()
         self.why = ""  # it ended
         self.skipped = 0  # messages that did not fit
@@ -45,6 +51,7 @@ class WatchLine:
         self._relay = relay
         self._tls_ca = tls_ca
         self._on_message = on_message
+        self._silence_seconds = silence_seconds
         self._whep = Whep(link, tls_ca)
         self._socket: ClientConnection | None = None
         self._tasks: list[asyncio.Task[None]] = []
@@ -104,7 +111,7 @@ class WatchLine:
         self._waiting.append(encode_console_message(message))
         self._filled.set()
         if self._answer_due is None and isinstance(message, Ping | Report):
-            self._answer_due = asyncio.get_running_loop().call_later(ANSWER_SECONDS, self._no_answer)
+            self._answer_due = asyncio.get_running_loop().call_later(self._silence_seconds, self._overdue)
 
     def lose(self, why: str) -> None:
         """Count the connection as lost; the first reason stands."""
@@ -166,9 +173,12 @@ class WatchLine:
             self._answer_due.cancel()
             self._answer_due = None
 
+    def _overdue(self) -> None:
+        self._answer_due = asyncio.get_running_loop().call_later(UNREAD_SECONDS, self._no_answer)
+
     def _no_answer(self) -> None:
         self._answer_due = None
-        self.lose(f"the console did not answer for {ANSWER_SECONDS:g} s")
+        self.lose(f"the console did not answer for {self._silence_seconds:g} s")
 
     def _trust(self) -> ssl.SSLContext | None:
         return ssl.create_default_context(cafile=self._tls_ca) if self._link.secure else None

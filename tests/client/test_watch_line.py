@@ -38,7 +38,7 @@ class _Heard:
 
 
 def _line(link: ConsoleLink, heard: _Heard) -> WatchLine:
-    return WatchLine(link, "0", None, heard.take)
+    return WatchLine(link, "0", None, heard.take, PATIENCE)
 
 
 async def test_a_line_is_welcomed_asks_stops_and_says_how_it_ended() -> None:
@@ -119,7 +119,7 @@ async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
         connection = Connection(_options(link))
         connection._relay = _Relay()  # type: ignore[assignment]
         await connection._peer.close()
-        connection._peer = WatchLine(link, "0", None, connection._received)
+        connection._peer = WatchLine(link, "0", None, connection._received, PATIENCE)
         try:
             await connection._negotiate(asyncio.get_running_loop().time() + PATIENCE)
             assert isinstance(connection._peer, Peer)
@@ -132,7 +132,6 @@ async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
 
 
 async def test_a_console_that_answers_no_ping_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("client.watch_line.ANSWER_SECONDS", 0.05)
 
     async def ticket(*_: object) -> str:
         return "t"
@@ -144,7 +143,7 @@ async def test_a_console_that_answers_no_ping_is_lost(monkeypatch: pytest.Monkey
     monkeypatch.setattr(Whep, "watch", ticket)
     async with serve(listen, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
-        line = _line(parse_link(f"http://127.0.0.1:{port}/#token=x"), _Heard())
+        line = WatchLine(parse_link(f"http://127.0.0.1:{port}/#token=x"), "0", None, _Heard().take, 0.05)
         try:
             await line.negotiate()
             await line.connect(PATIENCE)
@@ -187,8 +186,8 @@ async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate
     ):
         await eventually(lambda: rig.services.console.robot.description is not None)
         link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
-        line = WatchLine(link, "0", certificate.chain, heard.take)
-        doubting = WatchLine(link, "0", None, heard.take)
+        line = WatchLine(link, "0", certificate.chain, heard.take, PATIENCE)
+        doubting = WatchLine(link, "0", None, heard.take, PATIENCE)
         try:
             await line.negotiate()
             await line.connect(PATIENCE)
