@@ -1,8 +1,9 @@
 """Many observers behind relays: `python -m bench.relay.audience LINK COUNT`.
 
-Each is a whole observer: a data-only connection to the console, and the main camera with the feedback from a relay. RTP
+Each is a whole observer: a line to the console, and the main camera with the feedback from a relay. RTP
 is counted as it comes out of the socket, neither decrypted nor decoded, so that so many fit on the machine they load.
-Once all are connected it says so in a JSON line, and every second afterwards how many packets each has got by then.
+Once all are connected it says so in a JSON line, and every second afterwards how many packets each has got by then and
+how many have lost their console.
 """
 
 import asyncio
@@ -88,7 +89,8 @@ async def watch(link: str, count: int) -> None:
         while True:
             await asyncio.sleep(1.0)
             counts = [counter.packets for counter in counters]
-            print(json.dumps({"at": time.monotonic(), "packets": counts}), flush=True)
+            lost = sum(console._live().lost is not None for console in consoles)
+            print(json.dumps({"at": time.monotonic(), "packets": counts, "lost": lost}), flush=True)
 
 
 def main() -> None:

@@ -60,6 +60,7 @@ class Crowd:
     packets: float  # a second, that all observers together got
     least: float  # a second, that the observer with the fewest got
     connect_seconds: float
+    lost: int  # observers that were connected and no longer are
 
     @property
     def summary(self) -> str:
@@ -67,7 +68,8 @@ class Crowd:
         trip = f"{median(self.trips_ms):.1f} ms" if self.trips_ms else "none"
         return (
             f"{self.observers} observers: console {self.console:.1f} %, Janus {janus} %, {self.packets:.0f} packets/s, "
-            f"at least {self.least:.0f} each, connected in {self.connect_seconds:.0f} s; command → feedback {trip}"
+            f"at least {self.least:.0f} each, connected in {self.connect_seconds:.0f} s, {self.lost} lost; "
+            f"command → feedback {trip}"
         )
 
 
@@ -105,16 +107,17 @@ async def _look(stage: RelayStage, driver: Process, audience: Process | None, co
     shares = [(each.cpu_seconds() - before) / spent * 100 for each, before in zip(processes, used, strict=True)]
     trips = [trip for said in driver.said()[driven:] for trip in said["trips_ms"]]
     packets = least = connected = 0.0
+    lost = 0
     if audience is not None:
         said = audience.said()
         connected = said[0]["connected"]
         first, last = said[max(1, heard)], said[-1]
         between = max(1e-3, last["at"] - first["at"])
         rates = [(now - before) / between for before, now in zip(first["packets"], last["packets"], strict=True)]
-        packets, least = sum(rates), min(rates)
+        packets, least, lost = sum(rates), min(rates), last["lost"]
     janus = len(stage.janus)
     return Crowd(
-        count, shares[0], tuple(shares[1 : 1 + janus]), sum(shares[1 + janus :]), trips, packets, least, connected
+        count, shares[0], tuple(shares[1 : 1 + janus]), sum(shares[1 + janus :]), trips, packets, least, connected, lost
     )
 
 
