@@ -88,7 +88,8 @@ class WatchLine:
                 compression=None,
                 proxy=None if self._link.loopback else True,
             )
-        except (OSError, TimeoutError, WebSocketException) as error:
+        except (OSError, TimeoutError, ImportError, WebSocketException) as error:
+            # ImportError: a proxy of a kind that takes a package which is not there.
             await self._give_back(ticket)
             raise LineBlocked(f"no WebSocket to the console ({error or type(error).__name__})") from error
         return []

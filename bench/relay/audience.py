@@ -3,13 +3,14 @@
 Each is a whole observer: a line to the console, and the main camera with the feedback from a relay. RTP
 is counted as it comes out of the socket, neither decrypted nor decoded, so that so many fit on the machine they load.
 Once all are connected it says so in a JSON line, and every second afterwards how many packets each has got by then and
-how many have lost their console.
+why how many have lost their connection.
 """
 
 import asyncio
 import json
 import sys
 import time
+from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
@@ -89,7 +90,7 @@ async def watch(link: str, count: int) -> None:
         while True:
             await asyncio.sleep(1.0)
             counts = [counter.packets for counter in counters]
-            lost = sum(console._live().lost is not None for console in consoles)
+            lost = Counter(str(lost) for console in consoles if (lost := console._live().lost) is not None)
             print(json.dumps({"at": time.monotonic(), "packets": counts, "lost": lost}), flush=True)
 
 

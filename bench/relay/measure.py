@@ -60,15 +60,16 @@ class Crowd:
     packets: float  # a second, that all observers together got
     least: float  # a second, that the observer with the fewest got
     connect_seconds: float
-    lost: int  # observers that were connected and no longer are
+    lost: dict[str, int]  # why how many observers are no longer connected
 
     @property
     def summary(self) -> str:
         janus = " + ".join(f"{share:.1f}" for share in self.janus)
+        lost = ", ".join(f"{count} lost: {why}" for why, count in self.lost.items()) or "none lost"
         trip = f"{median(self.trips_ms):.1f} ms" if self.trips_ms else "none"
         return (
             f"{self.observers} observers: console {self.console:.1f} %, Janus {janus} %, {self.packets:.0f} packets/s, "
-            f"at least {self.least:.0f} each, connected in {self.connect_seconds:.0f} s, {self.lost} lost; "
+            f"at least {self.least:.0f} each, connected in {self.connect_seconds:.0f} s, {lost}; "
             f"command → feedback {trip}"
         )
 
@@ -107,7 +108,7 @@ async def _look(stage: RelayStage, driver: Process, audience: Process | None, co
     shares = [(each.cpu_seconds() - before) / spent * 100 for each, before in zip(processes, used, strict=True)]
     trips = [trip for said in driver.said()[driven:] for trip in said["trips_ms"]]
     packets = least = connected = 0.0
-    lost = 0
+    lost: dict[str, int] = {}
     if audience is not None:
         said = audience.said()
         connected = said[0]["connected"]
