@@ -75,6 +75,11 @@ class PeerMedia:
         """Take the client's own report. `now` is on the monotonic clock."""
         self.quality.report(report, now)
 
+    @property
+    def comes_first(self) -> bool:
+        """Whether it drives, or may, or has many behind it."""
+        return self.quality.drives or self.quality.operator or self.quality.relays
+
     def drives(self, holds_seat: bool) -> None:
         """Whether this peer holds the control seat: the operator's tier is made for who does."""
         self.quality.drives = holds_seat

@@ -1,7 +1,6 @@
 """The media plane: the streams of one robot, encoded once and sent to every peer."""
 
 import asyncio
-import random
 import re
 import time
 from collections.abc import Callable, Container, Iterator, Sequence
@@ -40,6 +39,7 @@ from server.media.quality.peer_quality import CameraLink, PeerQuality
 from server.media.receive_guard_private import guard_transports
 from server.media.receive_turns import ReceiveTurns
 from server.media.recorded_output import FrameTaker, RecordedOutput
+from server.media.sender_reports import SenderReports
 from server.media.settings import MediaSettings
 from server.media.sources.source_url import SourceSpec
 from server.media.video_stream import VideoStream
@@ -48,7 +48,6 @@ from server.media.voice_private import VoicePacket, take_voice
 __all__ = ["MediaPlane", "MediaSettings", "PeerMedia"]
 
 MAX_LINK_TIME = 1e9  # s; no monotonic clock gets there, and NaN is not below it
-REPORT_SECONDS = 1.0  # between sender reports of a peer, on average
 
 AnyStream = VideoStream | AudioStream
 
@@ -101,7 +100,8 @@ class MediaPlane:
         loop = asyncio.get_running_loop()
         self._stream_tasks = [loop.create_task(stream.run()) for stream in self._streams.values()]
         if not self._service_tasks:
-            services = (fan_out.run(), fan_out.run_paced(), self._report(), self._quality.run())
+            reports = SenderReports(lambda: list(self._peers))
+            services = (fan_out.run(), fan_out.run_paced(), reports.run(), self._quality.run())
             self._service_tasks = [loop.create_task(service) for service in services]
 
     def feed(self, media: Media, now: float) -> None:
@@ -351,14 +351,6 @@ class MediaPlane:
             on_dropped=lambda: stream.request_keyframe(codec, target, "drop"),
         )
         return target
-
-    async def _report(self) -> None:
-        """Sender reports of all peers, spread over the interval and varied (RFC 3550 6.2)."""
-        while True:
-            await asyncio.sleep(REPORT_SECONDS * random.uniform(0.5, 1.5))
-            for peer in list(self._peers):
-                peer.send_reports()
-                await asyncio.sleep(0)
 
     def _end_streams(self) -> None:
         for peer in list(self._peers):
