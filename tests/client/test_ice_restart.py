@@ -11,6 +11,7 @@ from client import Console
 from client.aiortc_private import transport_of
 from client.errors import ConnectFailed, SignallingRefused
 from client.ice_restart_private import MONITOR, IceRestart
+from client.peer import Peer
 from tests.server.rig import PATIENCE, Rig, running_rig
 
 CANDIDATE = re.compile(r"^a=candidate:(\S+ \d+ \S+ \d+) (\S+) (\d+) typ host", re.MULTILINE)
@@ -151,7 +152,9 @@ async def test_a_session_that_has_ended_is_not_restarted() -> None:
 async def test_the_private_parts_of_aiortc_are_where_they_were() -> None:
     """When this fails after an upgrade, client/ice_restart_private.py is where to look."""
     async with running_rig() as rig, Console(_link(rig), video=False, audio=False) as console:
-        pc = console._live()._peer._pc
+        peer = console._live()._peer
+        assert isinstance(peer, Peer)
+        pc = peer._pc
         transport = transport_of(pc).transport
         connection = transport._connection
         assert getattr(transport, MONITOR) is not None

@@ -9,6 +9,7 @@ from aiortc import RTCIceServer
 from client import Console
 from client.aiortc_private import transport_of
 from client.errors import ConnectFailed
+from client.peer import Peer
 from server.ice_servers import turn_credential
 from tests.server.rig import running_rig
 from tests.support.turn_server import TURN_SECRET, running_turn_server
@@ -27,7 +28,9 @@ async def test_with_only_a_relay_the_robot_is_driven_seen_and_moved_to_another_r
         async for picture in console.pictures():
             assert picture.stamp is None or picture.stamp >= first.event - 4
             break
-        pc = console._live()._peer._pc
+        peer = console._live()._peer
+        assert isinstance(peer, Peer)
+        pc = peer._pc
         pair = transport_of(pc).transport._connection._nominated[1]
         assert pair.local_candidate.type == "relay"
         await console.restart_ice()

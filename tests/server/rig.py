@@ -26,6 +26,7 @@ from server.services import Services
 from server.settings import Settings
 from server.state import open_state
 from server.tls import Certificate
+from server.webrtc_peer import WebRtcPeer
 
 __all__ = ["PATIENCE", "Rig", "TestPeer", "eventually", "running_bridge", "running_console", "running_rig"]
 
@@ -50,6 +51,10 @@ class Rig:
         found = self.app.state.services
         assert isinstance(found, Services)
         return found
+
+    @property
+    def webrtc_peers(self) -> list[WebRtcPeer]:
+        return [peer for peer in self.services.console.peers if isinstance(peer, WebRtcPeer)]
 
     def token(self, role: Role) -> dict[str, str]:
         return {"Authorization": f"Bearer {self.access.issue(role, role)}"}

@@ -70,7 +70,7 @@ async def test_a_peer_without_data_channels_is_left_alone() -> None:
 
 async def test_the_console_tunes_its_connections() -> None:
     async with running_rig() as rig, rig.peer("observer"):
-        (peer,) = rig.services.console.peers
+        (peer,) = rig.webrtc_peers
         sctp: Any = peer.pc.sctp
         assert sctp._rto < SOON
 
@@ -78,7 +78,7 @@ async def test_the_console_tunes_its_connections() -> None:
 async def test_who_drives_has_a_window_that_no_loss_makes_smaller_and_who_observes_has_not() -> None:
     async with running_rig() as rig, rig.peer("operator"), rig.peer("observer"):
         windows = dict[str, list[int]]()
-        for peer in rig.services.console.peers:
+        for peer in rig.webrtc_peers:
             sctp: Any = peer.pc.sctp
             windows[peer.role] = [sctp._cwnd]
             sctp._t3_cancel()

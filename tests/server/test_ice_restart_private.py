@@ -17,7 +17,7 @@ def _gatherer() -> RTCIceGatherer:
 
 async def test_a_connected_transport_has_the_parts_that_a_restart_replaces() -> None:
     async with running_rig() as rig, rig.peer("observer"):
-        pc = next(iter(rig.services.console.peers)).pc
+        pc = rig.webrtc_peers[0].pc
         assert pc.sctp is not None
         transport = pc.sctp.transport.transport
         connection = transport._connection
@@ -42,7 +42,7 @@ async def test_a_connection_without_sections_has_nothing_to_restart() -> None:
 async def test_a_restart_that_is_given_up_ends_with_its_session() -> None:
     async with running_rig() as rig:
         async with rig.peer("observer"):
-            session = next(iter(rig.services.console.peers)).ice
+            session = rig.webrtc_peers[0].ice
             before = session.tag
             local = await session.restart("other", "x" * 22, [])
             assert local.candidates
@@ -54,7 +54,7 @@ async def test_a_restart_that_is_given_up_ends_with_its_session() -> None:
 
 async def test_a_gatherer_that_fails_leaves_the_session_as_it_was() -> None:
     async with running_rig() as rig, rig.peer("observer") as peer:
-        session = next(iter(rig.services.console.peers)).ice
+        session = rig.webrtc_peers[0].ice
         before = session.tag
 
         class Broken(RTCIceGatherer):
@@ -71,7 +71,7 @@ async def test_a_gatherer_that_fails_leaves_the_session_as_it_was() -> None:
 async def test_restarts_that_overlap_leave_no_socket_behind() -> None:
     async with running_rig() as rig:
         async with rig.peer("observer") as peer:
-            session = next(iter(rig.services.console.peers)).ice
+            session = rig.webrtc_peers[0].ice
             answers = await asyncio.gather(*(session.restart(f"user{each}", "x" * 22, []) for each in range(4)))
             assert len({each.username for each in answers}) == 4
             assert session.username == "user3"

@@ -26,7 +26,7 @@ def _sctp(peer: TestPeer) -> Any:
 
 async def test_the_private_parts_are_where_they_were() -> None:
     async with running_rig() as rig, rig.peer("observer"):
-        sctp: Any = next(iter(rig.services.console.peers)).pc.sctp
+        sctp: Any = rig.webrtc_peers[0].pc.sctp
         assert sctp._receive_data_chunk.__name__ == "take_bounded", MOVED
         assert sctp._receive_forward_tsn_chunk.__name__ == "forward_bounded", MOVED
         assert 0 < sctp._advertised_rwnd <= RECEIVE_WINDOW, MOVED
@@ -182,7 +182,7 @@ async def test_data_that_looks_like_stun_passes_for_data() -> None:
     attribute = bytes([0x00, 0x24, 0x00, 0x02]) + bytes(4)
     lookalike = bytes([0x90, 0x60, 0x00, len(attribute)]) + bytes(16) + attribute
     async with running_rig() as rig, rig.peer("observer"):
-        sctp: Any = next(iter(rig.services.console.peers)).pc.sctp
+        sctp: Any = rig.webrtc_peers[0].pc.sctp
         connection = sctp.transport.transport._connection
         came: list[Any] = []
         connection._queue.put_nowait = lambda item: came.append(item)
