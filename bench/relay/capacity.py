@@ -23,7 +23,7 @@ class Figures:
     bits_per_second: float  # to one observer: cameras, sound, feedback, headers
     packets_per_second: float  # the same
     direct_share: float  # of a core of the console, for one observer that it serves itself
-    member_share: float  # of a core of the console, for the data-only connection of one behind a relay
+    member_share: float  # of a core of the console, for the line of one behind a relay
     relay_microseconds: float  # of a core of a Janus, for one packet to one observer
     hop_milliseconds: float  # that one Janus adds
     network_bits: float  # of each machine
@@ -36,7 +36,7 @@ MEASURED = Figures(
     bits_per_second=1_750_000,
     packets_per_second=260,
     direct_share=0.42,
-    member_share=0.05,  # assumed, well above what 59 were seen to cost together: 0.2 %
+    member_share=0.01,  # 299 were seen to cost 2.3 % together
     relay_microseconds=20.0,  # python -m bench.relay.packets: 19.8
     hop_milliseconds=1.0,  # assumed: below what could be measured
     network_bits=1e9,
