@@ -30,6 +30,7 @@ class Figures:
     usable: float = 0.7  # of network and processor; the rest is for bursts
     console_share: float = 50.0  # of the console's one core that observers may take; the operator comes first
     relay_cores: int = 1  # of a Janus' machine
+    most_members: int = 1000  # LOCKSTEP_MAX_RELAYED; and no more than 300 were tried
 
 
 MEASURED = Figures(
@@ -61,7 +62,7 @@ def plan(observers: int, figures: Figures) -> Plan:
     """How many relays, and what bounds them."""
     budget = figures.network_bits * figures.usable
     direct = min(int(figures.console_share / figures.direct_share), int(budget / figures.bits_per_second))
-    members = int(figures.console_share / figures.member_share)
+    members = min(figures.most_members, int(figures.console_share / figures.member_share))
     by_network = int(budget / figures.bits_per_second)
     packets = figures.relay_cores * figures.usable * 1e6 / figures.relay_microseconds
     by_processor = int(packets / figures.packets_per_second)
