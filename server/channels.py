@@ -1,4 +1,4 @@
-"""Parses what clients send on data channels and on lines. All failures are named ChannelErrors; nothing else comes out."""
+"""Parses what clients send on data channels and lines. Failures are named ChannelErrors; nothing else comes out."""
 
 from typing import Literal
 
