@@ -1,6 +1,7 @@
 """Brings the session into the relays while somebody watches there, and tells observers where to watch."""
 
 import asyncio
+import math
 import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -29,7 +30,7 @@ log = structlog.get_logger(__name__)
 WAIT_SECONDS = 3.0  # that an observer waits for a relay before it is served directly
 LINGER_SECONDS = 20.0  # that the session stays in the relays without an observer there
 HEARTBEAT_SECONDS = 0.4  # between two messages on the feedback channel, also while the robot link is down
-BACKOFF, BACKOFF_CAP = 0.1, 5.0  # s
+BACKOFF, BACKOFF_CAP = 0.1, 2.0  # s
 DISTRUST_SECONDS = 30.0  # that a relay which failed is tried after the others
 HEALTHY_SECONDS = 10.0
 NEW_EPOCH, REVOKED, UNWATCHED = "new epoch", "a link was revoked", "nobody watches"
@@ -158,9 +159,10 @@ class RelayDesk:
                 backoff.healthy()
             await asyncio.sleep(backoff.next())
 
-    def _order(self, station: Station) -> tuple[bool, int]:
-        """Those that failed lately come last."""
-        return self._clock() - station.failed_at < DISTRUST_SECONDS, int(station.name)
+    def _order(self, station: Station) -> tuple[float, int]:
+        """Those that failed lately come last, and of those the one that failed just now: it may be dead."""
+        distrusted = self._clock() - station.failed_at < DISTRUST_SECONDS
+        return station.failed_at if distrusted else -math.inf, int(station.name)
 
     def _in_demand(self) -> bool:
         now = self._clock()

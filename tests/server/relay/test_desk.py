@@ -1,0 +1,77 @@
+"""Which relay the session goes to first, without any: the engine only notes where it is asked to publish."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+
+from server.relay.desk import RelayDesk
+from server.relay.errors import RelayError
+from server.relay.publication import Publication, Watched
+from server.relay.relay_settings import RelaySettings
+from server.relay.station import Station
+from server.relay.tickets import JanusTicket, LiveKitTicket
+
+
+class Relays:
+    """An engine whose relays are there or not."""
+
+    def __init__(self) -> None:
+        self.down: set[str] = set()
+        self.tried: list[str] = []
+        self.carrying: dict[str, Publication] = {}
+        self.changed = asyncio.Event()
+
+    @asynccontextmanager
+    async def publish(self, station: Station, feed: int) -> AsyncIterator[Publication]:
+        self.tried.append(station.name)
+        if station.name in self.down:
+            raise RelayError("not there")
+        publication = self.carrying[station.name] = Publication(feed, [], lambda _: None)
+        self.changed.set()
+        try:
+            yield publication
+        finally:
+            del self.carrying[station.name]
+
+    def pass_on(
+        self, origin: Station, station: Station, publication: Publication
+    ) -> AbstractAsyncContextManager[Watched] | None:
+        return None
+
+    def ticket(self, station: Station) -> JanusTicket | LiveKitTicket:
+        raise NotImplementedError
+
+    async def until_carried_by(self, name: str) -> None:
+        async with asyncio.timeout(20):
+            while name not in self.carrying:
+                self.changed.clear()
+                await self.changed.wait()
+
+    def kill(self, name: str) -> None:
+        self.down.add(name)
+        self.carrying[name].end("killed")
+
+
+class Watching:
+    relay, role, ended = "0", "observer", ""
+
+
+async def test_of_two_relays_that_failed_lately_the_one_that_failed_just_now_is_not_tried_first() -> None:
+    relays, now = Relays(), [100.0]
+    settings = RelaySettings(relay=("janus:ws://a.example/1", "janus:ws://b.example/1"), observers_direct=0)
+    desk = RelayDesk(settings, {"janus": relays}, lambda: [Watching()], lambda: now[0])
+    asked = asyncio.create_task(desk.ticket(None, ""))
+    running = asyncio.create_task(desk.run())
+    try:
+        for killed, next_one in (("0", "1"), ("1", "0"), ("0", "1")):
+            await relays.until_carried_by(killed)
+            relays.down.clear()
+            now[0] += 12.0  # less than distrust lasts
+            relays.tried.clear()
+            relays.kill(killed)
+            await relays.until_carried_by(next_one)
+            assert relays.tried == [next_one]
+    finally:
+        for task in (asked, running):
+            task.cancel()
+        await asyncio.gather(asked, running, return_exceptions=True)
