@@ -1,12 +1,47 @@
 """How much a process grows, from samples of its memory. No I/O."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from statistics import median
+from typing import NamedTuple
 
-__all__ = ["WARM_UP", "growth"]
+__all__ = ["WARM_UP", "Sample", "growth", "growth_alike"]
 
 WARM_UP = 0.25  # share of a life after which its memory is compared
 WINDOW = 0.25  # share of the rest that is taken at its beginning and at its end
+ALIKE = 3  # samples at either end that are enough to compare
+
+
+class Sample(NamedTuple):
+    """A process at one moment."""
+
+    resident: float  # bytes
+    encoders: tuple[tuple[str, int], ...]  # how many picture encoders of each codec were open, by its name
+
+
+def growth_alike(samples: Sequence[Sample]) -> float | None:
+    """Relative growth as in `growth`, between moments with the same encoders open; None when there are no two such.
+
+    An encoder takes ten megabytes, and how many are open follows from how the network and the machine are just now. So
+    the first third after the warm-up is compared with the last, for each set of encoders that both have; sets weigh
+    as often as both had them.
+    """
+    warm = samples[int(len(samples) * WARM_UP) :]
+    size = len(warm) // 3
+    early, late = _by_encoders(warm[:size]), _by_encoders(warm[len(warm) - size :])
+    weights = {each: min(len(early[each]), len(late[each])) for each in early.keys() & late.keys()}
+    weights = {each: weight for each, weight in weights.items() if weight >= ALIKE}
+    if not weights:
+        return None
+    ratios = sum(weight * median(late[each]) / median(early[each]) for each, weight in weights.items())
+    return ratios / sum(weights.values()) - 1
+
+
+def _by_encoders(samples: Sequence[Sample]) -> dict[tuple[tuple[str, int], ...], list[float]]:
+    found: dict[tuple[tuple[str, int], ...], list[float]] = defaultdict(list)
+    for sample in samples:
+        found[sample.encoders].append(sample.resident)
+    return found
 
 
 def growth(samples: Sequence[float]) -> float | None:

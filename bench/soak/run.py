@@ -17,7 +17,7 @@ from bench.browsers.chromium import PAD, running_chromium
 from bench.emulator import Network, load_profile
 from bench.soak.crowd import Crowd, Intruder
 from bench.soak.judge import Judge
-from bench.soak.memory import growth
+from bench.soak.memory import Sample, growth, growth_alike
 from bench.soak.pages import OperatorPage, WatchedPage
 from bench.soak.schedule import Action, schedule
 from bench.soak.world import World
@@ -26,7 +26,7 @@ from bench.stack import Metrics
 __all__ = ["OBSERVERS", "soak"]
 
 OBSERVERS = 20
-SAMPLE_SECONDS = 1.0
+SAMPLE_SECONDS = 2.0
 LAST_LOOK = 45.0  # s at the end for everybody to be live again
 MAX_EVENT_AGE, HOLD = 2.0, 0.3  # of the planar robot
 
@@ -54,7 +54,7 @@ class _Soak:
         self._seed = seed
         self._say = say
         self._done: Counter[str] = Counter()
-        self._memory: list[float] = []  # of the server's present life
+        self._memory: list[Sample] = []  # of the server's present life
         self._crowd = Crowd(self._through(world.observer), OBSERVERS, seed)
         self._intruders = [
             Intruder(self._through(world.observer), "observer that commands"),
@@ -139,9 +139,9 @@ class _Soak:
 
     async def _sample_memory(self) -> None:
         while True:
-            memory = self._world.server_memory()
-            if memory is not None:
-                self._memory.append(float(memory))
+            encoders, memory = await self._world.open_encoders(), self._world.server_memory()
+            if encoders is not None and memory is not None:
+                self._memory.append(Sample(float(memory), encoders))
             await asyncio.sleep(SAMPLE_SECONDS)
 
     async def _refusals(self) -> dict[str, float]:
@@ -155,6 +155,7 @@ class _Soak:
         judge = Judge(MAX_EVENT_AGE, HOLD)
         judge.read(self._world.records())
         found = judge.verdict
+        overall, alike = growth([sample.resident for sample in self._memory]), growth_alike(self._memory)
         return {
             "executed_twice": found["executed_twice"],
             "executed_late": found["executed_late"],
@@ -162,7 +163,8 @@ class _Soak:
             "moved_while_stopped": found["moved_while_stopped"],
             "reloads_needed": operator.reloads + observer.reloads,
             "violations": operator.violations + observer.violations,
-            "memory_growth": growth(self._memory),
+            "memory_growth": overall if alike is None else alike,
+            "memory_growth_overall": overall,
             "minutes": self._minutes,
             "seed": self._seed,
             "executed": found["executed"],

@@ -2,9 +2,11 @@
 
 import asyncio
 import json
+import re
 import secrets
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -19,6 +21,7 @@ __all__ = ["World"]
 
 DOWN_SECONDS = 1.0  # between a death and the next life
 HTTP_SECONDS = 10.0
+OPEN_ENCODERS = re.compile(r'^lockstep_media_encoders\{codec="(\w+)",stream="[^"]*"\} ([\d.e+]+)$', re.MULTILINE)
 
 
 class World:
@@ -130,6 +133,18 @@ class World:
             return None if self._server is None else self._server.resident_bytes()
         except (OSError, ValueError, IndexError):
             return None
+
+    async def open_encoders(self) -> tuple[tuple[str, int], ...] | None:
+        """Of each codec how many picture encoders are open, by its name; None while the console does not answer."""
+        async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
+            try:
+                text = (await http.get("/metrics")).text
+            except httpx.TransportError:
+                return None
+        counts: Counter[str] = Counter()
+        for codec, count in OPEN_ENCODERS.findall(text):
+            counts[codec] += int(float(count))
+        return tuple(sorted(counts.items()))
 
     def records(self) -> Iterator[Mapping[str, Any]]:
         """The bridge's record of all epochs. A killed bridge may leave half a line: it is passed over."""

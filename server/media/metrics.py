@@ -35,4 +35,7 @@ class MediaMetrics:
             buckets=ENCODE_BUCKETS,
             registry=registry,
         )
+        self.encoders = Gauge(
+            "lockstep_media_encoders", "Picture encoders that are open", ["stream", "codec"], registry=registry
+        )
         self.peers = Gauge("lockstep_media_peers", "Peers that get a stream", ["stream"], registry=registry)

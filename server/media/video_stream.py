@@ -104,6 +104,7 @@ class VideoStream(Stream[PictureJob]):
         self._group = GroupOfPictures()
         self._passing = Passing(self.output(PASSED, "operator"), lambda tier: self.output("H264", tier))
         self._encoders: dict[Output, PictureEncoder] = {}
+        self._open = {codec: metrics.encoders.labels(camera.name, codec) for codec in VIDEO_CODECS}
 
     @property
     def full_plan(self) -> PicturePlan:
@@ -239,7 +240,9 @@ class VideoStream(Stream[PictureJob]):
         )
 
     def _work(self, job: PictureJob) -> list[Encoded]:
-        self._encoders = {output: encoder for output, encoder in self._encoders.items() if output in job.needed}
+        if not self._encoders.keys() <= job.needed:
+            self._encoders = {output: encoder for output, encoder in self._encoders.items() if output in job.needed}
+            self._count_encoders()
         started = time.perf_counter()
         output, source = job.output, job.source
         try:
@@ -267,5 +270,10 @@ class VideoStream(Stream[PictureJob]):
         if encoder is None:
             encoder = create_picture_encoder(output.codec, plan.bitrate_bps, plan.frame_rate)
             self._encoders[output] = encoder
+            self._count_encoders()
         encoder.aim(plan.bitrate_bps, plan.frame_rate)
         return encoder
+
+    def _count_encoders(self) -> None:
+        for codec, gauge in self._open.items():
+            gauge.set(sum(output.codec == codec for output in self._encoders))
