@@ -43,10 +43,22 @@ async def cancel_all(tasks: Iterable[asyncio.Task[None]]) -> None:
 
 
 async def within(seconds: float, coroutine: Coroutine[Any, Any, None]) -> None:
-    """Await it for at most so long. What hangs longer, as a connection that cannot close, is cancelled and left."""
+    """Await it for at most so long. What hangs longer, as a connection that cannot close, is cancelled and left.
+
+    So it is when the caller is cancelled.
+    """
     task = asyncio.ensure_future(coroutine)
-    done, _ = await asyncio.wait({task}, timeout=seconds)
+    try:
+        done, _ = await asyncio.wait({task}, timeout=seconds)
+    finally:
+        if not task.done():
+            task.cancel()
+            task.add_done_callback(_look_away)
     if done:
         task.result()
-    else:
-        task.cancel()
+
+
+def _look_away(task: asyncio.Task[None]) -> None:
+    """What was left may fail yet; nobody waits for it."""
+    if not task.cancelled():
+        task.exception()

@@ -33,7 +33,7 @@ ANSWER_SECONDS = 5.0
 CLOSE_SECONDS = 3.0
 KEEPALIVE_SECONDS = 25.0  # Janus forgets a session after 60 s
 SILENCE_SECONDS = 1.5  # without a word on the feedback channel; the console says something there every 0.4 s
-HELD_UP_SECONDS = 0.1
+HELD_UP_SECONDS, MOST_HELD_UP = 0.1, 3  # later than that this process was held up; so often in a row it may be
 MAX_MESSAGE = 256 * 1024  # bytes
 
 
@@ -210,15 +210,18 @@ class RelayMedia:
 
     async def _watch(self) -> None:
         loop = asyncio.get_running_loop()
+        held_up = 0  # times in a row
         while not self.ended.is_set():
             self._heard.clear()
             due = loop.time() + SILENCE_SECONDS
             try:
                 async with asyncio.timeout_at(due):
                     await self._heard.wait()
+                held_up = 0
             except TimeoutError:
                 # Late: this process was held up, and what came meanwhile is not read yet.
-                if loop.time() - due < HELD_UP_SECONDS:
+                held_up = held_up + 1 if loop.time() - due >= HELD_UP_SECONDS else 0
+                if not 0 < held_up <= MOST_HELD_UP:
                     self._lose(f"nothing came from the relay for {SILENCE_SECONDS:g} s")
 
 

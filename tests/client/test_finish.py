@@ -53,6 +53,25 @@ async def test_what_hangs_is_left_after_a_while() -> None:
         await cancelled.wait()
 
 
+async def test_who_is_cancelled_leaves_nothing_running() -> None:
+    begun, cancelled = asyncio.Event(), asyncio.Event()
+
+    async def hang() -> None:
+        begun.set()
+        try:
+            await asyncio.Event().wait()
+        finally:
+            cancelled.set()
+
+    task = asyncio.create_task(within(60, hang()))
+    async with asyncio.timeout(10):
+        await begun.wait()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        await cancelled.wait()
+
+
 async def test_what_ends_in_time_may_raise() -> None:
     async def fail() -> None:
         raise ValueError("no")

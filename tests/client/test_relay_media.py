@@ -1,8 +1,11 @@
 """Where the headless client can watch."""
 
+import asyncio
+
 import msgspec
 import pytest
 
+from client import relay
 from client.errors import ConnectFailed
 from client.relay import RelayMedia, RelayTicket
 
@@ -12,3 +15,17 @@ async def test_a_relay_that_is_no_janus_is_refused_by_name() -> None:
     ticket = msgspec.convert(told, RelayTicket)
     with pytest.raises(ConnectFailed, match="not through a livekit"):
         RelayMedia(ticket, lambda _: None)
+
+
+@pytest.mark.parametrize("late_from", [0.0, 60.0], ids=["a process that is always held up", "one that never is"])
+async def test_a_relay_that_says_nothing_is_given_up_by(late_from: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(relay, "SILENCE_SECONDS", 0.02)
+    monkeypatch.setattr(relay, "HELD_UP_SECONDS", late_from)
+    told = {"engine": "janus", "relay": "0", "url": "ws://host", "feed": 7, "room": 1, "streams": []}
+    media = RelayMedia(msgspec.convert(told, RelayTicket), lambda _: None)
+    try:
+        async with asyncio.timeout(10):
+            await media._watch()
+        assert media.why == "nothing came from the relay for 0.02 s"
+    finally:
+        await media.close()
