@@ -47,6 +47,12 @@ class _Problem(msgspec.Struct):
     detail: str = ""
 
 
+_ice_servers = msgspec.json.Decoder(_IceServers)
+_watch_ticket = msgspec.json.Decoder(_WatchTicket)
+_relay_answer = msgspec.json.Decoder(_RelayAnswer)
+_problem = msgspec.json.Decoder(_Problem)
+
+
 class Whep:
     """The HTTP side of one connection."""
 
@@ -76,7 +82,7 @@ class Whep:
         """STUN and TURN servers with credentials that are good now; raises as `offer`."""
         response = await self._request("GET", self._base + "/api/ice")
         try:
-            found = msgspec.json.decode(response.content, type=_IceServers).ice_servers
+            found = _ice_servers.decode(response.content).ice_servers
         except msgspec.DecodeError as error:
             raise SignallingRefused(response.status_code, "", "not a list of ICE servers") from error
         return [RTCIceServer(each.urls, each.username, each.credential) for each in found]
@@ -85,7 +91,7 @@ class Whep:
         """Where the console wants this observer to watch; None: with itself. Raises as `offer`."""
         response = await self._request("GET", self._base + "/api/relay")
         try:
-            return msgspec.json.decode(response.content, type=_RelayAnswer).relay
+            return _relay_answer.decode(response.content).relay
         except msgspec.DecodeError as error:
             raise SignallingRefused(response.status_code, "", "not an answer about relays") from error
 
@@ -93,7 +99,7 @@ class Whep:
         """A ticket for a line to the console, of an observer that has its media from `relay`. Raises as `offer`."""
         response = await self._request("POST", f"{self._base}/api/watch?relay={relay}")
         try:
-            return msgspec.json.decode(response.content, type=_WatchTicket).ticket
+            return _watch_ticket.decode(response.content).ticket
         except msgspec.DecodeError as error:
             raise SignallingRefused(response.status_code, "", "not a ticket") from error
 
@@ -144,7 +150,7 @@ class Whep:
 
 def _refusal(response: httpx.Response) -> SignallingRefused:
     try:
-        problem = msgspec.json.decode(response.content, type=_Problem)
+        problem = _problem.decode(response.content)
     except msgspec.DecodeError:
         problem = _Problem(detail=response.text[:200])
     return SignallingRefused(response.status_code, problem.error, problem.detail)

@@ -1,6 +1,7 @@
 """`lockstep robot`: run a bridge."""
 
 import asyncio
+import faulthandler
 import json
 import logging
 import os
@@ -61,6 +62,7 @@ def run(
     as_json: Annotated[bool, typer.Option("--json", help="Print the address as one JSON line once ready.")] = False,
 ) -> None:
     """Run a robot and its bridge until interrupted."""
+    faulthandler.enable()  # a crash in native code, as of a GL driver, says where every thread was
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     try:
         settings = BridgeSettings(

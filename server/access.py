@@ -3,7 +3,7 @@
 import secrets
 import time
 from collections.abc import Callable
-from typing import Annotated, Literal, NamedTuple, Self, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar
 
 import jwt
 import msgspec
@@ -67,6 +67,10 @@ class _FileClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
 
 
 Claims = TypeVar("Claims", _LinkClaims, _TicketClaims, _FileClaims)
+
+_decoders: dict[type, msgspec.json.Decoder[Any]] = {
+    kind: msgspec.json.Decoder(kind) for kind in (_LinkClaims, _TicketClaims, _FileClaims)
+}
 
 
 def _nothing_revoked(token_id: str) -> bool:
@@ -183,7 +187,8 @@ class Access:
             if len(token) > MAX_TOKEN:
                 raise TokenInvalid(INVALID)
             payload = jwt.api_jws.decode(token, self._secret, algorithms=[ALGORITHM])
-            return msgspec.json.decode(payload, type=kind)
+            claims: Claims = _decoders[kind].decode(payload)
+            return claims
         except (jwt.InvalidTokenError, msgspec.DecodeError, UnicodeError, RecursionError) as error:
             raise TokenInvalid(INVALID) from error
 

@@ -76,7 +76,7 @@ def _service(request: Request) -> RecordingService:
     return found
 
 
-def _caller(request: Request) -> Identity:
+async def _caller(request: Request) -> Identity:
     return _service(request).access.bearer(request.headers.get("authorization"))
 
 
@@ -177,7 +177,7 @@ async def download(request: Request, recording_id: str, ticket: str = "") -> Res
     if ticket:
         access.verify_file_ticket(ticket, recording_id)
     else:
-        require_role(_caller(request), "operator", "supervisor")
+        require_role(await _caller(request), "operator", "supervisor")
     path = await _with_reader(request, recording_id, lambda reader, entry: reader.path)
     return FileResponse(
         path, media_type="application/x-mcap", filename=path.name, headers={"Cache-Control": "no-store"}

@@ -82,7 +82,7 @@ def _restrict_ice(settings: Settings) -> None:
         restrict_ice_hosts([settings.host if settings.host != "localhost" else LOOPBACK, *own_addresses()])
 
 
-def _same_origin(connection: HTTPConnection) -> None:
+async def _same_origin(connection: HTTPConnection) -> None:
     """A dependency of all routes. WebSockets check for themselves: a refusal is another thing there."""
     if connection.scope["type"] == "http" and connection.scope["method"] not in SAFE_METHODS:
         check_origin(connection.headers, connection.app.state.settings.allowed_origins)

@@ -1,6 +1,7 @@
 """Reads request bodies with a bound, before anything else looks at them."""
 
 import asyncio
+from functools import cache
 from typing import TypeVar
 
 import msgspec
@@ -36,6 +37,11 @@ async def read_text(request: Request, expected: str, bound: int) -> str:
         raise WrongMediaType("the body is not UTF-8") from error
 
 
+@cache  # filled on the loop alone: two threads that meet a type for the first time crash in msgspec 0.22
+def _decoder(kind: type[Body]) -> msgspec.json.Decoder[Body]:
+    return msgspec.json.Decoder(kind)
+
+
 async def read_json(request: Request, kind: type[Body]) -> Body:
     """The body as `kind`; an empty body is `kind()`.
 
@@ -45,7 +51,7 @@ async def read_json(request: Request, kind: type[Body]) -> Body:
     """
     body = await _read(request, MAX_JSON)
     try:
-        return msgspec.json.decode(body, type=kind) if body else kind()
+        return _decoder(kind).decode(body) if body else kind()
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
         raise BadJson(str(error)) from error
 

@@ -13,6 +13,9 @@ class _Address(msgspec.Struct, frozen=True):
     url: str
 
 
+_decoder = msgspec.json.Decoder(_Address)
+
+
 def write_address(directory: StateDir, url: str) -> None:
     """The console that started last is the one that is found."""
     directory.write(FILE, msgspec.json.encode(_Address(url)))
@@ -22,6 +25,6 @@ def read_address(directory: StateDir) -> str:
     """ "" when no console has run with this directory."""
     data = directory.read(FILE)
     try:
-        return "" if data is None else msgspec.json.decode(data, type=_Address).url
+        return "" if data is None else _decoder.decode(data).url
     except (msgspec.DecodeError, UnicodeError, RecursionError):
         return ""

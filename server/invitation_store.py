@@ -29,6 +29,10 @@ class _Elsewhere(msgspec.Struct, frozen=True):
     revoked: dict[str, float] = {}  # id of a link: when it would have expired
 
 
+_file = msgspec.json.Decoder(_File)
+_elsewhere = msgspec.json.Decoder(_Elsewhere)
+
+
 class InvitationStore:
     """`is_revoked` answers from memory; `refresh` brings the memory up to date, which costs one `stat`.
 
@@ -119,7 +123,7 @@ class InvitationStore:
     def _read(self) -> Invitations:
         data = self._directory.read(FILE)
         try:
-            return Invitations([] if data is None else msgspec.json.decode(data, type=_File).invitations)
+            return Invitations([] if data is None else _file.decode(data).invitations)
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             path = self._directory.path / FILE
             raise StateDamaged(path, f"not understood: {error}; who removes it removes signing.key too") from error
@@ -127,7 +131,7 @@ class InvitationStore:
     def _read_elsewhere(self) -> dict[str, float]:
         data = self._directory.read(ELSEWHERE)
         try:
-            return {} if data is None else msgspec.json.decode(data, type=_Elsewhere).revoked
+            return {} if data is None else _elsewhere.decode(data).revoked
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             raise StateDamaged(self._directory.path / ELSEWHERE, f"not understood: {error}") from error
 

@@ -3,6 +3,7 @@
 FastAPI could only write one that knows no answers, since bodies are read with bounds and answers are msgspec structs.
 """
 
+import json
 from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any, NamedTuple
@@ -239,7 +240,7 @@ def openapi_document(operations: Sequence[Operation] = OPERATIONS) -> dict[str, 
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
         },
     }
-    found: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(document))
+    found: dict[str, Any] = json.loads(msgspec.json.encode(document))
     return found
 
 

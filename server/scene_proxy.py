@@ -74,7 +74,7 @@ async def stream(websocket: WebSocket, ticket: str) -> None:
 def is_allowed(data: bytes) -> bool:
     """Whether a viewer's message may pass."""
     try:
-        kind = msgspec.msgpack.decode(data, type=_Kind).type
+        kind = _kind.decode(data).type
     except (msgspec.DecodeError, UnicodeError, RecursionError):
         return False
     return kind in ALLOWED_UP
@@ -82,6 +82,9 @@ def is_allowed(data: bytes) -> bool:
 
 class _Kind(msgspec.Struct):
     type: str
+
+
+_kind = msgspec.msgpack.Decoder(_Kind)
 
 
 def _subprotocols(websocket: WebSocket) -> list[Subprotocol]:

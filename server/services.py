@@ -95,6 +95,6 @@ def takes_stops(connection: HTTPConnection) -> TakesStops:
     return services(connection) if keeper is None else keeper
 
 
-def authorized(request: Request) -> Identity:
+async def authorized(request: Request) -> Identity:
     """Who asks. Raises AccessError."""
     return services(request).access.bearer(request.headers.get("authorization"))

@@ -206,6 +206,6 @@ def fleet_of(connection: HTTPConnection) -> Fleet:
     return found
 
 
-def fleet_caller(connection: Request) -> Identity:
+async def fleet_caller(connection: Request) -> Identity:
     """Who asks the fleet. Raises AccessError."""
     return fleet_of(connection).caller(connection)

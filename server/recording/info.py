@@ -28,6 +28,9 @@ class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
     def parse(cls, metadata: Mapping[str, str]) -> "RecordingInfo":
         """Raises RecordingDamaged."""
         try:
-            return msgspec.convert(dict(metadata), cls, strict=False)
+            return _decoder.decode(msgspec.json.encode(metadata))
         except msgspec.ValidationError as error:
             raise RecordingDamaged(f"not a recording of Lockstep: {error}") from error
+
+
+_decoder = msgspec.json.Decoder(RecordingInfo, strict=False)  # recordings are read on threads

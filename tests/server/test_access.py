@@ -1,3 +1,5 @@
+import subprocess
+import sys
 import time
 
 import jwt
@@ -152,3 +154,31 @@ def test_a_ticket_of_one_robot_opens_nothing_of_another() -> None:
             other.verify_ticket(left.issue_ticket("link"))
         with pytest.raises(TokenInvalid):
             other.verify_file_ticket(left.issue_file_ticket("r1", "link"), "r1")
+
+
+FIRST_TOKENS = """
+import os, sys, threading
+from server.access import Access
+access = Access("a secret of at least thirty-two bytes", 60, 60)
+token = access.issue("operator", "Ada")
+sys.setswitchinterval(1e-6)
+for _ in range(20):
+    child = os.fork()
+    if child == 0:
+        together = threading.Barrier(8)
+        def verify():
+            together.wait()
+            access.verify(token)
+        threads = [threading.Thread(target=verify) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0, "the interpreter crashed"
+"""
+
+
+def test_the_first_tokens_of_a_process_can_be_verified_by_several_threads_at_once() -> None:
+    done = subprocess.run([sys.executable, "-c", FIRST_TOKENS], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr

@@ -1,6 +1,9 @@
 """Start and shutdown of the whole console."""
 
 import asyncio
+from collections.abc import Iterator
+from inspect import iscoroutinefunction
+from typing import Any
 
 from robot_bridge.protocol.console import Seat, SeatRequest
 from robot_bridge.protocol.messages import Command
@@ -50,3 +53,21 @@ async def test_one_process_can_run_several_consoles_one_after_the_other() -> Non
 
 def test_an_app_is_made_without_touching_anything() -> None:
     assert create_app(Settings()).title == "Lockstep"
+
+
+def test_no_request_leaves_the_loop_for_a_thread_before_its_route_asks_for_one() -> None:
+    """FastAPI calls what is not a coroutine on a thread, where it would meet the state of the loop half changed."""
+    for settings in (Settings(), Settings(robots=("left=tcp://127.0.0.1:1",))):
+        called = list(_called(create_app(settings)))
+        assert called
+        assert [each for each in called if not iscoroutinefunction(each)] == []
+
+
+def _called(router: Any) -> Iterator[Any]:
+    """All routes and what they depend on, of included routers too."""
+    for route in router.routes:
+        if included := getattr(route, "original_router", None):
+            yield from _called(included)
+        elif dependant := getattr(route, "dependant", None):
+            yield dependant.call
+            yield from (each.call for each in dependant.dependencies)

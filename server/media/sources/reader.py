@@ -67,7 +67,7 @@ class _Unheard(Exception):
 
 
 def main() -> None:
-    spec = msgspec.json.decode(sys.stdin.buffer.readline(), type=SourceSpec)
+    spec = msgspec.json.Decoder(SourceSpec).decode(sys.stdin.buffer.readline())
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a library prints is no message
     threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True).start()

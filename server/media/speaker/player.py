@@ -167,7 +167,7 @@ def _packet(console: BinaryIO) -> _Packet | None:
 
 
 def main() -> None:
-    spec = msgspec.json.decode(sys.stdin.buffer.readline(), type=SpeakerSpec)
+    spec = msgspec.json.Decoder(SpeakerSpec).decode(sys.stdin.buffer.readline())
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a library prints is no message
     with suppress(OSError, KeyboardInterrupt):
