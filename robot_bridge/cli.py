@@ -62,7 +62,6 @@ def run(
     as_json: Annotated[bool, typer.Option("--json", help="Print the address as one JSON line once ready.")] = False,
 ) -> None:
     """Run a robot and its bridge until interrupted."""
-    faulthandler.enable()  # a crash in native code, as of a GL driver, says where every thread was
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     try:
         settings = BridgeSettings(
@@ -147,4 +146,5 @@ def _announce(name: str, bridge: Bridge, scheme: str, as_json: bool) -> None:
 
 def main() -> None:
     """The robot's own entry point, without the console."""
+    faulthandler.enable()  # a crash in native code, as of a GL driver, says where every thread was
     robot_app(prog_name="lockstep robot")

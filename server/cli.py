@@ -1,5 +1,6 @@
 """The command `lockstep`: `up` runs a robot and a console, `serve` only the console, `robot` only the robot …"""
 
+import faulthandler
 import logging
 import sys
 from collections.abc import Mapping
@@ -342,4 +343,5 @@ def _usage(text: str) -> typer.Exit:
 
 
 def main() -> None:
+    faulthandler.enable()  # a crash in a library's native code says where every thread was
     app()

@@ -1,6 +1,5 @@
 """Log lines on standard error, for people or as JSON: standard output carries only what was asked for."""
 
-import faulthandler
 import logging
 import sys
 from enum import StrEnum
@@ -20,7 +19,6 @@ class LogFormat(StrEnum):
 
 def configure_logs(level: int = logging.INFO, form: LogFormat = LogFormat.TEXT) -> None:
     """Process-wide; call once, from an entry point."""
-    faulthandler.enable()  # a crash in a library's native code says where every thread was
     rendered = _json_lines() if form is LogFormat.JSON else _text_lines()
     structlog.configure(
         processors=[

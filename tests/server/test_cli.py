@@ -74,6 +74,16 @@ async def test_a_bridge_that_dies_is_started_again_on_the_same_port(tmp_path: Pa
         assert any(stack.robot in line for line in stack.output)
 
 
+async def test_a_console_that_crashes_in_native_code_says_where_it_was(tmp_path: Path) -> None:
+    async with running_stack(tmp_path) as stack:
+        os.kill(stack.process.pid, signal.SIGSEGV)
+        async with asyncio.timeout(PATIENCE):
+            assert await stack.process.wait() == -signal.SIGSEGV
+            while not any("most recent call first" in line for line in stack.output):  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+        assert any("Segmentation fault" in line for line in stack.output)
+
+
 async def test_a_port_in_use_is_said_clearly() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
