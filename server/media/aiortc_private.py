@@ -160,6 +160,8 @@ class MediaSender(RTCRtpSender):
         self._rest: deque[bytes] = deque()  # packets of the last frame that it holds back
         self._patience: asyncio.TimerHandle | None = None  # of a keyframe request that waits for a retransmission
         self._packets: PacketStream | None = None  # None before the transport is connected
+        self._pair: Any = None  # the selected one, as far as it was looked at
+        self._way: tuple[Any, tuple[str, int]] | None = None  # through it
         self._stopped = False
 
     @property
@@ -266,7 +268,9 @@ class MediaSender(RTCRtpSender):
         if dtls._state is not State.CONNECTED:
             return None
         pair = dtls.transport._connection._nominated.get(1)
-        return None if pair is None else (pair.protocol.transport, pair.remote_addr)
+        if pair is not self._pair:  # for every packet, so it is taken apart only once
+            self._pair, self._way = pair, None if pair is None else (pair.protocol.transport, pair.remote_addr)
+        return self._way
 
     def _send_control(self, packet: bytes | None) -> None:
         path = self._path()

@@ -1,7 +1,8 @@
-"""One microphone: sound is encoded once per codec that somebody needs."""
+"""One microphone: sound is encoded once per codec that somebody needs; a crowd gets several packets in one."""
 
 import time
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,15 @@ from server.media.output import Output
 from server.media.packetise import packetise_sound
 from server.media.quality.expected_loss import ExpectedLoss
 from server.media.settings import MediaSettings
-from server.media.sound_encoder import AUDIO_CODECS, EncodedSound, Segment, SoundEncoder, create_sound_encoder
+from server.media.sound_bundle import SoundBundle
+from server.media.sound_encoder import (
+    AUDIO_CODECS,
+    PACKET_SECONDS,
+    EncodedSound,
+    Segment,
+    SoundEncoder,
+    create_sound_encoder,
+)
 from server.media.stream import Encoded, Stream
 
 __all__ = ["AudioStream"]
@@ -43,6 +52,7 @@ class AudioStream(Stream[SoundJob]):
         super().__init__(microphone.name, microphone.label, settings, fan_out, metrics)
         self._waiting: deque[tuple[Media, float]] = deque()
         self._encoders: dict[str, SoundEncoder] = {}
+        self._bundles: dict[str, SoundBundle] = {}  # of the codecs that a crowd takes
         self._expected = ExpectedLoss(settings.opus_packet_loss_percent)
 
     def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
@@ -64,30 +74,66 @@ class AudioStream(Stream[SoundJob]):
         self._expected.update(loss, now)
 
     def _work(self, job: SoundJob) -> list[Encoded]:
-        needed = {output.codec for output, _ in job.outputs}
-        self._encoders = {codec: encoder for codec, encoder in self._encoders.items() if codec in needed}
+        orders: dict[str, list[tuple[Output, frozenset[bool]]]] = {}
+        for order in sorted(job.outputs, key=lambda order: order[0].tier == "crowd"):  # see `_finish`
+            orders.setdefault(order[0].codec, []).append(order)
+        self._encoders = {codec: encoder for codec, encoder in self._encoders.items() if codec in orders}
+        crowds = {output.codec for output, _ in job.outputs if output.tier == "crowd"}
+        self._bundles = {codec: bundle for codec, bundle in self._bundles.items() if codec in crowds}
         try:
             segment = _segment(job)
         except MediaError as error:
             return [Encoded(output, (), 0.0, error) for output, _ in job.outputs]
-        return [self._encode(segment, output, variants, job.expected_loss) for output, variants in job.outputs]
+        results = []
+        for codec, wanted in orders.items():
+            started = time.perf_counter()
+            try:
+                sounds: Sequence[EncodedSound] | MediaError = self._encode(segment, codec, job.expected_loss)
+            except MediaError as error:
+                del self._encoders[codec]
+                self._bundles.pop(codec, None)
+                sounds = error
+            seconds = time.perf_counter() - started
+            results += [self._packed(output, sounds, variants, seconds) for output, variants in wanted]
+        return results
 
-    def _encode(self, segment: Segment, output: Output, variants: frozenset[bool], expected_loss: int) -> Encoded:
-        started = time.perf_counter()
-        encoder = self._encoders.get(output.codec)
+    def _encode(self, segment: Segment, codec: str, expected_loss: int) -> list[EncodedSound]:
+        encoder = self._encoders.get(codec)
         if encoder is None:
-            encoder = create_sound_encoder(output.codec, self._settings.opus_bitrate_bps, expected_loss)
-            self._encoders[output.codec] = encoder
+            encoder = create_sound_encoder(codec, self._settings.opus_bitrate_bps, expected_loss)
+            self._encoders[codec] = encoder
         encoder.expect_loss(expected_loss)
-        try:
-            frames = [_frame(output, sound) for sound in encoder.encode(segment)]
-        except MediaError as error:
-            del self._encoders[output.codec]
-            return Encoded(output, (), 0.0, error)
+        return encoder.encode(segment)
+
+    def _packed(
+        self, output: Output, sounds: Sequence[EncodedSound] | MediaError, variants: frozenset[bool], seconds: float
+    ) -> Encoded:
+        if isinstance(sounds, MediaError):
+            return Encoded(output, (), 0.0, sounds)
+        whole = True
+        if output.tier == "crowd":
+            bundle = self._bundles.get(output.codec)
+            if bundle is None:
+                samples = int(self._encoders[output.codec].rate * PACKET_SECONDS)
+                bundle = self._bundles[output.codec] = SoundBundle(output.codec, samples)
+            sounds = [complete for sound in sounds for complete in bundle.add(sound)]
+            whole = bundle.empty
+        frames = [_frame(output, sound) for sound in sounds]
         for frame in frames:
             for trailer in variants:
                 frame.payloads(trailer)
-        return Encoded(output, frames, time.perf_counter() - started)
+        return Encoded(output, frames, seconds, whole=whole)
+
+    def _admit(self, output: Output, frame: EncodedFrame) -> None:
+        """Nobody: `_finish` says when."""
+
+    def _finish(self, encoded: Encoded) -> None:
+        """Who joins the crowd or leaves it does so between two bundles, when all of a codec have got the same sound."""
+        super()._finish(encoded)
+        if encoded.output.tier == "crowd" and encoded.whole and encoded.error is None:
+            for output in self._outputs.values():
+                if output.codec == encoded.output.codec:
+                    output.arrive()
 
 
 def _segment(job: SoundJob) -> Segment:

@@ -35,7 +35,7 @@ from server.media.publishing_private import H264_PROFILE, offer_section
 from server.media.quality.desk import QualityDesk
 from server.media.quality.metrics import QualityMetrics
 from server.media.quality.path import RateLimits
-from server.media.quality.peer_quality import CameraLink, PeerQuality
+from server.media.quality.peer_quality import CameraLink, PeerQuality, SoundLink
 from server.media.receive_guard_private import guard_transports
 from server.media.receive_turns import ReceiveTurns
 from server.media.recorded_output import FrameTaker, RecordedOutput
@@ -269,7 +269,11 @@ class MediaPlane:
             for each in deliveries
             if isinstance(each.stream, VideoStream)
         ]
-        peer.quality.sounds = [each.stream for each in deliveries if isinstance(each.stream, AudioStream)]
+        peer.quality.sounds = [
+            SoundLink(each.stream, each.info.codec, each.target)
+            for each in deliveries
+            if isinstance(each.stream, AudioStream)
+        ]
         if peer.quality.cameras or peer.quality.sounds:
             self._quality.join(peer.quality)
         return peer
@@ -322,7 +326,7 @@ class MediaPlane:
 
         def ready() -> None:
             target.sender = sender
-            stream.join(codec, target, quality.encoded_as if video else "operator")
+            stream.join(codec, target, quality.encoded_as if video else quality.hears_as)
             if video and self._settings.quality:
                 self._quality.tick()
 

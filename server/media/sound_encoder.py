@@ -17,6 +17,7 @@ from server.media.media_clock import SoundClock
 
 __all__ = [
     "AUDIO_CODECS",
+    "PACKET_SECONDS",
     "EncodedSound",
     "OpusEncoder",
     "PcmuEncoder",

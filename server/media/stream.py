@@ -31,15 +31,22 @@ Job = TypeVar("Job")
 class Encoded:
     """What the worker made for one output."""
 
-    __slots__ = ("error", "frames", "output", "seconds")
+    __slots__ = ("error", "frames", "output", "seconds", "whole")
 
     def __init__(
-        self, output: Output, frames: Sequence[EncodedFrame], seconds: float, error: MediaError | None = None
+        self,
+        output: Output,
+        frames: Sequence[EncodedFrame],
+        seconds: float,
+        error: MediaError | None = None,
+        *,
+        whole: bool = True,
     ) -> None:
         self.output = output
         self.frames = frames
         self.seconds = seconds
         self.error = error
+        self.whole = whole  # False: the worker keeps some of what it took for the next frame
 
 
 class Stream(ABC, Generic[Job]):
@@ -167,11 +174,15 @@ class Stream(ABC, Generic[Job]):
 
     def _publish(self, output: Output, frame: EncodedFrame) -> None:
         output.count(frame)
-        if frame.keyframe and output.arriving:
-            output.arrive()
+        self._admit(output, frame)
         self._fan_out.publish(frame, output.targets)
         if self._recorded is not None:
             self._recorded.published(self.name, output, frame)
+
+    def _admit(self, output: Output, frame: EncodedFrame) -> None:
+        """Let those who come from another tier begin with this frame, if they can."""
+        if frame.keyframe and output.arriving:
+            output.arrive()
 
     async def run(self) -> None:
         """Encode until cancelled."""

@@ -11,7 +11,8 @@ encoder serves both. As soon as that ends it has an encoder of its own. So there
 and codec, and one where the network is good.
 
 In a crowd (`Crowd`) the observers of the high tier get every second or third picture, from one more encoder, with as
-many bits for each picture as before. Who may drive, relays, recordings and thumbnails get what they got.
+many bits for each picture as before, and their sound in longer packets. Who may drive, relays, recordings and
+thumbnails get what they got.
 """
 
 import asyncio
@@ -89,22 +90,25 @@ class QualityDesk:
         for peer in observers:
             if peer.tier == "operator":  # it drove until now
                 self._step_back(peer, now)
-        for i, peer in enumerate(observers):
-            if (i + self._ticks) % OBSERVER_TICKS == 0:
-                peer.decide(now)
-                peer.tier = "low" if peer.stays_low else peer.choice.decide(peer.path, self._needs(peer), now)
+        turn = observers[-self._ticks % OBSERVER_TICKS :: OBSERVER_TICKS]
+        for peer in turn:
+            peer.decide(now)
+            peer.tier = "low" if peer.stays_low else peer.choice.decide(peer.path, self._needs(peer), now)
         self._plan_low([peer for peer in observers if peer.tier == "low"], now)
         self._thin(observers, now)
         shared = self._whole_since is not None and now - self._whole_since >= SHARE_AFTER
         for peer in leaders:
             self._settle(peer, "operator", "operator")
-        for i, peer in enumerate(observers):
+        for peer in observers:
             self._settle(peer, peer.tier, self._encoded_as(peer, shared))
-            if (i + self._ticks) % OBSERVER_TICKS == 0:
-                self._tell(peer)
+        for peer in turn:
+            self._tell(peer)
         for peer in self._peers:
-            for camera in peer.cameras:
-                camera.stream.hold_back(camera.target, peer.path.limited or peer.tier == "low")
+            self._sound_for(peer)
+            if peer.held_back != (held_back := peer.path.limited or peer.tier == "low"):
+                peer.held_back = held_back
+                for camera in peer.cameras:
+                    camera.stream.hold_back(camera.target, held_back)
         if self._ticks % OBSERVER_TICKS == 0:
             for peer in leaders:
                 self._tell(peer)
@@ -191,6 +195,14 @@ class QualityDesk:
             for output in camera.stream.outputs_of(encoded_as):
                 output.plan = self._plan_of(camera.stream, encoded_as)
 
+    def _sound_for(self, peer: PeerQuality) -> None:
+        """Also who gets small pictures in a crowd hears longer packets: their headers are a third of a small path."""
+        hears_as: PictureTier = "crowd" if peer.in_crowd and not peer.drives and self._crowd.divisor > 1 else "operator"
+        if peer.hears_as != hears_as:
+            peer.hears_as = hears_as
+            for sound in peer.sounds:
+                sound.stream.move(sound.codec, sound.target, hears_as)
+
     def _plan_of(self, stream: VideoStream, tier: PictureTier) -> PicturePlan:
         if tier == "crowd":
             return stream.full_plan.thinned(self._crowd.divisor)
@@ -224,8 +236,8 @@ class QualityDesk:
         """Sound is encoded once for all: against the operator's loss, or the worst observer's without one."""
         losses: dict[AudioStream, float] = {}
         for peer in peers:
-            for stream in peer.sounds:
-                losses[stream] = max(losses.get(stream, 0.0), peer.loss or 0.0)
+            for sound in peer.sounds:
+                losses[sound.stream] = max(losses.get(sound.stream, 0.0), peer.loss or 0.0)
         for stream, loss in losses.items():
             stream.measured_loss(loss, now)
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from server.media.audio_stream import AudioStream
     from server.media.video_stream import VideoStream
 
-__all__ = ["CameraLink", "PeerQuality"]
+__all__ = ["CameraLink", "PeerQuality", "SoundLink"]
 
 WIRE_SHARE = 0.92  # of what a receiver counts; the rest are headers
 
@@ -39,6 +39,14 @@ class CameraLink(NamedTuple):
     sender: Counted
 
 
+class SoundLink(NamedTuple):
+    """One microphone on its way to this peer."""
+
+    stream: "AudioStream"
+    codec: str
+    target: PeerStream
+
+
 class PeerQuality:
     """Hears receiver reports, bandwidth estimates and the client's own reports."""
 
@@ -50,12 +58,14 @@ class PeerQuality:
         self.stays_low = False  # a thumbnail: never more than the lowest tier
         self.relays = False  # a relay, with many behind it
         self.cameras: list[CameraLink] = []  # the main one first
-        self.sounds: list[AudioStream] = []
+        self.sounds: list[SoundLink] = []
         self.pacer = Pacer()
         self.path = PathController(limits, clock())
         self.choice = ObserverTier(clock())
         self.tier = tier  # what its pictures are made for
         self.encoded_as: PictureTier = tier  # whose pictures it gets: a tier may be served by another's encoder
+        self.hears_as: PictureTier = "operator"  # whose packets of sound it gets: a crowd's are longer
+        self.held_back = False  # from a camera's own pictures, which cannot be made smaller
         self.on_quality: Callable[[Quality], None] | None = None
         self.quality: Quality | None = None  # last one told
         self._clock = clock

@@ -1,18 +1,21 @@
-"""A crowd's pictures, end to end: real peers on loopback. Three observers are a crowd here."""
+"""A crowd's pictures and sound, end to end: real peers on loopback. Three observers are a crowd here."""
 
 import asyncio
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from typing import Any, cast
 
+import numpy as np
+
 from robot_bridge.protocol.carriers import EVENT_REFERENCE_URI
 from robot_bridge.protocol.console import Quality
+from robot_bridge.protocol.messages import Media
 from server.media.frame import EncodedFrame
 from server.media.plane import MediaPlane
 from server.media.quality.crowd import AFTER
 from tests.server.media.camera_h264 import camera_pictures
 from tests.server.media.feeding import read_stamp, value
 from tests.server.media.test_recorded_output import Taken
-from tests.server.media.viewer import TIMEOUT, Viewer, description, noise, picture, running_plane, viewing
+from tests.server.media.viewer import TIMEOUT, Viewer, description, noise, picture, running_plane, sound, viewing
 
 PICTURES = 12
 
@@ -183,6 +186,7 @@ async def test_what_is_recorded_is_not_thinned() -> None:
         for _ in range(10):
             desk(plane).tick()
         assert [viewer.media.quality.encoded_as for viewer in (crowd[0], far)] == ["crowd", "low"]
+        assert far.media.quality.hears_as == "crowd"
         await taken.feed(plane, [picture(i, i / 30) for i in range(1, 21)])
         assert taken.stamps == list(range(1, 21))
         assert len(cast(Any, plane)._streams["camera0"].output("H264", "high").targets) == 0
@@ -203,3 +207,68 @@ async def test_pictures_that_the_camera_encoded_reach_a_crowd_as_they_come() -> 
             desk(plane).tick()
         assert told[-1].crowd == 0
         assert told[-1].streams[0].frames_per_second > 25
+
+
+def segment(number: int) -> Media:
+    """20 ms that are like no others, in what G.711 can say exactly enough."""
+    level = (number * 37 % 200 - 100) * 250
+    payload = np.full(160, level, "<i2").tobytes()
+    return sound(number, number / 50, rate=8_000, payload=payload)
+
+
+def heard(viewer: Viewer) -> list[bytes]:
+    """The sound that came, 20 ms each."""
+    payloads = [bytes(received.packet.payload) for received in viewer.of("audio")]
+    return [payload[at : at + 160] for payload in payloads for at in range(0, len(payload), 160)]
+
+
+async def test_a_crowd_hears_longer_packets_and_who_joins_or_leaves_it_misses_none_and_hears_none_twice() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+
+        async def hearing(priority: bool = False) -> Viewer:
+            uris = {EVENT_REFERENCE_URI: 5}
+            return await stack.enter_async_context(
+                viewing(plane, codecs=["H264", "PCMU"], uris=uris, priority=priority)
+            )
+
+        operator, stays = await hearing(priority=True), await hearing()
+        number = 0
+
+        async def feed_sound(count: int) -> None:
+            nonlocal number
+            for _ in range(count):
+                number += 1
+                plane.feed(segment(number), number / 50)
+                await operator.until(lambda count=number: len(heard(operator)) == count)  # type: ignore[misc]
+
+        await feed_sound(4)
+        leave = [await hearing(), await hearing()]
+        desk(plane).tick()
+        assert [viewer.media.quality.hears_as for viewer in (operator, stays, *leave)] == ["operator", *["crowd"] * 3]
+        await feed_sound(20)
+        before = len(stays.of("audio"))
+        await feed_sound(30)
+        await stays.until(lambda: len(stays.of("audio")) == before + 10)
+        for viewer in leave:
+            await viewer.media.close()
+        desk(plane).tick()
+        disperse(plane)
+        await feed_sound(10)
+        assert [stays.media.quality.hears_as] == ["operator"]
+        await stays.until(lambda: len(heard(stays)) == number)
+        assert heard(stays) == heard(operator)
+        assert len(set(heard(operator))) > 40
+        lengths = [len(received.packet.payload) for received in stays.of("audio")]
+        assert lengths[:4] == [160] * 4
+        assert lengths[-4:] == [160] * 4
+        assert set(lengths) == {160, 480}
+        for viewer in (stays, *leave):
+            for received in viewer.of("audio"):  # a packet has the event of its oldest sound
+                stamp = read_stamp("native", received)
+                assert stamp is not None
+                assert bytes(received.packet.payload)[:160] == heard(operator)[stamp - 1]
+        times = [received.packet.timestamp for received in stays.of("audio")]
+        assert all(
+            (after - time) % 2**32 == length for time, after, length in zip(times, times[1:], lengths, strict=False)
+        )
