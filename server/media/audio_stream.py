@@ -90,7 +90,7 @@ class AudioStream(Stream[SoundJob]):
             try:
                 sounds: Sequence[EncodedSound] | MediaError = self._encode(segment, codec, job.expected_loss)
             except MediaError as error:
-                del self._encoders[codec]
+                self._encoders.pop(codec, None)
                 self._bundles.pop(codec, None)
                 sounds = error
             seconds = time.perf_counter() - started
