@@ -4,7 +4,7 @@ import asyncio
 import sys
 import time
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from bench.driving import round_and_round
 from bench.emulator import NetworkProcess, Profile
 from bench.processes import running_process
 from bench.stack import Stack, running_bridge
-from client import Console
+from client import Console, ConsoleLost
 from robot_bridge.protocol.serial import event_gap
 
 __all__ = ["Drive", "Picture", "Sight", "driving", "running_console"]
@@ -49,6 +49,7 @@ class Drive:
         self.sights: list[Sight] = []
         self.delays: list[tuple[float, float]] = []  # when, s from a command to the first picture of its event
         self.events = 0
+        self.lost_at: float | None = None  # s since the drive began, when the console gave the operator up
         self._sent: list[tuple[int, float]] = []
         self._shown: int | None = None
 
@@ -109,6 +110,8 @@ async def driving(
                     drive.sent(feedback.event, began)
         except TimeoutError:
             pass
+        except ConsoleLost:  # a network that is too full for acknowledgements: it ends there
+            drive.lost_at = time.monotonic() - drive.began
         drive.events = (console.feedback.event if console.feedback is not None else 0) - first
         for helper in helpers:
             helper.cancel()
@@ -116,9 +119,10 @@ async def driving(
 
 
 async def _watch(console: Console, drive: Drive) -> None:
-    async for picture in console.pictures(keep=30):
-        if picture.stamp is not None and console.feedback is not None:
-            drive.arrived(picture.stamp, console.feedback.event, picture.frame.width)
+    with suppress(ConsoleLost):  # the drive notes it
+        async for picture in console.pictures(keep=30):
+            if picture.stamp is not None and console.feedback is not None:
+                drive.arrived(picture.stamp, console.feedback.event, picture.frame.width)
 
 
 async def _look(console: Console, network: NetworkProcess, drive: Drive) -> None:

@@ -19,6 +19,7 @@ def summarise(drive: Drive, seconds: float) -> dict[str, float | int | None]:
     frozen = freezes([picture.at for picture in drive.pictures if abs(picture.gap) <= drive.tolerance])
     return {
         "events": drive.events,
+        "lost_after_seconds": None if drive.lost_at is None else round(drive.lost_at, 1),
         "pictures": len(drive.pictures),
         "pictures_in_tolerance_percent": _share(rendered, len(drive.pictures)),
         "time_with_picture_in_tolerance_percent": _share(within, len(drive.sights)),

@@ -1,11 +1,15 @@
 """What comes out of the loudspeaker in real Chromium, recorded from the sound card."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 from playwright.async_api import Browser
 
 from bench.browsers.console_page import open_console
 from bench.browsers.sound_card import SoundCard, tone_level
-from tests.support.stack import Stack
+from client import Console
+from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
@@ -17,6 +21,28 @@ async def test_the_robots_tone_is_heard(stack: Stack, chromium: Browser, sound_c
         await console.until_live()
         await console.until("s.streams.microphone.rendered > 20")
         assert await sound_card.hears(TONE, 0.04)
+
+
+async def test_one_of_a_crowd_hears_it_without_gaps_in_a_third_of_the_packets(
+    tmp_path: Path, chromium: Browser, sound_card: SoundCard
+) -> None:
+    crowd = {"LOCKSTEP_MEDIA__CROWD_OBSERVERS": "1"}
+    async with (
+        running_stack(tmp_path, settings=crowd) as stack,
+        Console(stack.observer, decode=False),
+        open_console(chromium, stack.observer, pad=False) as console,
+    ):
+        await console.until_live()
+        await console.until("s.streams.microphone.rendered > 20")
+        assert await sound_card.hears(TONE, 0.04)
+        before = (await console.stats())["streams"]["microphone"]
+        heard = await sound_card.record(3.0)
+        after = (await console.stats())["streams"]["microphone"]
+        levels = sorted(tone_level(part, TONE) for part in np.array_split(heard, 30))
+        assert levels[2] > 0.03  # of tenths of a second; a busy machine may spoil one or two
+        taken = after["received"] - before["received"]
+        assert after["rendered"] - before["rendered"] > 0.9 * taken
+        assert 3.0 / 0.06 - 5 < taken < 3.0 / 0.02 * 0.6  # at least those of three seconds; 150 would be all
 
 
 async def test_sound_outside_the_tolerance_is_silent_until_the_gate_is_switched_off(
