@@ -21,7 +21,15 @@ def draw(results: dict[str, Any], path: Path) -> None:
         above, below = axes[0][column], axes[1][column]
         for mode, found in modes.items():
             line = found["timeline"]
-            above.plot(line["at"], line["delay_ms"], color=COLOURS[mode], label=WORDS[mode], linewidth=1.2)
+            above.plot(
+                line["at"],
+                line["delay_ms"],
+                color=COLOURS[mode],
+                marker=".",
+                markersize=3,
+                label=WORDS[mode],
+                linewidth=1.2,
+            )
             below.plot(line["at"], line["queue_ms"], color=COLOURS[mode], linewidth=1.2)
         above.set_title(name, loc="left", fontsize=11)
         above.set_ylabel("command to picture, ms")
