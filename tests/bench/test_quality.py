@@ -1,13 +1,17 @@
 """What `python -m bench.quality` counts, and the repair of losses in simulated time."""
 
+import asyncio
 import json
 
 import pytest
 from typer.testing import CliRunner
 
+from bench.emulator import load_profile
 from bench.quality.cli import app
 from bench.quality.freezes import freezes
 from bench.quality.repair import simulate
+from bench.quality.stage import driving, running_console
+from bench.quality.summary import summarise
 
 
 def test_an_interval_much_longer_than_usual_is_a_freeze() -> None:
@@ -47,3 +51,19 @@ def test_the_command_writes_json() -> None:
     result = CliRunner().invoke(app, ["repair", "5", "--seconds", "10", "--json", "-"])
     assert result.exit_code == 0
     assert set(json.loads(result.stdout)["5 %"]) == {"keyframes only", "repaired"}
+
+
+async def test_a_drive_ends_with_its_console_and_says_when() -> None:
+    async with running_console("planar", quality=True) as stack:
+
+        async def kill_once_it_drives() -> None:
+            while b'"executed"' not in stack.bridge.event_log.read_bytes():  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+            await stack.console.kill()
+
+        killing = asyncio.create_task(kill_once_it_drives())
+        drive = await driving(stack, load_profile("micro-lan"), seconds=40, tolerance=4, seed=1)
+        await killing
+    assert drive.lost_at is not None
+    assert drive.events > 0
+    assert summarise(drive, 40)["lost_after_seconds"] == round(drive.lost_at, 1)

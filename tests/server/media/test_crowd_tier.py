@@ -272,3 +272,32 @@ async def test_a_crowd_hears_longer_packets_and_who_joins_or_leaves_it_misses_no
         assert all(
             (after - time) % 2**32 == length for time, after, length in zip(times, times[1:], lengths, strict=False)
         )
+
+
+async def test_what_is_recorded_of_the_sound_is_the_same_with_and_without_a_crowd() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+        taken = Taken("microphone0")
+
+        def take(stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
+            if stream == "microphone0":
+                taken(stream, codec, frame, attached=attached)
+
+        plane.record(take)
+        crowd = [await stack.enter_async_context(viewing(plane, codecs=["H264", "PCMU"])) for _ in range(2)]
+        numbers = iter(range(1, 1000))
+
+        async def record(count: int) -> None:
+            await taken.feed(plane, [segment(number) for _, number in zip(range(count), numbers, strict=False)])
+
+        await record(5)
+        crowd.append(await stack.enter_async_context(viewing(plane, codecs=["H264", "PCMU"])))
+        desk(plane).tick()
+        assert crowd[0].media.quality.hears_as == "crowd"
+        await record(20)
+        for viewer in crowd[1:]:
+            await viewer.media.close()
+        disperse(plane)
+        await record(20)
+        assert taken.stamps == list(range(1, 46))
+        assert {len(frame.data) for frame in taken.frames} == {160}
