@@ -7,10 +7,11 @@ and hand out what `outcomes` returns.
   issue of its feedback.
 - Armed and without a new intention for `IDLE`, it sends neutral values at that interval.
 - New in the control seat, the first command is neutral: the console refuses a moving one.
-- While the path loses packets every command is sent twice, `ECHO` apart: the copy covers the loss of the command,
-  and, being answered from the stored feedback, the loss of the answer too. On a clean path nothing is doubled.
-- Losses come in a row. When both were lost on such a path, the first repeat comes early and is a salvo of `SALVO`
-  copies, which ends with the answer: single repeats would wait out a row of lost packets one by one.
+- While the path loses packets every command is followed by `ECHOES` copies, `ECHO` apart, until its answer: a copy
+  covers the loss of the command and, being answered from the stored feedback, the loss of the answer too. On a clean
+  path nothing is copied.
+- Losses come in a row. When all were lost on such a path, the first repeat comes early, and each repeat is a salvo of
+  `SALVO` copies, which ends with the answer: single repeats would wait out a row of lost packets one by one.
 """
 
 from collections import deque
@@ -27,11 +28,13 @@ from robot_bridge.protocol.serial import event_gap
 __all__ = ["Outcome", "Pilot"]
 
 IDLE = 0.2  # s; 5 Hz
+TURN = 0.1  # s; who waited for an answer longer than `IDLE` has so long to say what comes next
 ECHO = 0.020  # s; longer than the console's own path to the robot and back
+ECHOES = 3  # at most; with the command itself as many as a row of lost packets is long
 SALVO = 12
 SALVO_SPACING = 0.003  # s
 SALVO_LEAST = 0.050  # s; with a shorter interval single repeats are as quick
-LOSSY_SPELL = 60.0  # s to go on doubling after the last loss that was seen
+LOSSY_SPELL = 60.0  # s to go on copying after the last loss that was seen
 PATIENT_REASONS = {"late", "out_of_order", "rested", "not_neutral"}  # another try, on fresh feedback, can succeed
 NEEDLESS = 0.75  # an answer within this part of a ping's round trip after the last repeat answers an earlier sending
 NEEDLESS_BLIND = 0.25  # of the whole wait, while no ping is known
@@ -70,6 +73,7 @@ class _Flight:
         self.repeat_at = NEVER
         self.echo_at = NEVER
         self.echoes_left = 0
+        self.spacing = ECHO  # s between two echoes
 
 
 class Pilot:
@@ -230,7 +234,7 @@ class Pilot:
         flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now)
         flight.repeat_at = now + self._wait(1)
         if now < self._lossy_until:
-            flight.echo_at, flight.echoes_left = now + ECHO, 1
+            flight.echo_at, flight.echoes_left = now + ECHO, ECHOES
             if self.timer.early >= SALVO_LEAST:
                 flight.repeat_at = now + max(self._least(), self.timer.early)
         self._flight = flight
@@ -256,13 +260,13 @@ class Pilot:
             wait = self._wait(flight.sends)
             flight.repeat_at = now + wait
             flight.echo_at, flight.echoes_left = NEVER, 0
-            if flight.sends == 2 and now < self._lossy_until and wait >= SALVO_LEAST:
-                flight.echo_at, flight.echoes_left = now + SALVO_SPACING, SALVO - 1
+            if now < self._lossy_until and wait >= SALVO_LEAST:
+                flight.echo_at, flight.echoes_left, flight.spacing = now + SALVO_SPACING, SALVO - 1, SALVO_SPACING
         while now >= flight.echo_at:
             copies += 1
             self.echoes += 1
             flight.echoes_left -= 1
-            flight.echo_at = flight.echo_at + SALVO_SPACING if flight.echoes_left else NEVER
+            flight.echo_at = flight.echo_at + flight.spacing if flight.echoes_left else NEVER
         if not copies:
             return []
         flight.issue = self.gate.next().issue
@@ -293,11 +297,12 @@ class Pilot:
         soonest = NEEDLESS * min(self._pings) if self._pings else NEEDLESS_BLIND * taken
         # A later issue of this feedback came by itself, not as an answer.
         if feedback.issue == 1 and (flight.sends == 1 or now - flight.last_sent_at < soonest):
-            self.timer.sample(taken)  # an echo makes a sample at most ECHO too long, which is the safe side
+            self.timer.sample(taken)  # echoes make a sample too long at times, which is the safe side
         else:
             self.loss(now)  # and no sample, by Karn's rule
         if flight.ticket:
             self._outcomes.append(Outcome(flight.ticket, feedback, None))
+            self._idle_at = max(self._idle_at, now + TURN)
 
     def _is_used_up(self) -> bool:
         newest = self.newest

@@ -88,7 +88,7 @@ class ConsoleStatistics(msgspec.Struct, frozen=True, kw_only=True):
     event_rate: float = 0.0  # Hz
     bad_messages: int = 0  # from the console, that could not be read
     repeats: int = 0  # commands sent again for want of an answer
-    echoes: int = 0  # commands doubled because the path loses packets
+    echoes: int = 0  # copies of commands because the path loses packets
 
 
 def percentiles(samples: Iterable[float], scale: float = 1.0) -> Percentiles:

@@ -330,6 +330,8 @@ class Console:
     def _settle(self, peer: Peer, channel: ChannelName, outcome: Outcome, command: Command | None = None) -> None:
         if isinstance(outcome, Forward) and not self._forward(outcome):
             outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
+        if isinstance(outcome, Answer) and not peer.may_be_answered_again():
+            outcome = Absorbed()
         match outcome:
             case Answer(feedback):
                 peer.send_feedback(encode_console_message(feedback))

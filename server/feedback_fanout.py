@@ -7,8 +7,11 @@ hundred observers are served in small slices, and the operator's commands are ha
 """
 
 import asyncio
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Protocol
+
+from server.loop_turns import turns_of_loop
 
 __all__ = ["FeedbackFanout", "FeedbackPace", "FeedbackReceiver"]
 
@@ -87,9 +90,22 @@ class FeedbackFanout:
                     await self._serve(text)
 
     async def _serve(self, text: str) -> None:
-        observers = self._observers()
-        self._pace.share(len(observers))
-        for count, peer in enumerate(observers, start=1):
-            peer.send_feedback(text)
-            if count % SLICE == 0:
-                await asyncio.sleep(0)
+        waiting = deque(self._observers())
+        self._pace.share(len(waiting))
+        served = asyncio.get_running_loop().create_future()
+
+        def serve_some() -> None:
+            try:
+                for _ in range(min(SLICE, len(waiting))):
+                    waiting.popleft().send_feedback(text)
+            except Exception as error:
+                if not served.done():
+                    served.set_exception(error)
+                return
+            if waiting and not served.done():
+                turns_of_loop().ask(serve_some)
+            elif not served.done():
+                served.set_result(None)
+
+        turns_of_loop().ask(serve_some)
+        await served

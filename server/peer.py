@@ -21,6 +21,7 @@ from robot_bridge.protocol.console import (
 )
 from robot_bridge.protocol.messages import Stop
 from server.access import Identity
+from server.answer_pace import AnswerPace
 from server.audit import Actor
 from server.channels import ChannelName, MessageBudget, channel_of, parse_message
 from server.errors import ChannelError, Flood, TransportRefused
@@ -64,6 +65,8 @@ class PeerStreams(Protocol):
     def tier(self) -> Tier | None: ...
     @property
     def loss(self) -> float | None: ...
+    @property
+    def queues(self) -> bool: ...
 
     def report(self, report: Report, now: float) -> None: ...
     def drives(self, holds_seat: bool) -> None: ...
@@ -129,6 +132,7 @@ class Peer(ABC):
         self._budget = MessageBudget(rate, self._loop.time())
         self._patience = RateLimits(FORGIVEN_RATE, limits.max_bad_messages)
         self.asks = TokenBucket(ASK_RATE, ASK_BURST, self._loop.time())  # for what concerns everybody
+        self._answers = AnswerPace()
         self._heard_at = self._loop.time()
         self._connected = asyncio.Event()
         self._end = asyncio.Event()
@@ -188,6 +192,10 @@ class Peer(ABC):
     def send_feedback(self, text: str) -> None:
         if "control" in self._writers:
             self._writers["control"].send_newest(text)
+
+    def may_be_answered_again(self) -> bool:
+        """Whether a repeat of its command is answered now; if so, it counts."""
+        return self._answers.allows(self._loop.time(), queues=self._media.queues)
 
     def participant(self) -> Participant:
         carriers = [stream.carrier for stream in self.streams]

@@ -163,6 +163,7 @@ class _NoMedia:
     voice = ""
     tier: Tier | None = None
     loss: float | None = None
+    queues = False
 
     @property
     def streams(self) -> list[StreamInfo]:

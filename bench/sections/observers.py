@@ -22,7 +22,7 @@ from bench.driving import console_trips
 from bench.processes import Running, running_process
 from bench.results import Result
 from bench.samples import median, quantile
-from bench.stack import Bridge, Stack, running_stack
+from bench.stack import Bridge, Metrics, Stack, running_stack
 from client import Console
 
 __all__ = ["run"]
@@ -125,14 +125,20 @@ async def _count(stack: Stack, audiences: list[Running]) -> Counts:
         metrics, received = await asyncio.gather(stack.metrics(), _settled(audiences))
     finally:
         stack.bridge.process.go_on()
+    return counts_from(metrics, received)
+
+
+def counts_from(metrics: Metrics, received: list[Received]) -> Counts:
+    """What the console says of its pictures. A crowd's tier has sound as well, which is left out."""
     taken = metrics.values("lockstep_media_pictures_taken_total", "stream")  # each once, for however many tiers
     thinned = metrics.values("lockstep_media_tier_frames_encoded_total", "stream", tier="crowd")
     dropped = metrics.values("lockstep_media_frames_dropped_total", "stream", stage="peer_busy")
-    return Counts(_whole(taken), _whole(thinned), sum(dropped.values()), received)
-
-
-def _whole(counts: dict[str, float]) -> dict[str, int]:
-    return {camera: int(count) for camera, count in counts.items()}
+    return Counts(
+        {camera: int(count) for camera, count in taken.items()},
+        {camera: int(count) for camera, count in thinned.items() if camera in taken},
+        sum(dropped.values()),
+        received,
+    )
 
 
 async def _settled(audiences: list[Running]) -> list[Received]:

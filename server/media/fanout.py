@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Protocol
 
+from server.loop_turns import turns_of_loop
 from server.media.frame import EncodedFrame
 
 __all__ = ["FanOut", "Target"]
@@ -39,7 +40,7 @@ class FanOut:
         self._clock = clock
         self._waiting: dict[Target, None] = {}  # observers with frames, in the order they are served
         self._order: deque[Target] = deque()
-        self._wake = asyncio.Event()
+        self._asked = False  # for a turn of the loop
         self._paced: dict[Target, None] = {}  # that wait for their pacers
         self._pace = asyncio.Event()
 
@@ -71,7 +72,7 @@ class FanOut:
         if target not in self._waiting:
             self._waiting[target] = None
             self._order.append(target)
-        self._wake.set()
+        self._ask()
 
     def forget(self, target: Target) -> None:
         """A target is gone."""
@@ -80,14 +81,17 @@ class FanOut:
             del self._waiting[target]
             self._order.remove(target)
 
-    async def run(self) -> None:
-        """Serve observers until cancelled, at most one slice in each turn of the loop."""
-        while True:
-            await self._wake.wait()
-            self._wake.clear()
-            while self._order:
-                self.serve()
-                await asyncio.sleep(0)  # everything that is ready goes first
+    def _ask(self) -> None:
+        if self._order and not self._asked:
+            self._asked = True
+            turns_of_loop().ask(self._take_turn)
+
+    def _take_turn(self) -> None:
+        self._asked = False
+        try:
+            self.serve()
+        finally:
+            self._ask()
 
     async def run_paced(self) -> None:
         """Come back to those whose pacers held packets back, until cancelled; the operator first, observers queue."""

@@ -11,7 +11,7 @@ from server.media.sent_history import SentFrame, SentHistory
 __all__ = ["PacketStream", "SenderStats", "StreamParameters"]
 
 RTP_HEADER = 12  # bytes
-REPORTS_KEPT = 8  # sender reports that an answer may name; over a satellite the newest is not the one
+REPORTS_KEPT = 16  # sender reports that an answer may name; over a satellite the newest is not the one
 FIRST_ROUND_TRIP = 0.1  # s, before one was measured
 NTP_EPOCH_OFFSET = 2_208_988_800  # s from 1900 to 1970
 RTCP_SR, RTCP_SDES, RTCP_BYE = 200, 202, 203

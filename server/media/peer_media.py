@@ -71,6 +71,11 @@ class PeerMedia:
         """Of RTCP; None before the first that was measured."""
         return self.quality.round_trip_ms
 
+    @property
+    def queues(self) -> bool:
+        """Whether packets waited on the path to this peer within the last minute."""
+        return self.quality.path.limited
+
     def report(self, report: Report, now: float) -> None:
         """Take the client's own report. `now` is on the monotonic clock."""
         self.quality.report(report, now)

@@ -101,7 +101,7 @@ class MediaPlane:
         self._stream_tasks = [loop.create_task(stream.run()) for stream in self._streams.values()]
         if not self._service_tasks:
             reports = SenderReports(lambda: list(self._peers))
-            services = (fan_out.run(), fan_out.run_paced(), reports.run(), self._quality.run())
+            services = (fan_out.run_paced(), reports.run(), self._quality.run())
             self._service_tasks = [loop.create_task(service) for service in services]
 
     def feed(self, media: Media, now: float) -> None:

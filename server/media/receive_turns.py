@@ -1,9 +1,10 @@
 """Observers' datagrams wait for their turn; operators and the robot never wait for them."""
 
-import asyncio
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
+
+from server.loop_turns import turns_of_loop
 
 __all__ = ["ReceiveTurns", "Waiting"]
 
@@ -37,7 +38,7 @@ class ReceiveTurns:
     def _schedule(self) -> None:
         if not self._is_scheduled:
             self._is_scheduled = True
-            asyncio.get_running_loop().call_soon(self._serve)
+            turns_of_loop().ask(self._serve)
 
     def _serve(self) -> None:
         self._is_scheduled = False

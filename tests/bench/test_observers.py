@@ -1,6 +1,7 @@
 import pytest
 
-from bench.sections.observers import Counts, missed_pictures
+from bench.sections.observers import Counts, counts_from, missed_pictures
+from bench.stack import Metrics
 
 
 def counts(taken: int, *received: int, thinned: int = 0) -> Counts:
@@ -23,6 +24,18 @@ def test_in_a_crowd_it_is_the_count_of_the_crowds_encoder_or_of_all_for_who_gets
 
 def test_a_crowd_that_was_there_before_counts_no_more() -> None:
     assert missed_pictures(counts(100, 0, thinned=50), counts(150, 50, thinned=50)) == [0]
+
+
+def test_a_crowds_sound_is_no_picture_that_it_could_miss() -> None:
+    metrics = Metrics(
+        """
+lockstep_media_pictures_taken_total{stream="overview"} 100.0
+lockstep_media_tier_frames_encoded_total{stream="overview",tier="crowd"} 50.0
+lockstep_media_tier_frames_encoded_total{stream="microphone",tier="crowd"} 17.0
+lockstep_media_frames_dropped_total{stage="peer_busy",stream="overview"} 2.0
+"""
+    )
+    assert counts_from(metrics, []) == Counts({"overview": 100}, {"overview": 50}, 2.0, [])
 
 
 def test_a_spell_without_pictures_proves_nothing() -> None:

@@ -1,4 +1,4 @@
-"""What feeds the repeat timer, and when commands are doubled: the table that the page runs too."""
+"""What feeds the repeat timer, and when commands are copied: the table that the page runs too."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ def command(pilot: Pilot, event: int, at: float, answer_after: float) -> list[fl
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
-def test_what_is_learnt_and_doubled_follows_the_shared_table(case: dict[str, Any]) -> None:
+def test_what_is_learnt_and_copied_follows_the_shared_table(case: dict[str, Any]) -> None:
     pilot = Pilot(CommandGate("feedback", 4, 0.0), [0.0])
     event = 1
     pilot.feedback(feedback(event), 0.0)

@@ -3,7 +3,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from client.command_gate import CommandGate
-from client.pilot import IDLE, Pilot
+from client.pilot import IDLE, TURN, Pilot
 from client.repeat_timer import INITIAL
 from client.rest_call import SETTLE
 from robot_bridge.protocol.messages import Command, Rest
@@ -64,6 +64,17 @@ def test_an_intention_that_came_while_another_was_in_flight_gets_an_event_of_its
     assert pilot.due(0.02) == [Command(event=3, issue=1, values=[0.5])]
     pilot.feedback(feedback(3), 0.04)
     assert [outcome.ticket for outcome in pilot.outcomes()] == [second]
+
+
+def test_who_waited_long_for_an_answer_has_time_to_say_what_comes_next() -> None:
+    pilot = new_pilot()
+    flying(pilot)
+    pilot.feedback(feedback(2), 3 * IDLE)
+    assert pilot.due(3 * IDLE) == []
+    pilot.intend([0.5], 3 * IDLE + 0.05)
+    assert pilot.due(3 * IDLE + 0.05) == [Command(event=3, issue=1, values=[0.5])]
+    pilot.feedback(feedback(3), 6 * IDLE)
+    assert pilot.due(6 * IDLE + TURN) == [Command(event=4, issue=1, values=NEUTRAL)]
 
 
 def test_without_a_new_intention_neutral_values_leave_five_times_a_second() -> None:

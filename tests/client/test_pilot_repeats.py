@@ -1,6 +1,6 @@
 """When the command in flight is repeated, and what is learnt from its answer."""
 
-from client.pilot import ECHO, LOSSY_SPELL, SALVO, SALVO_SPACING
+from client.pilot import ECHO, ECHOES, LOSSY_SPELL, SALVO, SALVO_SPACING
 from client.repeat_timer import FLOOR, INITIAL
 from tests.client.helpers import feedback
 from tests.client.pilots import FAST, commands, flying, new_pilot
@@ -45,31 +45,44 @@ def test_pings_stand_in_until_commands_are_known() -> None:
     assert pilot.timer.round_trip == known
 
 
-def test_after_a_loss_commands_are_doubled_for_a_while() -> None:
+def test_after_a_loss_commands_are_copied_until_their_answer_for_a_while() -> None:
     pilot = new_pilot()
     pilot.loss(0.0)
     command = flying(pilot)
     assert pilot.wake_at(0.0) == ECHO
-    assert pilot.due(ECHO) == [command]
-    assert pilot.due(2 * ECHO) == []
-    assert (pilot.echoes, pilot.repeats) == (1, 0)
-    pilot.feedback(feedback(2), 0.05)
-    assert pilot.timer.round_trip == 0.05
+    for copy in range(1, ECHOES + 1):
+        assert pilot.due((copy + 0.01) * ECHO) == [command]
+    assert pilot.wake_at(ECHOES * ECHO) == INITIAL
+    assert (pilot.echoes, pilot.repeats) == (ECHOES, 0)
+    pilot.feedback(feedback(2), 0.07)
+    assert pilot.timer.round_trip == 0.07
     flying(pilot, LOSSY_SPELL)
     assert pilot.due(LOSSY_SPELL + ECHO) == []
 
 
-def test_on_a_lossy_path_the_first_repeat_is_a_salvo_that_ends_with_the_answer() -> None:
+def test_the_answer_ends_the_copies() -> None:
     pilot = new_pilot()
     pilot.loss(0.0)
     command = flying(pilot)
-    pilot.due(ECHO)
+    assert pilot.due(1.01 * ECHO) == [command]
+    pilot.feedback(feedback(2), 1.5 * ECHO)
+    assert pilot.due(ECHOES * ECHO) == []
+    assert pilot.echoes == 1
+
+
+def test_on_a_lossy_path_each_repeat_is_a_salvo_that_ends_with_the_answer() -> None:
+    pilot = new_pilot()
+    pilot.loss(0.0)
+    command = flying(pilot)
+    pilot.due(4 * ECHO)
     assert pilot.due(INITIAL) == [command]
     assert pilot.wake_at(INITIAL) == INITIAL + SALVO_SPACING
     assert pilot.due(INITIAL + 2.5 * SALVO_SPACING) == [command] * 2
     assert pilot.due(INITIAL + 0.05) == [command] * (SALVO - 3)
     assert pilot.due(INITIAL + 0.09) == []
-    pilot.feedback(feedback(2), INITIAL + 0.09)
+    assert pilot.due(2 * INITIAL) == [command]
+    assert pilot.due(2 * INITIAL + 1.5 * SALVO_SPACING) == [command]
+    pilot.feedback(feedback(2), 2 * INITIAL + 2 * SALVO_SPACING)
     assert command not in pilot.due(5.0)
 
 

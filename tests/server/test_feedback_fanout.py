@@ -74,6 +74,18 @@ async def test_operators_are_served_at_once_and_observers_by_the_task() -> None:
     await asyncio.gather(task, return_exceptions=True)
 
 
+async def test_a_failure_of_ours_ends_the_task_which_is_run_again() -> None:
+    class Broken(FakePeer):
+        def send_feedback(self, text: str) -> None:
+            raise RuntimeError("a fault of ours")
+
+    fanout = FeedbackFanout(1000, list, lambda: [Broken()])
+    fanout.publish("a")
+    async with asyncio.timeout(5):
+        with pytest.raises(RuntimeError, match="a fault of ours"):
+            await fanout.run()
+
+
 async def test_an_observer_gets_the_newest_of_a_burst() -> None:
     observer = FakePeer()
     fanout = FeedbackFanout(50, list, lambda: [observer])

@@ -1,10 +1,11 @@
 import { gateState, type GateState, type Pacing } from "./core/command_gate";
 import { holdsSeat } from "./core/console_state";
+import { gateBlock, type GateBlock } from "./core/gate_block";
 import type { GateMode } from "./core/media_gate";
 import { meanGap, takeLag, type MediumCounts } from "./core/medium_counts";
 import { quantile, rateOf } from "./core/samples";
 import { staleness } from "./core/staleness";
-import { GATE_WORDS } from "./core/words";
+import { GATE_BLOCK_WORDS, GATE_WORDS } from "./core/words";
 import type { ConsoleApp } from "./console_app";
 import type { VideoStream } from "./media/video_stream";
 import type { SoundStream } from "./media/sound_stream";
@@ -41,7 +42,7 @@ export interface Statistics {
   readonly armed: boolean;
   readonly driving: boolean;
   readonly seat: { readonly holder: string; readonly name: string; readonly mine: boolean } | null;
-  readonly gate: { readonly state: GateState; readonly reason: string };
+  readonly gate: { readonly state: GateState | GateBlock; readonly reason: string };
   readonly pacing: Pacing;
   readonly tolerance: { readonly video: number; readonly audio: number };
   readonly gate_enabled: boolean;
@@ -71,7 +72,6 @@ export interface Statistics {
 export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statistics {
   const { state, driver, arming } = app;
   const now = performance.now();
-  const gate = driver === null ? "no_feedback" : gateState(driver.gate, now);
   const main = mainStream === null ? undefined : app.room.videos.get(mainStream);
   const { seat, settings } = state;
   return {
@@ -85,7 +85,7 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     armed: arming.state !== "disarmed",
     driving: arming.state === "driving",
     seat: seat === null ? null : { holder: seat.holder, name: seat.name, mine: holdsSeat(state) },
-    gate: { state: gate, reason: GATE_WORDS[gate] },
+    gate: gateOf(app, now),
     pacing: settings.pacing,
     tolerance: { ...settings.tolerance },
     gate_enabled: settings.gate === "event",
@@ -119,6 +119,13 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     pad: padOf(app),
     bad_messages: state.badMessages,
   };
+}
+
+function gateOf(app: ConsoleApp, now: number): Statistics["gate"] {
+  const block = gateBlock(app.state);
+  if (block !== null) return { state: block, reason: GATE_BLOCK_WORDS[block] };
+  const state = app.driver === null ? "no_feedback" : gateState(app.driver.gate, now);
+  return { state, reason: GATE_WORDS[state] };
 }
 
 function padOf(app: ConsoleApp): Statistics["pad"] {

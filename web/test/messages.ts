@@ -1,4 +1,4 @@
-import type { Axis, Feedback, Refusal, RobotDescription, Seat, Welcome } from "../src/wire";
+import type { Axis, Feedback, Refusal, RobotDescription, RobotState, Seat, Welcome } from "../src/wire";
 
 export function feedbackOf(event: number, rest: Partial<Feedback> = {}): Feedback {
   return {
@@ -48,6 +48,10 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     max_event_age: 2,
     max_event_rate: 25,
   };
+}
+
+export function robotOf(link: RobotState["link"], detail = ""): RobotState {
+  return { type: "robot", link, epoch: "e", description: descriptionOf([axisOf("x")]), detail };
 }
 
 export function welcomeOf(role: Welcome["role"]): Welcome {

@@ -26,12 +26,14 @@ const IDLE_INTERVAL_MS = 200;
 const REST_GIVE_UP_MS = 5000;
 /** A copy comes this much later: longer than the console's own path to the robot and back. */
 const ECHO_MS = 20;
-/** The first repeat on such a path: so many copies, until the answer. Losses come in a row. */
+/** So many at most, until the answer; with the command itself as many as a row of lost packets is long. */
+const ECHOES = 3;
+/** Each repeat on such a path: so many copies, until the answer. */
 const SALVO = 12;
 const SALVO_SPACING_MS = 3;
 /** With a shorter interval single repeats are as quick. */
 const SALVO_LEAST_MS = 50;
-/** To go on doubling after the last loss that was seen. */
+/** To go on copying after the last loss that was seen. */
 const LOSSY_SPELL_MS = 60_000;
 /** An answer within this part of a ping's round trip after the last repeat answers an earlier sending. */
 const NEEDLESS = 0.75;
@@ -50,9 +52,10 @@ export interface Intention {
 /**
  * Turns intentions into commands, rests and repeats of them. Holds no clock and no socket.
  *
- * While the path loses packets every command is sent twice: the copy covers the loss of the command and, being
- * answered from the stored feedback, the loss of the answer too. When both were lost, the first repeat comes
- * early and is a salvo: single repeats would wait out a row of lost packets one by one. On a clean path nothing is doubled.
+ * While the path loses packets every command is followed by copies until its answer: a copy covers the loss of the
+ * command and, being answered from the stored feedback, the loss of the answer too. When all were lost, the first
+ * repeat comes early, and each repeat is a salvo: single repeats would wait out a row of lost packets one by one. On a
+ * clean path nothing is copied.
  */
 export interface Driver {
   readonly gate: CommandGate;
@@ -120,7 +123,7 @@ export function driverFeedback(
  * repeat would come too soon for ever on a path longer than the interval, so a repeat that was needless still counts.
  */
 function landed(driver: Driver, issue: number, takenMs: number, now: number): void {
-  // An echo makes a sample at most ECHO_MS too long, which is the safe side.
+  // Echoes make a sample too long at times, which is the safe side.
   const soonest = driver.pings.length > 0 ? NEEDLESS * Math.min(...driver.pings) : NEEDLESS_BLIND * takenMs;
   const answers = driver.sends === 1 || now - driver.lastSentMs < soonest;
   // A later issue of this feedback came by itself, not as an answer.
@@ -231,16 +234,20 @@ function noteSending(driver: Driver, sends: number, now: number): void {
   if (now < driver.lossyUntilMs) {
     const earlyMs = earlyInterval(driver.repeat);
     if (sends === 1) {
-      driver.echoesLeft = 1;
+      driver.echoesLeft = ECHOES;
       if (earlyMs >= SALVO_LEAST_MS) driver.repeatAtMs = now + Math.max(least, earlyMs);
-    } else if (sends === 2 && waitMs >= SALVO_LEAST_MS) driver.echoesLeft = SALVO - 1;
+    } else if (waitMs >= SALVO_LEAST_MS) driver.echoesLeft = SALVO - 1;
   }
-  driver.echoAtMs = driver.echoesLeft === 0 ? Infinity : now + (sends === 1 ? ECHO_MS : SALVO_SPACING_MS);
+  driver.echoAtMs = driver.echoesLeft === 0 ? Infinity : now + echoSpacing(driver);
 }
 
 function noteEcho(driver: Driver): void {
   driver.echoesLeft -= 1;
-  driver.echoAtMs = driver.echoesLeft === 0 ? Infinity : driver.echoAtMs + SALVO_SPACING_MS;
+  driver.echoAtMs = driver.echoesLeft === 0 ? Infinity : driver.echoAtMs + echoSpacing(driver);
+}
+
+function echoSpacing(driver: Driver): number {
+  return driver.sends === 1 ? ECHO_MS : SALVO_SPACING_MS;
 }
 
 function knowsFewCommands(driver: Driver): boolean {

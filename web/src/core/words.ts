@@ -1,6 +1,7 @@
 import type { Refusal } from "../wire";
 import type { ArmRefusal, DisarmReason } from "./arming";
 import type { GateState } from "./command_gate";
+import type { GateBlock } from "./gate_block";
 
 type RefusalReason = Refusal["reason"];
 
@@ -28,6 +29,13 @@ export const GATE_WORDS: Readonly<Record<GateState, string>> = {
   in_flight: "Waiting for the robot's answer",
   rate: "Keeping to the robot's event rate",
   picture: "Waiting for a fresh picture",
+};
+
+export const GATE_BLOCK_WORDS: Readonly<Record<GateBlock, string>> = {
+  not_connected: "Not connected",
+  robot_down: "The robot cannot be reached",
+  stopped: "The robot is stopped",
+  no_seat: "The control seat is not yours",
 };
 
 export const ARM_REFUSAL_WORDS: Readonly<Record<ArmRefusal, string>> = {

@@ -1,7 +1,8 @@
 import { gateState } from "../core/command_gate";
-import { holdsSeat, isOperator, robotIsUp } from "../core/console_state";
+import { holdsSeat, isOperator } from "../core/console_state";
+import { gateBlock } from "../core/gate_block";
 import { rateOf } from "../core/samples";
-import { GATE_WORDS } from "../core/words";
+import { GATE_BLOCK_WORDS, GATE_WORDS } from "../core/words";
 import type { ConsoleApp } from "../console_app";
 import { grouped, h, setData, setText, type Panel } from "./dom";
 
@@ -29,24 +30,23 @@ export function createEventPanel(app: ConsoleApp): Panel {
     update(now) {
       const found = app.driver === null ? "no_feedback" : gateState(app.driver.gate, now);
       if (found === "open" || found === "rate") openMs = now;
-      const blocked = blockedWords(app);
+      const blocked = gateBlock(app.state);
       const flows = blocked === null && now - openMs < STEADY_MS;
       setText(number, app.state.feedback === null ? "–" : grouped(app.state.feedback.event));
       setText(rate, `${rateOf(app.events, now).toFixed(1)} /s`);
       const watches = app.state.welcome !== null && !isOperator(app.state) && !holdsSeat(app.state);
       setData(gate, "tone", watches ? "off" : flows ? "good" : "wait");
       setText(state, watches ? "Watching" : flows ? "Gate open" : "Gate shut");
-      setText(words, watches ? driverWords(app) : (blocked ?? GATE_WORDS[flows ? "open" : found]));
+      setText(
+        words,
+        watches
+          ? driverWords(app)
+          : blocked === null
+            ? GATE_WORDS[flows ? "open" : found]
+            : GATE_BLOCK_WORDS[blocked],
+      );
     },
   };
-}
-
-/** What shuts the gate before its own rule is asked; null when nothing does. */
-function blockedWords(app: ConsoleApp): string | null {
-  if (app.state.welcome === null) return "Not connected";
-  if (!robotIsUp(app.state)) return "The robot cannot be reached";
-  if (app.state.stop.stopped) return "The robot is stopped";
-  return holdsSeat(app.state) ? null : "The control seat is not yours";
 }
 
 function driverWords(app: ConsoleApp): string {

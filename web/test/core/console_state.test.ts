@@ -8,15 +8,7 @@ import {
   note,
   robotIsUp,
 } from "../../src/core/console_state";
-import { axisOf, descriptionOf, feedbackOf, refusalOf, seatOf, welcomeOf } from "../messages";
-
-const robot = {
-  type: "robot",
-  link: "up",
-  epoch: "e",
-  description: descriptionOf([axisOf("x")]),
-  detail: "",
-} as const;
+import { feedbackOf, refusalOf, robotOf, seatOf, welcomeOf } from "../messages";
 
 describe("the console's state", () => {
   it("knows who we are and whether we may drive", () => {
@@ -24,10 +16,10 @@ describe("the console's state", () => {
     expect([isOperator(state), holdsSeat(state), robotIsUp(state)]).toEqual([false, false, false]);
     applyMessage(state, welcomeOf("operator"), 0);
     applyMessage(state, seatOf("me", "somebody"), 0);
-    applyMessage(state, robot, 0);
+    applyMessage(state, robotOf("up"), 0);
     expect([isOperator(state), holdsSeat(state), robotIsUp(state)]).toEqual([true, true, true]);
     applyMessage(state, seatOf("", ""), 0);
-    applyMessage(state, { ...robot, link: "down", detail: "silent" }, 0);
+    applyMessage(state, robotOf("down", "silent"), 0);
     expect([holdsSeat(state), robotIsUp(state)]).toEqual([false, false]);
     expect(state.log.map((line) => line.level)).toContain("error");
   });

@@ -55,16 +55,18 @@ describe("commands", () => {
     expect(driverStep(driver, MOVING, true, 200)).toHaveLength(1);
   });
 
-  it("are sent twice on a lossy path, and then as a salvo that ends with the answer", () => {
+  it("are copied three times on a lossy path, and then as salvos that end with the answer", () => {
     driverLoss(driver, 0);
     const sent = driverStep(driver, MOVING, true, 0);
-    expect(driverStep(driver, MOVING, true, 20)).toEqual(sent);
+    for (const copyMs of [20, 40, 60]) expect(driverStep(driver, MOVING, true, copyMs)).toEqual(sent);
     expect(driverStep(driver, MOVING, true, 99)).toEqual([]);
     expect(driverStep(driver, MOVING, true, 100)).toEqual(sent);
     expect(driverStep(driver, MOVING, true, 107)).toHaveLength(2);
     expect(driverStep(driver, MOVING, true, 180)).toHaveLength(9);
     expect(driverStep(driver, MOVING, true, 199)).toEqual([]);
-    driverFeedback(driver, feedbackOf(2), true, 199);
+    expect(driverStep(driver, MOVING, true, 200)).toEqual(sent);
+    expect(driverStep(driver, MOVING, true, 207)).toHaveLength(2);
+    driverFeedback(driver, feedbackOf(2), true, 208);
     expect(commands(driverStep(driver, DISARMED, true, 500))).toEqual([]);
   });
 

@@ -1,0 +1,43 @@
+import { describe, expect, it } from "vitest";
+import { applyMessage, createConsoleState, forgetConnection } from "../../src/core/console_state";
+import { gateBlock } from "../../src/core/gate_block";
+import { feedbackOf, robotOf, seatOf, welcomeOf } from "../messages";
+
+function driving(): ReturnType<typeof createConsoleState> {
+  const state = createConsoleState();
+  applyMessage(state, welcomeOf("operator"), 0);
+  applyMessage(state, robotOf("up"), 0);
+  applyMessage(state, seatOf("me", "somebody"), 0);
+  return state;
+}
+
+describe("the gate", () => {
+  it("is left to its own rule for who holds the seat of a robot that can be reached", () => {
+    expect(gateBlock(driving())).toBeNull();
+  });
+
+  it("is shut before that without a connection", () => {
+    const state = driving();
+    forgetConnection(state);
+    expect(gateBlock(state)).toBe("not_connected");
+  });
+
+  it("is shut while the robot cannot be reached, whatever else holds", () => {
+    const state = driving();
+    applyMessage(state, feedbackOf(5, { stop: { stopped: true, by: "Ada", reason: "test" } }), 0);
+    applyMessage(state, robotOf("down", "silent"), 0);
+    expect(gateBlock(state)).toBe("robot_down");
+  });
+
+  it("is shut while the robot is stopped", () => {
+    const state = driving();
+    applyMessage(state, feedbackOf(5, { stop: { stopped: true, by: "Ada", reason: "test" } }), 0);
+    expect(gateBlock(state)).toBe("stopped");
+  });
+
+  it("is shut for who does not hold the seat", () => {
+    const state = driving();
+    applyMessage(state, seatOf("other", "Ada"), 0);
+    expect(gateBlock(state)).toBe("no_seat");
+  });
+});
