@@ -266,10 +266,11 @@ class Bridge:
             measured = measured._replace(faults=[*measured.faults, *self._source_faults, *blind])
         measured = measured._replace(at_rest=measured.at_rest and self._shaper.at_rest)
         feedback = self._core.issue(measured, now, sorted(self._acted | self._acting), unknown)
-        self._times.changed(feedback.event, feedback.time)
+        measured_by = time.monotonic()  # what was captured before may show less than this feedback says
+        self._times.changed(feedback.event, measured_by)
         self._acted.clear()
         self.counters.issued += 1
-        self._record("feedback", feedback.event, issue=feedback.issue, at_rest=feedback.at_rest)
+        self._record_at(measured_by, "feedback", feedback.event, issue=feedback.issue, at_rest=feedback.at_rest)
         self._links.publish_feedback(feedback)
 
     def _note_limits(self, acting: frozenset[str]) -> None:
@@ -321,8 +322,13 @@ class Bridge:
         )
 
     def _record(self, kind: EventKind, event: int, **fields: str | float | bool | list[float] | list[str]) -> None:
+        self._record_at(time.monotonic(), kind, event, **fields)
+
+    def _record_at(
+        self, now: float, kind: EventKind, event: int, **fields: str | float | bool | list[float] | list[str]
+    ) -> None:
         if self._log is not None:
-            self._log.record(kind, time.monotonic(), event, **fields)
+            self._log.record(kind, now, event, **fields)
 
 
 class _Stamper:

@@ -57,7 +57,8 @@ async def test_a_drive_ends_with_its_console_and_says_when() -> None:
     async with running_console("planar", quality=True) as stack:
 
         async def kill_once_it_drives() -> None:
-            while b'"executed"' not in stack.bridge.event_log.read_bytes():  # noqa: ASYNC110
+            # Each command waits for the answer to the last, so that the third shows two answers at the operator's.
+            while stack.bridge.event_log.read_bytes().count(b'"executed"') < 3:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
             await stack.console.kill()
 

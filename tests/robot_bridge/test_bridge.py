@@ -4,8 +4,9 @@ import asyncio
 import logging
 import signal
 import sys
+import time
 from pathlib import Path
-from typing import cast
+from typing import ClassVar, cast
 
 import msgspec
 import pytest
@@ -24,8 +25,8 @@ from robot_bridge.protocol.messages import (
     Rest,
     Stop,
 )
-from robot_bridge.protocol.serial import MAX_EVENT
-from robot_bridge.robots.base import Measurement, MediaSource
+from robot_bridge.protocol.serial import FIRST_EVENT, MAX_EVENT
+from robot_bridge.robots.base import Measurement, MediaSource, Stamper
 from robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import (
     DRIVE,
@@ -222,6 +223,41 @@ async def test_media_are_stamped_with_the_event_that_held(tmp_path: Path) -> Non
     for medium in received.values():
         assert captured[medium.stream, medium.time] == medium.stamp
         assert medium.stamp == max(event for when, event in issued if when <= medium.time)
+
+
+async def test_what_is_captured_before_a_feedback_is_measured_belongs_to_the_event_before(tmp_path: Path) -> None:
+    """A camera of another process has a clock and no turn: it may capture between the tick and its feedback."""
+    log = tmp_path / "events.jsonl"
+
+    class Keeping(MediaSource):
+        async def run(self, stamp: Stamper, emit: object) -> None:
+            self.stamp = stamp
+
+    class MeasuredRobot(RecordingRobot):
+        source = Keeping()
+        measured_at: ClassVar[list[float]] = []
+
+        def measure(self) -> Measurement:
+            self.measured_at.append(time.monotonic())
+            return super().measure()
+
+        def sources(self) -> list[MediaSource]:
+            return [self.source]
+
+    robot = MeasuredRobot()
+    async with running_bridge(robot, event_log=log) as bridge, operator(bridge) as driver:
+        for _ in range(10):
+            await driver.drive()
+    newest = FIRST_EVENT
+    for line, measured_at in zip(log_lines(log, "feedback"), robot.measured_at, strict=True):
+        event = int(str(line["event"]))
+        if event != newest:
+            shown = robot.source.stamp.at(measured_at)
+            assert shown is not None
+            assert shown.event == newest
+            assert float(str(line["time"])) > measured_at
+        newest = event
+    assert newest >= FIRST_EVENT + 10
 
 
 async def test_the_counters_are_logged_at_intervals(caplog: pytest.LogCaptureFixture) -> None:

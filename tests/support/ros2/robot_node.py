@@ -134,8 +134,9 @@ class RobotNode(Node):  # type: ignore[misc]
     def _send(self, topic: str, make: Any) -> None:
         if topic in self._hushed:
             return
-        self._captured = time.monotonic()
-        message = self._frozen.get(topic) or make(self.get_clock().now().to_msg(), topic in self._spoilt)
+        stamp = self.get_clock().now().to_msg()
+        self._captured = time.monotonic()  # no sooner than the stamp says, or a pause between them would be its lie
+        message = self._frozen.get(topic) or make(stamp, topic in self._spoilt)
         self._spoilt.discard(topic)
         if topic in self._frozen:
             self._frozen[topic] = message
