@@ -4,6 +4,7 @@ import asyncio
 import ssl
 import time
 from collections import Counter
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -56,6 +57,8 @@ class RobotLink:
         self._media: MediaOutbox[Media] = MediaOutbox()
         self._news = asyncio.Event()
         self._ticker: asyncio.TimerHandle | None = None
+        self._take: Callable[[LinkMessage], None] | None = None  # None: messages wait for who iterates
+        self._failure: Exception | None = None  # that it raised
         self._closed = False
 
     @property
@@ -115,16 +118,41 @@ class RobotLink:
             raise self._error()
         self._transport.send(message)
 
+    def fileno(self) -> int:
+        """Of the socket, so that others can see whether something has come; -1 without one (select(2))."""
+        return self._transport.fileno()
+
+    async def deliver(self, take: Callable[[LinkMessage], None]) -> None:
+        """Hand each message to `take` as it comes, within its turn of the event loop, until `close`.
+
+        Who iterates gets it a turn or two later. Nothing waits for a reader then, and nothing is dropped.
+
+        Raises:
+            LinkError: the link broke.
+            Exception: what `take` raised; nothing was handed over after that.
+        """
+        self._take = take
+        try:
+            while self._take is not None and (waits := self._oldest()) is not None:
+                self._hand_over(take, waits)
+            while not self._closed and self._session.ended is None and self._failure is None:
+                self._news.clear()
+                await self._news.wait()
+        finally:
+            self._take = None
+        if self._failure is not None:
+            raise self._failure
+        if not self._closed:
+            raise self._error()
+
     def __aiter__(self) -> Self:
         return self
 
     async def __anext__(self) -> LinkMessage:
         while True:
-            if self._inbox:
-                return self._inbox.pop(next(iter(self._inbox)))
-            media = self._media.pop()
-            if media is not None:
-                return media
+            message = self._oldest()
+            if message is not None:
+                return message
             if self._closed:
                 raise StopAsyncIteration
             if self._session.ended is not None:
@@ -160,9 +188,24 @@ class RobotLink:
         if self._session.ended is None:
             self._ticker = asyncio.get_running_loop().call_later(TICK_INTERVAL, self._tick)
 
+    def _oldest(self) -> LinkMessage | None:
+        """Of those that wait; media last."""
+        return self._inbox.pop(next(iter(self._inbox))) if self._inbox else self._media.pop()
+
+    def _hand_over(self, take: Callable[[LinkMessage], None], message: LinkMessage) -> None:
+        try:
+            take(message)
+        except Exception as error:
+            self._failure = error
+            self._take = None
+            self._news.set()
+
     def _received(self, event: LinkMessage | BadInput) -> None:
         if isinstance(event, BadInput):
             self.bad_input[event.name] += 1
+        elif self._take is not None and not isinstance(event, Hello):
+            self._hand_over(self._take, event)
+            return
         elif isinstance(event, Media):
             self._media.put(event, lambda: event)
         elif not isinstance(event, Hello):

@@ -69,6 +69,11 @@ class LinkTransport(asyncio.Protocol):
         else:
             self._transport.write(make())
 
+    def fileno(self) -> int:
+        """Of the socket; -1 without one."""
+        tcp = None if self._transport is None else self._transport.get_extra_info("socket")
+        return -1 if tcp is None else cast(int, tcp.fileno())
+
     def tick(self) -> None:
         """Heartbeats, silence, peers that do not read, closes that hang."""
         now = self._clock()

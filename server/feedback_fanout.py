@@ -15,7 +15,6 @@ from server.loop_turns import turns_of_loop
 
 __all__ = ["FeedbackFanout", "FeedbackPace", "FeedbackReceiver"]
 
-SLICE = 2  # observers served in one turn of the loop
 FULL_RATE = 50  # observers that are served at the full rate
 LEAST_RATE = 0.5  # of the full rate
 
@@ -90,22 +89,25 @@ class FeedbackFanout:
                     await self._serve(text)
 
     async def _serve(self, text: str) -> None:
+        turns = turns_of_loop()
         waiting = deque(self._observers())
         self._pace.share(len(waiting))
         served = asyncio.get_running_loop().create_future()
 
         def serve_some() -> None:
             try:
-                for _ in range(min(SLICE, len(waiting))):
+                while waiting:
                     waiting.popleft().send_feedback(text)
+                    if turns.is_over():
+                        break
             except Exception as error:
                 if not served.done():
                     served.set_exception(error)
                 return
             if waiting and not served.done():
-                turns_of_loop().ask(serve_some)
+                turns.ask(serve_some)
             elif not served.done():
                 served.set_result(None)
 
-        turns_of_loop().ask(serve_some)
+        turns.ask(serve_some)
         await served

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections import Counter
+from functools import partial
 from typing import Protocol
 
 import structlog
@@ -12,6 +13,7 @@ from robot_bridge.protocol.errors import LinkError, LinkLost
 from robot_bridge.protocol.messages import LinkMessage, LinkRole
 from server.backoff import Backoff
 from server.link_access import LinkAccess
+from server.loop_turns import turns_of_loop
 
 __all__ = ["LinkKeeper", "LinkSink"]
 
@@ -82,8 +84,8 @@ class LinkKeeper:
             self._link = link
             try:
                 self._sink.link_opened(self._role, hello.epoch, hello.description)
-                async for message in link:
-                    self._sink.link_received(self._role, message)
+                turns_of_loop().yield_to(link)
+                await link.deliver(partial(self._sink.link_received, self._role))
             finally:
                 self._link = None
                 self._bad_input += link.bad_input

@@ -60,7 +60,7 @@ class AudioStream(Stream[SoundJob]):
             self._waiting.popleft()
             self._drop("encoder_busy")
         self._waiting.append((media, capture_time))
-        self._wake.set()
+        self._begin_next()
 
     def _next_job(self) -> SoundJob | None:
         if not self._waiting:

@@ -1,11 +1,11 @@
-"""Who is served when: the operator at once, observers in bounded slices of the event loop."""
+"""Who is served when: the operator at once, observers in their turns of the event loop."""
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Protocol
 
-from server.loop_turns import turns_of_loop
+from server.loop_turns import LoopTurns
 from server.media.frame import EncodedFrame
 
 __all__ = ["FanOut", "Target"]
@@ -35,9 +35,8 @@ class Target(Protocol):
 class FanOut:
     """Sends frames to targets. A slow target only fills its own outbox; an observer never delays the operator."""
 
-    def __init__(self, slice_seconds: float, clock: Callable[[], float]) -> None:
-        self._slice = slice_seconds
-        self._clock = clock
+    def __init__(self, turns: LoopTurns) -> None:
+        self._turns = turns
         self._waiting: dict[Target, None] = {}  # observers with frames, in the order they are served
         self._order: deque[Target] = deque()
         self._asked = False  # for a turn of the loop
@@ -84,7 +83,7 @@ class FanOut:
     def _ask(self) -> None:
         if self._order and not self._asked:
             self._asked = True
-            turns_of_loop().ask(self._take_turn)
+            self._turns.ask(self._take_turn)
 
     def _take_turn(self) -> None:
         self._asked = False
@@ -109,8 +108,7 @@ class FanOut:
                         self._enqueue(target)
 
     def serve(self) -> None:
-        """Serve observers in turn, one frame each, for one slice."""
-        deadline = self._clock() + self._slice
+        """Serve observers in turn, one frame each, until the slice is over."""
         while self._order:
             target = self._order.popleft()
             if target.send_next():
@@ -119,5 +117,5 @@ class FanOut:
                 del self._waiting[target]
                 if target.paced:
                     self.pace(target)
-            if self._clock() >= deadline:
+            if self._turns.is_over():
                 return

@@ -13,6 +13,7 @@ from robot_bridge.protocol.carriers import Carrier
 from robot_bridge.protocol.console import StreamInfo, StreamOffer
 from robot_bridge.protocol.description import Camera, Microphone, RobotDescription
 from robot_bridge.protocol.messages import Media
+from server.loop_turns import turns_of_loop
 from server.media.aiortc_private import (
     MediaSender,
     install_sender,
@@ -73,9 +74,12 @@ class MediaPlane:
         self._metrics = MediaMetrics(metrics_registry)
         self._wall_clock = wall_clock
         self._capture_clock = CaptureClock()
-        self._fan_out = FanOut(settings.slice_seconds, time.perf_counter)
-        self._turns = ReceiveTurns(time.perf_counter)
-        self._quality = QualityDesk(settings, QualityMetrics(metrics_registry))
+        self._loop_turns = turns_of_loop()
+        self._fan_out = FanOut(self._loop_turns)
+        self._turns = ReceiveTurns(self._loop_turns)
+        self._quality = QualityDesk(
+            settings, QualityMetrics(metrics_registry), busy_seconds=lambda: self._loop_turns.busy_seconds
+        )
         self._streams: dict[str, AnyStream] = {}
         self._peers: dict[PeerMedia, None] = {}  # an ordered set
         self._stream_tasks: list[asyncio.Task[None]] = []
@@ -289,7 +293,8 @@ class MediaPlane:
         return spec is not None and spec.passing and spec.size is None
 
     def _guard(self, pc: RTCPeerConnection, turns: ReceiveTurns | None) -> None:
-        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc(), turns)
+        on_socket = self._loop_turns.yield_to if turns is None else None
+        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc(), turns, on_socket)
 
     def _peer_quality(self, pc: RTCPeerConnection, priority: bool) -> PeerQuality:
         cameras = min(

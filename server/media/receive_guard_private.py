@@ -6,6 +6,7 @@ aiortc and aioice have no public hooks for that. What is used and why:
 - `RTCDtlsTransport._state`, `.__handshake_done`, `._ssl`, `._write_ssl`, `._rx_srtp`, `._handle_rtcp_data`,
   `._data_receiver`: what `_recv_next` does with a datagram
 - `aioice.Connection._queue`: the receive queue, which has no bound
+- `aioice.Connection._nominated`: the pair of candidates in use, whose socket slices of observers' work end for
 - `RTCRtpReceiver.__remote_bitrate_estimator`: a third of a megabyte of small objects for each picture stream, on which
   nothing of ours depends: the console receives no pictures. A peer that left waits with it for the garbage collector
 """
@@ -21,6 +22,7 @@ from aiortc.rtcdtlstransport import RTCDtlsTransport, State
 from aiortc.rtp import is_rtcp
 from OpenSSL import SSL
 
+from server.loop_turns import HasFileno
 from server.media.receive_turns import ReceiveTurns
 from server.run_now import run_now
 
@@ -41,11 +43,19 @@ class _Intake(asyncio.Queue[Any]):
     further on, is dropped and counted.
     """
 
-    def __init__(self, dtls: Any, on_error: Callable[[str], None], turns: ReceiveTurns | None) -> None:
+    def __init__(
+        self,
+        dtls: Any,
+        on_error: Callable[[str], None],
+        turns: ReceiveTurns | None,
+        on_socket: Callable[[HasFileno], None] | None = None,
+    ) -> None:
         super().__init__()
         self._dtls = dtls
         self._on_error = on_error
         self._turns = turns  # None: everything at once
+        self._on_socket = on_socket
+        self._pair: Any = None  # of candidates, whose socket was told last
         self._later: deque[bytes] = deque()  # what waits for its turn
         self._awaited = False
 
@@ -57,6 +67,8 @@ class _Intake(asyncio.Queue[Any]):
             self._awaited = False
 
     def put_nowait(self, item: tuple[bytes, int] | None) -> None:
+        if self._on_socket is not None:
+            self._tell_socket(self._on_socket)
         if item is None:
             super().put_nowait(None)
         elif not 0 < len(item[0]) <= DATAGRAM_MAX:
@@ -77,6 +89,14 @@ class _Intake(asyncio.Queue[Any]):
         if self._dtls._state is State.CONNECTED and not self._handled(data):
             super().put_nowait((data, COMPONENT))
         return bool(self._later)
+
+    def _tell_socket(self, on_socket: Callable[[HasFileno], None]) -> None:
+        pair = self._dtls.transport._connection._nominated.get(COMPONENT)
+        if pair is not self._pair:
+            self._pair = pair
+            socket = None if pair is None else pair.protocol.transport.get_extra_info("socket")
+            if socket is not None:  # a relay's transport has none
+                on_socket(socket)
 
     def _is_idle(self) -> bool:
         """Whether DTLS is connected, and waits for just this datagram."""
@@ -116,10 +136,16 @@ class _Intake(asyncio.Queue[Any]):
             run_now(dtls._data_receiver._handle_data(record))
 
 
-def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None], turns: ReceiveTurns | None = None) -> None:
+def guard_transports(
+    pc: RTCPeerConnection,
+    on_error: Callable[[str], None],
+    turns: ReceiveTurns | None = None,
+    on_socket: Callable[[HasFileno], None] | None = None,
+) -> None:
     """Keep what a peer sends from ending its connection or filling memory; `on_error` gets a stable name to count.
 
-    With `turns` its datagrams are handled in its turn, without at once.
+    With `turns` its datagrams are handled in its turn, without at once. `on_socket` gets the socket by which they come,
+    and another one when that has changed.
 
     Call after setRemoteDescription, when the transports exist. Calling it again changes nothing.
     """
@@ -129,7 +155,7 @@ def guard_transports(pc: RTCPeerConnection, on_error: Callable[[str], None], tur
     if pc.sctp is not None:
         transports.add(pc.sctp.transport)
     for transport in transports:
-        _guard_transport(transport, on_error, turns)
+        _guard_transport(transport, on_error, turns, on_socket)
 
 
 def _estimate_nothing(receiver: RTCRtpReceiver) -> None:
@@ -138,13 +164,18 @@ def _estimate_nothing(receiver: RTCRtpReceiver) -> None:
     setattr(receiver, ESTIMATOR, None)
 
 
-def _guard_transport(dtls: RTCDtlsTransport, on_error: Callable[[str], None], turns: ReceiveTurns | None) -> None:
+def _guard_transport(
+    dtls: RTCDtlsTransport,
+    on_error: Callable[[str], None],
+    turns: ReceiveTurns | None,
+    on_socket: Callable[[HasFileno], None] | None,
+) -> None:
     connection = dtls.transport._connection
     if isinstance(connection._queue, _Intake):
         return
     if not hasattr(dtls, HANDSHAKE_DONE):
         raise RuntimeError("aiortc moved __handshake_done; see server/media/receive_guard_private.py")
-    connection._queue = _Intake(dtls, on_error, turns)
+    connection._queue = _Intake(dtls, on_error, turns, on_socket)
     receive = dtls._recv_next
 
     async def guarded() -> None:

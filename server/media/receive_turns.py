@@ -1,14 +1,11 @@
 """Observers' datagrams wait for their turn; operators and the robot never wait for them."""
 
 from collections import deque
-from collections.abc import Callable
 from typing import Protocol
 
-from server.loop_turns import turns_of_loop
+from server.loop_turns import LoopTurns
 
 __all__ = ["ReceiveTurns", "Waiting"]
-
-SLICE = 0.00025  # s; each of the operator's messages waits for one or two of them
 
 
 class Waiting(Protocol):
@@ -21,9 +18,8 @@ class Waiting(Protocol):
 class ReceiveTurns:
     """One datagram of each in turn, for at most a slice in each turn of the loop: who floods waits for himself."""
 
-    def __init__(self, clock: Callable[[], float], slice_seconds: float = SLICE) -> None:
-        self._clock = clock
-        self._slice = slice_seconds
+    def __init__(self, turns: LoopTurns) -> None:
+        self._turns = turns
         self._order: deque[Waiting] = deque()
         self._waiting: set[Waiting] = set()
         self._is_scheduled = False
@@ -38,18 +34,17 @@ class ReceiveTurns:
     def _schedule(self) -> None:
         if not self._is_scheduled:
             self._is_scheduled = True
-            turns_of_loop().ask(self._serve)
+            self._turns.ask(self._serve)
 
     def _serve(self) -> None:
         self._is_scheduled = False
-        deadline = self._clock() + self._slice
         while self._order:
             waiting = self._order.popleft()
             if waiting.handle_next():
                 self._order.append(waiting)
             else:
                 self._waiting.discard(waiting)
-            if self._clock() >= deadline:
+            if self._turns.is_over():
                 break
         if self._order:
             self._schedule()

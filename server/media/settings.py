@@ -21,6 +21,5 @@ class MediaSettings(BaseModel):
     sound_codecs: tuple[Literal["opus", "PCMU"], ...] = Field(default=("opus", "PCMU"), min_length=1)  # answered
     opus_bitrate_bps: int = Field(default=32_000, ge=6_000, le=256_000)
     opus_packet_loss_percent: int = Field(default=10, ge=0, le=100)  # in-band FEC is sized for it at first
-    slice_seconds: float = Field(default=0.0005, gt=0.0, le=0.05)  # of a turn, for observers' pictures
     video_queue_frames: int = Field(default=6, ge=1, le=100)  # pictures that may wait for one peer
     audio_queue_frames: int = Field(default=10, ge=1, le=100)  # sound packets that may wait for one peer

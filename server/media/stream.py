@@ -5,11 +5,13 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Generic, Literal, TypeVar
 
 from robot_bridge.protocol.messages import Media
 from robot_bridge.protocol.serial import event_gap
 from robot_bridge.thread_name import name_thread
+from server.loop_turns import LoopTurns, turns_of_loop
 from server.media.errors import MediaError
 from server.media.fanout import FanOut
 from server.media.frame import EncodedFrame
@@ -66,7 +68,8 @@ class Stream(ABC, Generic[Job]):
         self._metrics = metrics
         self._last_stamp: int | None = None
         self._reported = False  # that the worker failed
-        self._wake = asyncio.Event()
+        self._works = False  # the worker
+        self._turns: LoopTurns | None = None  # None: not running
         self._thread = ThreadPoolExecutor(
             1, thread_name_prefix=f"media-{name}", initializer=name_thread, initargs=(f"media-{name}",)
         )
@@ -186,25 +189,44 @@ class Stream(ABC, Generic[Job]):
 
     async def run(self) -> None:
         """Encode until cancelled."""
-        loop = asyncio.get_running_loop()
+        self._turns = turns_of_loop()
         try:
-            while True:
-                await self._wake.wait()
-                self._wake.clear()
-                while (job := self._next_job()) is not None:
-                    try:
-                        results = await loop.run_in_executor(self._thread, self._work, job)
-                    except Exception:  # a codec library did what it never should; the stream must go on
-                        self._failed()
-                        continue
-                    for encoded in results:
-                        self._finish(encoded)
+            self._begin_next()
+            await asyncio.get_running_loop().create_future()
         finally:
+            self._turns = None
             await asyncio.to_thread(self._thread.shutdown)
 
-    def _failed(self) -> None:
+    def _begin_next(self) -> None:
+        """Give the worker what it does next, unless it has something to do."""
+        if self._turns is not None and not self._works and (job := self._next_job()) is not None:
+            self._works = True
+            self._thread.submit(self._work_and_tell, job, self._turns)
+
+    def _work_and_tell(self, job: Job, turns: LoopTurns) -> None:
+        """In the thread. What it made goes out at once: it does not wait for a task to have its turn."""
+        try:
+            tell = partial(self._worked, self._work(job))
+        except Exception as error:  # a codec library did what it never should; the stream must go on
+            tell = partial(self._worked, (), error)
+        turns.call_from_thread(tell)
+
+    def _worked(self, results: Sequence[Encoded], error: Exception | None = None) -> None:
+        self._works = False
+        if self._turns is None:  # ended meanwhile
+            return
+        try:
+            if error is not None:
+                self._failed(error)
+            for encoded in results:
+                self._finish(encoded)
+        finally:
+            self._begin_next()
+
+    def _failed(self, error: Exception) -> None:
         if not self._reported:
-            logger.exception("stream %s: the worker failed; further failures are only counted", self.name)
+            text = "stream %s: the worker failed; further failures are only counted"
+            logger.error(text, self.name, exc_info=error)
         self._reported = True
         self._drop("worker_failed")
         for output in self._outputs.values():

@@ -129,7 +129,7 @@ class VideoStream(Stream[PictureJob]):
         if self._newest is not None:
             self._drop("encoder_busy")
         self._newest = media, now, capture_time
-        self._wake.set()
+        self._begin_next()
 
     def _take_h264(self, media: Media, capture_time: float) -> None:
         """A picture that the camera encoded: for those who get it as it is, and kept for the decoder."""

@@ -134,6 +134,71 @@ async def test_messages_before_the_end_are_read_and_then_the_reason_is_raised() 
             link.send(Rest(event=1))
 
 
+async def test_delivered_messages_come_in_their_order_those_that_waited_first_and_then_the_reason() -> None:
+    refusals = [Refusal(event=number, reason="late", current=1) for number in range(2, 6)]
+    got: list[LinkMessage] = []
+    async with (
+        fake_bridge(wire(HELLO, *refusals, Goodbye(error="closing", detail="bye"))) as bridge,
+        RobotLink("127.0.0.1", bridge.port, "operator") as link,
+    ):
+        with pytest.raises(LinkLost, match="closing: bye"):
+            await link.deliver(got.append)
+    assert got == refusals
+
+
+async def test_a_message_is_delivered_in_the_turn_that_it_comes_in() -> None:
+    """Nothing that became ready in between, a slice of work for observers say, is done before it."""
+    turns: list[str] = []
+    async with running_bridge() as bridge, RobotLink(*bridge.address, "operator") as link:
+        received = link._transport.data_received
+        ended = asyncio.Event()
+
+        def data_received(data: bytes) -> None:
+            asyncio.get_running_loop().call_soon(turns.append, "ready since")
+            turns.append("came")
+            received(data)
+
+        def take(message: LinkMessage) -> None:
+            turns.append("delivered")
+            if turns.count("delivered") == 3:
+                ended.set()
+
+        link._transport.data_received = data_received  # type: ignore[method-assign]
+        delivering = asyncio.create_task(link.deliver(take))
+        async with asyncio.timeout(10):
+            await ended.wait()
+        await link.close()
+        await delivering
+    first = turns.index("came")
+    assert turns[first : first + 2] == ["came", "delivered"]
+
+
+async def test_what_a_taker_raises_ends_the_delivery_and_nothing_more_is_handed_over() -> None:
+    refusals = [Refusal(event=number, reason="late", current=1) for number in range(2, 6)]
+    got: list[LinkMessage] = []
+
+    def take(message: LinkMessage) -> None:
+        got.append(message)
+        raise RuntimeError("a fault of ours")
+
+    async with (
+        fake_bridge(wire(HELLO, *refusals)) as bridge,
+        RobotLink("127.0.0.1", bridge.port, "operator") as link,
+    ):
+        with pytest.raises(RuntimeError, match="a fault of ours"):
+            await link.deliver(take)
+    assert got == refusals[:1]
+
+
+async def test_its_socket_can_be_watched_by_others_while_it_is_open() -> None:
+    async with running_bridge() as bridge:
+        link = RobotLink(*bridge.address, "operator")
+        assert link.fileno() == -1
+        async with link:
+            assert link.fileno() > 0
+        assert link.fileno() == -1
+
+
 async def test_a_silent_bridge_is_lost_after_a_second() -> None:
     async with fake_bridge(wire(HELLO)) as bridge, RobotLink("127.0.0.1", bridge.port, "operator") as link:
         with pytest.raises(LinkLost, match="silent"):

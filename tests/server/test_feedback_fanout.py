@@ -1,10 +1,12 @@
 import asyncio
+import time
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.feedback_fanout import SLICE, FeedbackFanout, FeedbackPace
+from server.feedback_fanout import FeedbackFanout, FeedbackPace
+from server.loop_turns import SLICE
 
 
 class FakePeer:
@@ -61,7 +63,7 @@ def test_no_more_than_the_rate_leaves_and_the_newest_never_starves(gaps: list[fl
 
 
 async def test_operators_are_served_at_once_and_observers_by_the_task() -> None:
-    operator, observers = FakePeer(), [FakePeer() for _ in range(2 * SLICE + 1)]
+    operator, observers = FakePeer(), [FakePeer() for _ in range(5)]
     fanout = FeedbackFanout(1000, lambda: [operator], lambda: observers)
     task = asyncio.create_task(fanout.run())
     fanout.publish("a")
@@ -70,6 +72,29 @@ async def test_operators_are_served_at_once_and_observers_by_the_task() -> None:
     async with asyncio.timeout(5):
         await observers[-1].news.wait()
     assert all(observer.got == ["a"] for observer in observers)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+async def test_a_turn_of_the_loop_serves_observers_until_the_slice_is_over() -> None:
+    class SlowPeer(FakePeer):
+        """Sending to it takes longer than a slice."""
+
+        def send_feedback(self, text: str) -> None:
+            super().send_feedback(text)
+            until = time.perf_counter() + SLICE
+            while time.perf_counter() < until:
+                pass
+
+    observers = [SlowPeer() for _ in range(3)]
+    fanout = FeedbackFanout(1000, list, lambda: observers)
+    task = asyncio.create_task(fanout.run())
+    fanout.publish("a")
+    steps = []
+    while not observers[-1].got:
+        await asyncio.sleep(0)
+        steps.append(sum(len(observer.got) for observer in observers))
+    assert sorted({0, *steps}) == [0, 1, 2, 3]
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
 

@@ -10,9 +10,9 @@ While the operator's pictures are whole and their path shows no limit, the high 
 encoder serves both. As soon as that ends it has an encoder of its own. So there are at most three encoders for a camera
 and codec, and one where the network is good.
 
-In a crowd (`Crowd`) the observers of the high tier get every second or third picture, from one more encoder, with as
-many bits for each picture as before, and their sound in longer packets. Who may drive, relays, recordings and
-thumbnails get what they got.
+In a crowd (`Crowd`) the observers of the high tier get every second or third picture, fewer where the event loop has
+more to do than it can, from one more encoder, with as many bits for each picture as before, and their sound in longer
+packets. Who may drive, relays, recordings and thumbnails get what they got.
 """
 
 import asyncio
@@ -34,6 +34,7 @@ __all__ = ["QualityDesk"]
 
 TICK = 0.1  # s
 LATE = 0.03  # s by which a tick may be late
+LOAD_SECONDS = 1.0  # between two looks at the loop's load
 OBSERVER_TICKS = 10  # an observer is looked at once in so many
 SHARE_AFTER = 5.0  # s of an operator's path without a limit
 LOW_FLOOR_BPS = 120_000
@@ -44,8 +45,13 @@ class QualityDesk:
     """One per media plane; runs on its loop. Switched off, everybody gets one tier with everything."""
 
     def __init__(
-        self, settings: MediaSettings, metrics: QualityMetrics, clock: Callable[[], float] = time.monotonic
+        self,
+        settings: MediaSettings,
+        metrics: QualityMetrics,
+        clock: Callable[[], float] = time.monotonic,
+        busy_seconds: Callable[[], float] = lambda: 0.0,
     ) -> None:
+        """`busy_seconds`: as of `LoopTurns`."""
         self._settings = settings
         self._metrics = metrics
         self._clock = clock
@@ -53,7 +59,10 @@ class QualityDesk:
         self._ladders: dict[tuple[Tier, str], PictureLadder] = {}
         self._plans: dict[tuple[Tier, str], PicturePlan] = {}
         self._crowd = Crowd(settings.crowd_observers)
+        self._busy_seconds = busy_seconds
+        self._load_at = clock(), busy_seconds()  # the last look at it
         self._ticks = 0
+        self._common: object = None  # what decides for all observers, at the last tick
         self._whole_since: float | None = None  # the operator's pictures; None: they are not
 
     def join(self, peer: PeerQuality) -> None:
@@ -64,6 +73,7 @@ class QualityDesk:
     def leave(self, peer: PeerQuality) -> None:
         """Idempotent."""
         self._peers.pop(peer, None)
+        self._common = None
         self._metrics.forget(peer)
 
     async def run(self) -> None:
@@ -95,15 +105,20 @@ class QualityDesk:
             peer.decide(now)
             peer.tier = "low" if peer.stays_low else peer.choice.decide(peer.path, self._needs(peer), now)
         self._plan_low([peer for peer in observers if peer.tier == "low"], now)
+        self._look_at_load(now)
         self._thin(observers, now)
         shared = self._whole_since is not None and now - self._whole_since >= SHARE_AFTER
         for peer in leaders:
             self._settle(peer, "operator", "operator")
-        for peer in observers:
+        # What concerns all of them is rare, and there may be hundreds: else only those whose turn it is.
+        common = shared, self._crowd.divisor > 1, leaders, observers
+        settled = turn if common == self._common else observers
+        self._common = common
+        for peer in settled:
             self._settle(peer, peer.tier, self._encoded_as(peer, shared))
         for peer in turn:
             self._tell(peer)
-        for peer in self._peers:
+        for peer in (*leaders, *settled):
             self._sound_for(peer)
             if peer.held_back != (held_back := peer.path.limited or peer.tier == "low"):
                 peer.held_back = held_back
@@ -114,6 +129,12 @@ class QualityDesk:
                 self._tell(peer)
             self._protect_sound(leaders or observers, now)
             self._measure(leaders, observers)
+
+    def _look_at_load(self, now: float) -> None:
+        (since, before), busy = self._load_at, self._busy_seconds()
+        if now - since >= LOAD_SECONDS:
+            self._load_at = now, busy
+            self._crowd.loaded((busy - before) / (now - since), now)
 
     def _thin(self, observers: list[PeerQuality], now: float) -> None:
         """Look whether there is a crowd, and what it gets."""

@@ -1,5 +1,6 @@
 import asyncio
 
+from server.loop_turns import LoopTurns
 from server.media.fanout import FanOut
 from server.media.frame import EncodedFrame
 from tests.server.media.test_outbox import frame
@@ -42,10 +43,10 @@ async def test_the_operator_is_served_within_publish_and_before_observers() -> N
     clock = FakeClock()
     observers = [FakeTarget(log, f"observer{i}:", clock) for i in range(3)]
     operator = FakeTarget(log, "operator:", clock, priority=True)
-    fan_out = FanOut(0.001, clock)
+    fan_out = FanOut(LoopTurns(clock, 0.001))
     fan_out.publish(frame(1), [*observers, operator])
     assert log == ["operator:1"]
-    fan_out.serve()
+    await asyncio.sleep(0)
     assert log == ["operator:1", "observer0:1", "observer1:1", "observer2:1"]
 
 
@@ -53,11 +54,11 @@ async def test_a_slice_is_bounded_and_the_next_one_goes_on_where_it_ended() -> N
     log: list[str] = []
     clock = FakeClock()
     observers = [FakeTarget(log, f"{i}:", clock, cost=0.0004) for i in range(7)]
-    fan_out = FanOut(0.001, clock)
+    fan_out = FanOut(LoopTurns(clock, 0.001))
     fan_out.publish(frame(1), observers)
-    fan_out.serve()
+    await asyncio.sleep(0)
     assert log == ["0:1", "1:1", "2:1"]
-    fan_out.serve()
+    await asyncio.sleep(0)
     assert log[3:] == ["3:1", "4:1", "5:1"]
 
 
@@ -67,14 +68,14 @@ async def test_a_blocked_observer_delays_nobody_and_is_tried_again_with_the_next
     slow, quick = FakeTarget(log, "slow:", clock), FakeTarget(log, "quick:", clock)
     operator = FakeTarget(log, "operator:", clock, priority=True)
     slow.blocked = True
-    fan_out = FanOut(0.001, clock)
+    fan_out = FanOut(LoopTurns(clock, 0.001))
     for i in range(1, 4):
         fan_out.publish(frame(i), [slow, quick, operator])
-        fan_out.serve()
+        await asyncio.sleep(0)
     assert log == ["operator:1", "quick:1", "operator:2", "quick:2", "operator:3", "quick:3"]
     slow.blocked = False
     fan_out.publish(frame(4), [slow])
-    fan_out.serve()
+    await asyncio.sleep(0)
     assert log[6:] == ["slow:2", "slow:3", "slow:4"]
 
 
@@ -82,11 +83,11 @@ async def test_a_forgotten_target_gets_nothing_more() -> None:
     log: list[str] = []
     clock = FakeClock()
     target = FakeTarget(log, "gone:", clock)
-    fan_out = FanOut(0.001, clock)
+    fan_out = FanOut(LoopTurns(clock, 0.001))
     fan_out.publish(frame(1), [target])
     fan_out.forget(target)
     fan_out.forget(target)
-    fan_out.serve()
+    await asyncio.sleep(0)
     assert log == []
 
 
@@ -95,7 +96,7 @@ async def test_the_loop_gets_a_turn_between_slices() -> None:
     log: list[str] = []
     clock = FakeClock()
     observers = [FakeTarget(log, f"{i}:", clock, cost=0.0005) for i in range(100)]
-    fan_out = FanOut(0.001, clock)
+    fan_out = FanOut(LoopTurns(clock, 0.001))
     fan_out.publish(frame(1), observers)
     turns = []
     while len(log) < 100:

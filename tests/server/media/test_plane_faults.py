@@ -87,8 +87,8 @@ async def test_a_worker_that_fails_is_reported_once_counted_and_goes_on(caplog: 
         def fail(job: Any) -> Any:
             raise MemoryError
 
-        def count() -> None:
-            failed()
+        def count(error: Exception) -> None:
+            failed(error)
             failures.put_nowait(None)
 
         camera._work, camera._failed = fail, count

@@ -2,8 +2,7 @@
 
 import asyncio
 import inspect
-import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -11,6 +10,7 @@ import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
 from aiortc.rtcdtlstransport import RTCDtlsTransport, State
 
+from server.loop_turns import HasFileno, LoopTurns
 from server.media.aiortc_private import create_peer_connection
 from server.media.receive_guard_private import HANDSHAKE_DONE, _Intake, guard_transports
 from server.media.receive_turns import ReceiveTurns
@@ -39,7 +39,9 @@ class Ends:
 
 
 @asynccontextmanager
-async def connected(turns: ReceiveTurns | None = None) -> AsyncIterator[Ends]:
+async def connected(
+    turns: ReceiveTurns | None = None, on_socket: Callable[[HasFileno], None] | None = None
+) -> AsyncIterator[Ends]:
     client, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
     opened = asyncio.Event()
     errors: list[str] = []
@@ -51,7 +53,7 @@ async def connected(turns: ReceiveTurns | None = None) -> AsyncIterator[Ends]:
         async with asyncio.timeout(PATIENCE):
             await client.setLocalDescription(await client.createOffer())
             await server.setRemoteDescription(RTCSessionDescription(client.localDescription.sdp, "offer"))
-            guard_transports(server, errors.append, turns)
+            guard_transports(server, errors.append, turns, on_socket)
             await server.setLocalDescription(await server.createAnswer())
             await client.setRemoteDescription(RTCSessionDescription(server.localDescription.sdp, "answer"))
             await opened.wait()
@@ -117,7 +119,7 @@ async def test_a_message_is_handled_in_the_turn_that_its_datagram_comes_in(monke
 
 
 async def test_an_observers_message_is_handled_in_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with connected(ReceiveTurns(time.perf_counter)) as ends:
+    async with connected(ReceiveTurns(LoopTurns())) as ends:
         await exchanged(ends, "first")
         handled: list[bool] = []
         take = ends.intake.put_nowait
@@ -134,8 +136,17 @@ async def test_an_observers_message_is_handled_in_its_turn(monkeypatch: pytest.M
         assert not any(handled)
 
 
+async def test_the_socket_that_datagrams_come_by_is_told_once() -> None:
+    told: list[HasFileno] = []
+    async with connected(on_socket=told.append) as ends:
+        for text in ("first", "second"):
+            await exchanged(ends, text)
+        pair = ends.dtls.transport._connection._nominated[1]
+        assert [each.fileno() for each in told] == [pair.protocol.transport.get_extra_info("socket").fileno()]
+
+
 async def test_what_waits_for_its_turn_is_bounded_and_forgotten_at_the_end() -> None:
-    async with connected(ReceiveTurns(time.perf_counter)) as ends:
+    async with connected(ReceiveTurns(LoopTurns())) as ends:
         await exchanged(ends, "first")
         intake = ends.intake
         for _ in range(2000):

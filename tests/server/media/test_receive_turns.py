@@ -2,6 +2,7 @@
 
 import asyncio
 
+from server.loop_turns import LoopTurns
 from server.media.receive_turns import ReceiveTurns
 
 
@@ -33,7 +34,7 @@ async def turns_of_the_loop(count: int) -> None:
 
 async def test_everybody_has_a_turn_before_anybody_has_a_second() -> None:
     world = World()
-    turns = ReceiveTurns(lambda: world.now, slice_seconds=1.0)
+    turns = ReceiveTurns(LoopTurns(lambda: world.now, 1.0))
     for peer in (Peer("flood", 5, world), Peer("a", 1, world), Peer("b", 2, world)):
         turns.add(peer)
     assert world.handled == []  # never in the turn of the loop that they came in
@@ -43,7 +44,7 @@ async def test_everybody_has_a_turn_before_anybody_has_a_second() -> None:
 
 async def test_a_turn_of_the_loop_handles_no_more_than_a_slice() -> None:
     world = World()
-    turns = ReceiveTurns(lambda: world.now, slice_seconds=0.0035)
+    turns = ReceiveTurns(LoopTurns(lambda: world.now, 0.0035))
     turns.add(Peer("flood", 10, world))
     between: list[int] = []
     while len(world.handled) < 10:
@@ -54,7 +55,7 @@ async def test_a_turn_of_the_loop_handles_no_more_than_a_slice() -> None:
 
 async def test_who_is_added_again_has_one_place() -> None:
     world = World()
-    turns = ReceiveTurns(lambda: world.now, slice_seconds=1.0)
+    turns = ReceiveTurns(LoopTurns(lambda: world.now, 1.0))
     peer = Peer("a", 1, world)
     for _ in range(3):
         turns.add(peer)

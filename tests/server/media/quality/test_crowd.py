@@ -1,6 +1,6 @@
 """How many pictures a crowd gets, and that its edge is no hinge."""
 
-from server.media.quality.crowd import AFTER, Crowd
+from server.media.quality.crowd import AFTER, FULL, LONGEST, MOST, Crowd
 from server.media.quality.plan import PicturePlan
 
 
@@ -48,6 +48,73 @@ def test_a_crowd_of_two_is_one_beyond_one() -> None:
     assert crowd.watch(2, 0.0) == 2
     crowd.watch(0, 1.0)
     assert crowd.watch(0, 1.0 + AFTER) == 1
+
+
+def crowd_of(observers: int) -> Crowd:
+    crowd = Crowd(60)
+    crowd.watch(observers, 0.0)
+    return crowd
+
+
+def seconds_of(crowd: Crowd, load: float, seconds: int, begin: int) -> list[int]:
+    """The divisor after each second of such a load."""
+    found = []
+    for now in range(begin, begin + seconds):
+        crowd.loaded(load, float(now))
+        found.append(crowd.divisor)
+    return found
+
+
+def test_a_crowd_whose_work_fills_the_loop_gets_fewer_pictures_every_two_seconds() -> None:
+    assert seconds_of(crowd_of(100), 0.95, 12, 1) == [2, 3, 3, 4, 4, 5, 5, 6, 6, 6, 6, 6]
+    assert MOST == 6
+
+
+def test_a_full_second_now_and_then_changes_nothing() -> None:
+    crowd = crowd_of(100)
+    for now in range(50):
+        crowd.loaded(1.0 if now % 2 else 0.5, float(now))
+    assert crowd.divisor == 2
+
+
+def test_whoever_is_no_crowd_gets_everything_however_full_the_loop() -> None:
+    crowd = crowd_of(60)
+    assert set(seconds_of(crowd, 1.0, 20, 1)) == {1}
+    crowd.watch(61, 21.0)
+    assert crowd.divisor == 2, "what happened before was remembered"
+
+
+def test_a_step_comes_back_only_where_there_is_room_for_it() -> None:
+    crowd = crowd_of(100)
+    assert seconds_of(crowd, 0.9, 4, 1)[-1] == 4
+    assert set(seconds_of(crowd, 0.7, 60, 5)) == {4}, "with 4/3 of 0.7 it would be full again"
+    assert seconds_of(crowd, 0.5, 7, 65) == [4, 4, 4, 4, 4, 3, 3]
+    assert seconds_of(crowd, 0.3, 20, 72)[-1] == 2
+
+
+def test_a_step_that_is_taken_again_soon_comes_back_ever_later() -> None:
+    crowd = crowd_of(100)
+    now, waits = 0, []
+    for _ in range(8):
+        while crowd.divisor < 3:
+            now += 1
+            crowd.loaded(FULL + 0.05, float(now))
+        began = now
+        while crowd.divisor > 2:
+            now += 1
+            crowd.loaded(0.4, float(now))
+        waits.append(now - began - 1)
+    assert waits == [5, 10, 20, 40, 80, 160, 160, 160]
+    assert waits[-1] == LONGEST
+
+
+def test_when_the_crowd_is_gone_everybody_gets_everything_and_its_steps_are_forgotten() -> None:
+    crowd = crowd_of(100)
+    seconds_of(crowd, 1.0, 10, 1)
+    crowd.watch(10, 11.0)
+    assert crowd.watch(10, 11.0 + AFTER) == 1
+    crowd.loaded(0.2, 17.0)
+    assert crowd.watch(100, 18.0) == 2
 
 
 def test_a_thinned_picture_has_as_many_bits_as_before() -> None:
