@@ -33,6 +33,7 @@ export const GATE_WORDS: Readonly<Record<GateState, string>> = {
 
 export const GATE_BLOCK_WORDS: Readonly<Record<GateBlock, string>> = {
   not_connected: "Not connected",
+  console_silent: "The console is silent",
   robot_down: "The robot cannot be reached",
   stopped: "The robot is stopped",
   no_seat: "The control seat is not yours",

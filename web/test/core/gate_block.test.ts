@@ -13,31 +13,40 @@ function driving(): ReturnType<typeof createConsoleState> {
 
 describe("the gate", () => {
   it("is left to its own rule for who holds the seat of a robot that can be reached", () => {
-    expect(gateBlock(driving())).toBeNull();
+    expect(gateBlock(driving(), true)).toBeNull();
   });
 
   it("is shut before that without a connection", () => {
     const state = driving();
     forgetConnection(state);
-    expect(gateBlock(state)).toBe("not_connected");
+    expect(gateBlock(state, true)).toBe("not_connected");
+  });
+
+  it("is shut while the console is silent, whatever was true when it last spoke", () => {
+    expect(gateBlock(driving(), false)).toBe("console_silent");
+    const state = driving();
+    applyMessage(state, robotOf("down", "silent"), 0);
+    expect(gateBlock(state, false)).toBe("console_silent");
+    forgetConnection(state);
+    expect(gateBlock(state, false)).toBe("not_connected");
   });
 
   it("is shut while the robot cannot be reached, whatever else holds", () => {
     const state = driving();
     applyMessage(state, feedbackOf(5, { stop: { stopped: true, by: "Ada", reason: "test" } }), 0);
     applyMessage(state, robotOf("down", "silent"), 0);
-    expect(gateBlock(state)).toBe("robot_down");
+    expect(gateBlock(state, true)).toBe("robot_down");
   });
 
   it("is shut while the robot is stopped", () => {
     const state = driving();
     applyMessage(state, feedbackOf(5, { stop: { stopped: true, by: "Ada", reason: "test" } }), 0);
-    expect(gateBlock(state)).toBe("stopped");
+    expect(gateBlock(state, true)).toBe("stopped");
   });
 
   it("is shut for who does not hold the seat", () => {
     const state = driving();
     applyMessage(state, seatOf("other", "Ada"), 0);
-    expect(gateBlock(state)).toBe("no_seat");
+    expect(gateBlock(state, true)).toBe("no_seat");
   });
 });
