@@ -16,7 +16,7 @@ from weakref import WeakKeyDictionary, ref
 
 __all__ = ["SLICE", "HasFileno", "LoopTurns", "turns_of_loop"]
 
-SLICE = 0.002  # s; what is not announced, a request by HTTP say, waits for one at each step of its way
+SLICE = 0.001  # s; what is not announced, a request by HTTP say, waits for one at each step of its way
 
 
 class HasFileno(Protocol):
