@@ -37,6 +37,7 @@ BARE_SECONDS, QUICK_BARE_SECONDS = 8, 3
 CONNECT_SECONDS = 150.0
 ANSWER_SECONDS = 10.0
 SETTLE = 2.0  # s after somebody came
+CALM, QUICK_CALM = 20, 2  # s until what hundreds of handshakes did to the crowd's pictures is over
 ENCODE = 0.03  # s until what the bridge has sent is encoded
 LOOK, SAME, LOOKS = 0.01, 3, 40  # s between two looks at the observers; looks alike that settle it; looks at most
 ROBOT = "planar"  # the lightest: the machine's cores are for the console and the observers
@@ -99,7 +100,7 @@ async def _watched_by(count: int, stack: Stack, operator: Console, events: int, 
             audience, ready = await crowd.enter_async_context(running_process(*command, ready_seconds=CONNECT_SECONDS))
             context.say(f"{size} observers connected within {ready['seconds']} s")
             audiences.append(audience)
-        await asyncio.sleep(SETTLE)
+        await asyncio.sleep(context.scale(CALM, QUICK_CALM))
         before = await _count(stack, audiences)
         await asyncio.sleep(SETTLE)
         watched = await _drive(stack, audiences, operator, events)

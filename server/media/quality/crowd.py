@@ -19,7 +19,8 @@ EDGE = 0.8  # of a step's observers, below which it is left
 AFTER = 5.0  # s
 MOST = 6  # one picture of so many
 FULL = 0.85  # of the loop's time: above it, what comes late is dropped, and asks for keyframes, which make more to do
-ROOM = 0.8  # of the loop's time, that another step may fill
+ROOM = 0.8  # of the loop's time, that may be filled with one step more
+PICTURES = 0.5  # of the work for observers; the rest are sound, feedback and what they send
 FULL_LOOKS = 2  # one after the other
 LONGEST = 160.0  # s of waiting
 
@@ -65,7 +66,7 @@ class Crowd:
         if self._full_looks >= FULL_LOOKS and self.divisor < MOST:
             self._relief, self._full_looks = self._relief + 1, 0
             self._wait = min(LONGEST, 2 * self._wait) if now - self._eased_at < 2 * AFTER else self._wait
-        if self._relief == 0 or load * self.divisor / (self.divisor - 1) > ROOM:
+        if self._relief == 0 or load * (1 + PICTURES / (self.divisor - 1)) > ROOM:
             self._room_since = None
         elif self._room_since is None:
             self._room_since = now

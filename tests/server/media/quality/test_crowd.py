@@ -87,7 +87,7 @@ def test_whoever_is_no_crowd_gets_everything_however_full_the_loop() -> None:
 def test_a_step_comes_back_only_where_there_is_room_for_it() -> None:
     crowd = crowd_of(100)
     assert seconds_of(crowd, 0.9, 4, 1)[-1] == 4
-    assert set(seconds_of(crowd, 0.7, 60, 5)) == {4}, "with 4/3 of 0.7 it would be full again"
+    assert set(seconds_of(crowd, 0.7, 60, 5)) == {4}, "half of that are pictures: a third more of them do not fit"
     assert seconds_of(crowd, 0.5, 7, 65) == [4, 4, 4, 4, 4, 3, 3]
     assert seconds_of(crowd, 0.3, 20, 72)[-1] == 2
 
