@@ -67,7 +67,7 @@ class _Intake(asyncio.Queue[Any]):
             self._awaited = False
 
     def put_nowait(self, item: tuple[bytes, int] | None) -> None:
-        if self._on_socket is not None:
+        if item is not None and self._on_socket is not None:
             self._tell_socket(self._on_socket)
         if item is None:
             super().put_nowait(None)
