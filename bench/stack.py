@@ -27,7 +27,7 @@ class Bridge:
     robot: str
     process: Running
     address: str  # "tcp://127.0.0.1:5600"
-    event_log: Path
+    event_log: Path  # not there unless it was asked for
 
     @property
     def port(self) -> int:
@@ -69,19 +69,24 @@ class Metrics:
 
 
 @asynccontextmanager
-async def running_bridge(robot: str) -> AsyncIterator[Bridge]:
-    """Raises ProcessFailed when the robot lacks something here."""
+async def running_bridge(robot: str, *, is_logged: bool = True) -> AsyncIterator[Bridge]:
+    """`is_logged`: whether the bridge writes its event log, which costs it some processor time.
+
+    Raises:
+        ProcessFailed: the robot lacks something here.
+    """
     with TemporaryDirectory(prefix="lockstep-bench-") as directory:
         log = Path(directory) / "events.jsonl"
-        command = (sys.executable, "-m", "robot_bridge", robot, "--port", "0", "--event-log", str(log), "--json")
-        async with running_process(*command) as (process, ready):
+        command = (sys.executable, "-m", "robot_bridge", robot, "--port", "0", "--json")
+        logging = ("--event-log", str(log)) if is_logged else ()
+        async with running_process(*command, *logging) as (process, ready):
             yield Bridge(robot, process, ready["robot"], log)
 
 
 @asynccontextmanager
-async def running_stack(robot: str, **more: str) -> AsyncIterator[Stack]:
+async def running_stack(robot: str, *, is_logged: bool = True, **more: str) -> AsyncIterator[Stack]:
     """`more`: settings of the console besides, LOCKSTEP_…"""
-    async with running_bridge(robot) as bridge:
+    async with running_bridge(robot, is_logged=is_logged) as bridge:
         lockstep = str(Path(sys.executable).with_name("lockstep"))
         command = (lockstep, "serve", "--robot", bridge.address, "--port", "0", "--json", "--quiet")
         settings = {"LOCKSTEP_STATE_DIR": str(bridge.event_log.parent / "state"), "LOCKSTEP_MAX_PEERS": str(MAX_PEERS)}

@@ -34,7 +34,6 @@ class Zone:
 
     def __init__(self, fence: Geofence) -> None:
         self.name = fence.name
-        self.label = fence.label
         self._keeps_in = fence.kind == "keep_in"
         corners = list(fence.polygon)
         area = sum(ax * by - bx * ay for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True))

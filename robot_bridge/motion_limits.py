@@ -12,7 +12,8 @@ from typing import Protocol
 from robot_bridge.geofence import FenceGuard
 from robot_bridge.motion_demand import Demand, share_of
 from robot_bridge.position_guard import PositionGuard
-from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.posture_guard import PostureGuard, is_by_posture
+from robot_bridge.protocol.description import PositionLimit, RobotDescription
 
 __all__ = ["MotionLimits", "PositionSense"]
 
@@ -41,11 +42,16 @@ class MotionLimits:
         self._lingering: dict[str, int] = {}  # limit -> calls that it still counts as acting
         self._sense = sense
         self._rest_values = [axis.rest for axis in description.axes]
-        self._positions = [PositionGuard(limit, description, tick_seconds) for limit in description.position_limits]
-        self._by_posture = any(guard.by_posture for guard in self._positions)
+        self._positions = [
+            PositionGuard(limit, description, tick_seconds)
+            for limit in description.position_limits
+            if not is_by_posture(limit)
+        ]
+        self._postures = posture_guards(description, tick_seconds)
         base = description.planar_base
         self._fence = FenceGuard(base, description, tick_seconds) if base and description.geofences else None
         guarded = {number for guard in self._positions for number in guard.axes}
+        guarded.update(number for guard in self._postures for number in guard.axes)
         guarded.update(() if self._fence is None else self._fence.axes)
         self._guarded = tuple(sorted(guarded))
 
@@ -82,10 +88,13 @@ class MotionLimits:
     def _demands(self, values: list[float]) -> list[Demand]:
         offsets = [value - rest for value, rest in zip(values, self._rest_values, strict=True)]
         joints = self._sense.positions()
-        rates = self._sense.joint_rates(values) if self._by_posture else None
         demands = [] if self._fence is None else self._fence.demands(offsets, joints)
         for guard in self._positions:
-            demands += guard.demands(offsets, joints, rates)
+            demands += guard.demands(offsets, joints)
+        if self._postures:
+            rates = self._sense.joint_rates(values)
+            for postures in self._postures:
+                demands += postures.demands(offsets, joints, rates)
         return demands
 
     def _scaled(self, values: list[float], braked: Sequence[float], shares: dict[int, float]) -> list[float]:
@@ -109,3 +118,12 @@ class MotionLimits:
         rest = self._rest_values[number]
         same_side = (value - rest) * (braked - rest) > 0
         return value if same_side and abs(value - rest) < abs(braked - rest) else braked
+
+
+def posture_guards(description: RobotDescription, tick_seconds: float) -> list[PostureGuard]:
+    """One for each set of axes that limits by posture have."""
+    index = {axis.name: number for number, axis in enumerate(description.axes)}
+    together: dict[tuple[int, ...], list[PositionLimit]] = {}
+    for limit in filter(is_by_posture, description.position_limits):
+        together.setdefault(tuple(index[each.axis] for each in limit.axes), []).append(limit)
+    return [PostureGuard(axes, limits, description, tick_seconds) for axes, limits in together.items()]

@@ -1,6 +1,7 @@
 """Drives the holonomic base: velocities in the base frame in, wheel motors and a parking brake out."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -27,11 +28,11 @@ class BaseDrive:
         """Forget the held place."""
         self._parked = None
 
-    def drive(self, data: Any, velocity: Array) -> None:
+    def drive(self, data: Any, velocity: Sequence[float]) -> None:
         """Use `velocity` (vx, vy, wz in the base frame) for the coming step."""
         yaw = data.qpos[2]
         cosine, sine = math.cos(yaw), math.sin(yaw)
-        forward, left, turn = velocity.tolist()
+        forward, left, turn = velocity
         data.ctrl[BASE] = (cosine * forward - sine * left, sine * forward + cosine * left, turn)
         if forward or left or turn:
             self._parked = None

@@ -43,8 +43,9 @@ class Hearing:
         wheels = math.hypot(vx, vy) + DRUM_RADIUS * wz
         large, small = sum(arm[:3]), sum(arm[3:])
         rubbing = contacts.rubbing * (wheels + ARM_LENGTH * (large + small))
-        if (objects := speeds[self._objects]).any():
-            rubbing += OBJECT_FRICTION * float(np.sqrt((objects**2).sum(axis=1)).sum())
+        others = speeds[JOINTS:]
+        if others.dot(others):  # mostly nothing but the robot moves, and that is the quickest way to see it
+            rubbing += OBJECT_FRICTION * float(np.sqrt((speeds[self._objects] ** 2).sum(axis=1)).sum())
         for index, level in enumerate((wheels, large, small, rubbing)):
             self._sums[index] += level
         self._ticks += 1

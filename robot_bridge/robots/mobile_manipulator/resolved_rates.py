@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+from collections.abc import Sequence
 from operator import truediv
 from typing import Final, NamedTuple
 
@@ -22,7 +23,7 @@ LOST: Final = 0.35  # share of the wanted twist that may be missing before it is
 
 
 class Resolution(NamedTuple):
-    velocities: Array  # rad/s of each joint
+    velocities: tuple[float, ...]  # rad/s of each joint
     limited: tuple[int, ...]  # joints held back by their limits
     lost: bool  # the arm cannot make a good part of the twist here
 
@@ -30,19 +31,18 @@ class Resolution(NamedTuple):
 class ResolvedRates:
     """Damped least squares, with weights that fade out a joint that runs into its limit."""
 
-    def __init__(self, lower: Array, upper: Array, fastest: Array) -> None:
-        self._lower: list[float] = lower.tolist()  # rad
-        self._upper: list[float] = upper.tolist()  # rad
-        self._fastest: list[float] = fastest.tolist()  # rad/s
+    def __init__(self, lower: Sequence[float], upper: Sequence[float], fastest: Sequence[float]) -> None:
+        self._lower = tuple(lower)  # rad
+        self._upper = tuple(upper)  # rad
+        self._fastest = tuple(fastest)  # rad/s
 
-    def resolve(self, jacobian: Array, twist: Array, joints: Array) -> Resolution:
+    def resolve(self, jacobian: Array, twist: Array, joints: Sequence[float]) -> Resolution:
         """Joint velocities that move the tool by `twist` (m/s, rad/s), as nearly as the arm can."""
         scaled_jacobian = jacobian * SCALE[:, None]
         scaled_twist = twist * SCALE
-        places = joints.tolist()
-        weights = [1.0] * len(places)
+        weights = [1.0] * len(joints)
         velocities = damped_inverse(scaled_jacobian, scaled_twist)
-        freedom = self._freedom(places, velocities)
+        freedom = self._freedom(joints, velocities)
         for _ in range(PASSES):
             allowed = list(map(min, weights, freedom))
             if allowed == weights:
@@ -50,17 +50,18 @@ class ResolvedRates:
             weights = allowed
             shares = np.array(weights)
             velocities = shares * damped_inverse(scaled_jacobian * shares, scaled_twist)
-            freedom = self._freedom(places, velocities)
+            freedom = self._freedom(joints, velocities)
         if min(freedom) <= 0.0:
             velocities = np.where(np.array(freedom) > 0.0, velocities, 0.0)
         missing = math.hypot(*(scaled_jacobian @ velocities - scaled_twist).tolist())
+        slower = max(1.0, *map(truediv, np.abs(velocities).tolist(), self._fastest))  # same direction
         return Resolution(
-            velocities / max(1.0, *map(truediv, np.abs(velocities).tolist(), self._fastest)),  # slower, same direction
+            tuple((velocities / slower).tolist()),
             tuple(index for index, weight in enumerate(weights) if weight < 0.5),
             missing > LOST * math.hypot(*scaled_twist.tolist()),
         )
 
-    def _freedom(self, places: list[float], velocities: Array) -> list[float]:
+    def _freedom(self, places: Sequence[float], velocities: Array) -> list[float]:
         """1 for a joint that may move on, falling to 0 at the limit that it moves to."""
         freedom = []
         for place, velocity, lower, upper in zip(places, velocities.tolist(), self._lower, self._upper, strict=True):

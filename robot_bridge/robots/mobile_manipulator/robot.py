@@ -43,7 +43,7 @@ class MobileManipulator(Robot):
         self._ranges = RangeSensors(model)
         self._hearing = Hearing(model)
         self._sound = Sound(MICROPHONE.sample_rate, round(MICROPHONE.sample_rate * SEGMENT_SECONDS))
-        self._values = np.zeros(len(self._description.axes))
+        self._values: Sequence[float] = [0.0] * len(self._description.axes)
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)
         self._sources: tuple[MediaSource, ...] = (
             *(CameraSource(each, self._renderer.drawing(each), self.simulation.snapshot) for each in CAMERAS),
@@ -54,7 +54,7 @@ class MobileManipulator(Robot):
         return self._description
 
     def apply(self, values: Sequence[float]) -> None:
-        self._values[:] = values
+        self._values = values
 
     def tick(self) -> None:
         data = self.simulation.data
@@ -84,7 +84,7 @@ class MobileManipulator(Robot):
 
     def joint_rates(self, values: Sequence[float]) -> Sequence[float]:
         """The base's rates are left out: no limit by posture needs them."""
-        return [0.0, 0.0, 0.0, *self._arm.rates(np.array(values[BASE.stop :])).tolist()]
+        return [0.0, 0.0, 0.0, *self._arm.rates(values[BASE.stop :])]
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources

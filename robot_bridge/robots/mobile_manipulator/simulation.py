@@ -29,12 +29,21 @@ def load_model() -> Any:
 
 
 class Simulation:
-    """Steps the physics. `restarts` counts how often a diverged state had to be put back to its beginning."""
+    """Steps the physics.
+
+    Attributes:
+        joints: positions of the robot's joints, base first (a view)
+        joint_velocities: theirs (a view)
+        restarts: how often a diverged state had to be put back to its beginning
+    """
 
     def __init__(self) -> None:
         mujoco.set_mju_user_warning(warn)  # else MuJoCo writes a file into the working directory
         self.model = load_model()
         self.data = mujoco.MjData(self.model)
+        self.joints: Array = self.data.qpos[:JOINTS]
+        self.joint_velocities: Array = self.data.qvel[:JOINTS]
+        self._velocities: Array = self.data.qvel
         self.restarts = 0
         self._home = self.model.key("home").id
         self._tip = self.model.site(TOOL_TIP).id
@@ -51,20 +60,11 @@ class Simulation:
         """Let `count` timesteps pass. False if the state diverged and was put back to its beginning."""
         before = self.data.time
         mujoco.mj_step(self.model, self.data, count)
-        if self.data.time > before and np.isfinite(self.data.qvel).all():
+        if self.data.time > before and math.isfinite(self._velocities.dot(self._velocities)):
             return True
         self.restarts += 1  # MuJoCo resets the state, and with it the time, when it finds a value that is not finite
         self.restart()
         return False
-
-    @property
-    def joints(self) -> Array:
-        """Positions of the robot's joints, base first (a view)."""
-        return self.data.qpos[:JOINTS]  # type: ignore[no-any-return]
-
-    @property
-    def joint_velocities(self) -> Array:
-        return self.data.qvel[:JOINTS]  # type: ignore[no-any-return]
 
     def snapshot(self) -> Array:
         """Everything a picture needs of the state now."""

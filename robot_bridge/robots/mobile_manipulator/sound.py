@@ -5,7 +5,8 @@ single precision: sines are several times cheaper so, and the error is far below
 """
 
 import math
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,48 +25,69 @@ KNOCK_MODES: Final = (
     (930.0, 50.0, 0.3),
     (2150.0, 90.0, 0.15),
 )  # Hz, 1/s, share
-NOISE_SECONDS: Final = 3
+UNHEARD: Final = 1e-6  # of full scale
+LOOP_SECONDS: Final = 3
 
 
-class Motor:
+class Motor(NamedTuple):
     """A whining tone with harmonics whose pitch and level follow a speed."""
 
-    def __init__(self, rest_pitch: float, pitch: float, level: float, full_speed: float, harmonics: int) -> None:
-        self._rest_pitch = rest_pitch  # Hz
-        self._pitch = pitch  # Hz at full speed, on top
-        self._level = level
-        self._full_speed = full_speed
-        self._orders = np.arange(1, harmonics + 1, dtype=np.float32)[:, None]
-        self._shares = 1 / (self._orders[:, 0] + np.float32(0.5))
-        self._phase = 0.0
-        self._last = 0.0  # share of full speed at the end of the last segment
-
-    def play(self, speed: float, steps: Signal, seconds: float) -> Signal:
-        share = min(1.0, speed / self._full_speed)
-        if share == self._last == 0.0:
-            self._phase = (self._phase + 2 * math.pi * seconds * self._rest_pitch) % (2 * math.pi)
-            return np.zeros(len(steps), np.float32)
-        glide = self._last + (share - self._last) * steps
-        travelled = (self._last + glide) / 2 * steps  # integral of the glide
-        phase = self._phase + 2 * np.pi * seconds * (self._rest_pitch * steps + self._pitch * travelled)
-        self._phase = float(phase[-1] % (2 * np.pi))
-        self._last = share
-        if not glide.any():
-            return np.zeros(len(steps), np.float32)
-        tone: Signal = self._shares @ np.sin(self._orders * phase)
-        return self._level * np.sqrt(glide) * tone  # type: ignore[no-any-return]
+    rest_pitch: float  # Hz
+    pitch: float  # Hz at full speed, on top
+    level: float
+    full_speed: float
+    harmonics: int
 
 
-class Noise:
-    """Noise of a band, out of a loop made in the frequency domain so that its ends meet."""
+MOTORS: Final = (Motor(55.0, 190.0, 0.16, 0.6, 4), Motor(150.0, 420.0, 0.10, 1.5, 3), Motor(310.0, 800.0, 0.06, 2.5, 3))
 
-    def __init__(self, rate: int, low: float, high: float, seed: int) -> None:
-        length = rate * NOISE_SECONDS
-        frequencies = np.fft.rfftfreq(length, 1 / rate)
-        shape = np.exp(-0.5 * (np.log(np.maximum(frequencies, 1.0) / np.sqrt(low * high)) / np.log(high / low)) ** 2)
-        phases = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, len(frequencies))
-        loop = np.fft.irfft(shape * np.exp(1j * phases), length)
-        self._loop: Signal = (loop / loop.std()).astype(np.float32)
+
+class Motors:
+    """All motors at once: what they cost is the number of calls, not that of samples."""
+
+    def __init__(self, motors: Sequence[Motor], steps: Signal, seconds: float) -> None:
+        """`steps`: the part of a segment that has passed at each of its samples."""
+        self._steps = steps
+        self._seconds = seconds
+        self._motors = motors
+        self._rest_pitch = column([each.rest_pitch for each in motors])
+        self._pitch = column([each.pitch for each in motors])
+        orders = [order for each in motors for order in range(1, each.harmonics + 1)]
+        self._orders = column(orders)
+        self._owners = np.repeat(np.arange(len(motors)), [each.harmonics for each in motors])
+        self._shares = np.zeros((len(motors), len(orders)), np.float32)  # of each motor's level in each harmonic
+        self._shares[self._owners, np.arange(len(orders))] = 1 / (self._orders[:, 0] + 0.5)
+        self._shares *= column([each.level for each in motors])
+        self._phases = [0.0] * len(motors)
+        self._last = [0.0] * len(motors)  # share of full speed at the end of the last segment
+
+    def play(self, speeds: Sequence[float]) -> Signal | float:
+        """The sound of the next segment; 0 for silence."""
+        shares = [min(1.0, speed / each.full_speed) for speed, each in zip(speeds, self._motors, strict=True)]
+        if not any(shares) and not any(self._last):
+            turned = (2 * math.pi * self._seconds * each.rest_pitch for each in self._motors)
+            self._phases = [(phase + turn) % (2 * math.pi) for phase, turn in zip(self._phases, turned, strict=True)]
+            return 0.0
+        last = column(self._last)
+        glides = last + (column(shares) - last) * self._steps
+        travelled = (last + glides) * (self._steps / 2)  # integrals of the glides
+        turns = self._rest_pitch * self._steps + self._pitch * travelled
+        phases = column(self._phases) + np.float32(2 * np.pi * self._seconds) * turns
+        self._phases = (phases[:, -1] % np.float32(2 * np.pi)).tolist()
+        self._last = shares
+        tones = self._shares @ np.sin(self._orders * phases[self._owners])
+        return np.einsum("ij,ij->j", np.sqrt(glides), tones)  # type: ignore[no-any-return]
+
+
+def column(values: Sequence[float]) -> Signal:
+    return np.array(values, np.float32)[:, None]
+
+
+class Loop:
+    """Sound that goes round: its ends meet."""
+
+    def __init__(self, loop: Signal) -> None:
+        self._loop = loop
         self._position = 0
 
     def play(self, count: int) -> Signal:
@@ -76,52 +98,53 @@ class Noise:
         return np.concatenate((self._loop[begin:], self._loop[: self._position]))
 
 
+def noise(rate: int, low: float, high: float, seed: int) -> Signal:
+    """Noise of a band, made in the frequency domain so that its ends meet; its mean square is 1."""
+    length = rate * LOOP_SECONDS
+    frequencies = np.fft.rfftfreq(length, 1 / rate)
+    shape = np.exp(-0.5 * (np.log(np.maximum(frequencies, 1.0) / np.sqrt(low * high)) / np.log(high / low)) ** 2)
+    phases = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, len(frequencies))
+    loop = np.fft.irfft(shape * np.exp(1j * phases), length)
+    return (loop / loop.std()).astype(np.float32)  # type: ignore[no-any-return]
+
+
+def fan(rate: int) -> Signal:
+    """A hum in its own wind; whole turns of it fill the loop."""
+    hum = np.sin(2 * np.pi * FAN_TONE / rate * np.arange(rate * LOOP_SECONDS))
+    return (FAN_LEVEL * (0.5 * hum + 0.6 * noise(rate, 150.0, 900.0, seed=1))).astype(np.float32)  # type: ignore[no-any-return]
+
+
 class Sound:
     """Makes one segment after the other; each takes what was heard during it."""
 
     def __init__(self, rate: int, samples: int) -> None:
         self._samples = samples
-        self._seconds = samples / rate
         self._steps: Signal = np.arange(1, samples + 1, dtype=np.float32) / samples
-        self._wheels = Motor(55.0, 190.0, 0.16, 0.6, 4)
-        self._arm = Motor(150.0, 420.0, 0.10, 1.5, 3)
-        self._wrist = Motor(310.0, 800.0, 0.06, 2.5, 3)
-        self._fan_noise = Noise(rate, 150.0, 900.0, seed=1)
-        self._rub_noise = Noise(rate, 500.0, 3500.0, seed=2)
-        self._fan_phase = 0.0
+        self._motors = Motors(MOTORS, self._steps, samples / rate)
+        self._fan = Loop(fan(rate))
+        self._rub_noise = Loop(noise(rate, 500.0, 3500.0, seed=2))
         self._rubbing = 0.0
         times = np.arange(1, samples + 1) / rate
         self._modes = np.array([np.exp((2j * np.pi * pitch - decay) * times) for pitch, decay, _ in KNOCK_MODES])
         self._shares = np.array([share for _, _, share in KNOCK_MODES])
         self._ringing = np.zeros(len(KNOCK_MODES), dtype=complex)
+        self._rings = False
 
     def segment(self, heard: Heard) -> bytes:
         """The next segment, pcm_s16le mono."""
-        steps, seconds = self._steps, self._seconds
-        signal = (
-            self._fan(steps, seconds)
-            + self._wheels.play(heard.wheels, steps, seconds)
-            + self._arm.play(heard.arm, steps, seconds)
-            + self._wrist.play(heard.wrist, steps, seconds)
-            + self._rub(heard.rubbing, steps)
-            + self._knock(heard.knocks)
-        )
-        return (np.tanh(signal) * 32000.0).astype("<i2").tobytes()
-
-    def _fan(self, steps: Signal, seconds: float) -> Signal:
-        phase = self._fan_phase + 2 * np.pi * FAN_TONE * seconds * steps
-        self._fan_phase = float(phase[-1] % (2 * np.pi))
-        return FAN_LEVEL * (0.5 * np.sin(phase) + 0.6 * self._fan_noise.play(self._samples))  # type: ignore[no-any-return]
-
-    def _rub(self, rubbing: float, steps: Signal) -> Signal:
-        level = min(0.14, 0.03 * math.sqrt(max(rubbing - 0.05, 0.0)))
-        glide = self._rubbing + (level - self._rubbing) * steps
-        self._rubbing = level
-        return glide * self._rub_noise.play(self._samples)
+        signal: Signal = self._fan.play(self._samples) + self._motors.play((heard.wheels, heard.arm, heard.wrist))
+        level = min(0.14, 0.03 * math.sqrt(max(heard.rubbing - 0.05, 0.0)))
+        if level or self._rubbing:
+            signal += (self._rubbing + (level - self._rubbing) * self._steps) * self._rub_noise.play(self._samples)
+            self._rubbing = level
+        if heard.knocks or self._rings:
+            signal += self._knock(heard.knocks)
+        return (np.tanh(signal) * np.float32(32000.0)).astype("<i2").tobytes()
 
     def _knock(self, knocks: float) -> Signal:
         # A mode is the imaginary part of a decaying phasor: struck with a real amount it starts from zero.
         self._ringing = self._ringing + self._shares * min(0.7, knocks / 300.0)
         signal: Signal = (self._ringing @ self._modes).imag.astype(np.float32)
         self._ringing = self._ringing * self._modes[:, -1]
+        self._rings = float(np.abs(self._ringing).max()) > UNHEARD
         return signal

@@ -1,14 +1,15 @@
 """The arm's drive: when a twist is resolved anew."""
 
+import math
+
 import mujoco
-import numpy as np
 import pytest
 
 from robot_bridge.robots.mobile_manipulator.arm_drive import STEADY, ArmDrive
 from robot_bridge.robots.mobile_manipulator.simulation import ARM, Simulation
 
-UP = np.array((0.0, 0.0, 0.1, 0.0, 0.0, 0.0))
-DOWN = -UP
+UP = (0.0, 0.0, 0.1, 0.0, 0.0, 0.0)
+DOWN = tuple(-speed for speed in UP)
 
 
 def move(simulation: Simulation, joint: int, angle: float) -> None:
@@ -24,8 +25,8 @@ def test_an_arm_that_hardly_moved_makes_the_same_of_a_twist_to_within_a_hundredt
         move(simulation, joint, 0.9 * STEADY)
     assert drive.rates(UP) is known
     anew = ArmDrive(simulation).rates(UP)
-    assert not np.array_equal(anew, known)
-    assert np.linalg.norm(anew - known) < 0.01 * np.linalg.norm(anew)
+    assert anew != known
+    assert math.dist(anew, known) < 0.01 * math.hypot(*anew)
 
 
 @pytest.mark.parametrize("joint", range(6))
@@ -34,11 +35,11 @@ def test_a_twist_is_resolved_anew_when_any_joint_has_moved(joint: int) -> None:
     drive = ArmDrive(simulation)
     drive.rates(UP)
     move(simulation, joint, 1.1 * STEADY)
-    assert np.array_equal(drive.rates(UP), ArmDrive(simulation).rates(UP))
+    assert drive.rates(UP) == ArmDrive(simulation).rates(UP)
 
 
 def test_another_twist_is_resolved_by_itself() -> None:
     simulation = Simulation()
     drive = ArmDrive(simulation)
     up = drive.rates(UP)
-    assert np.allclose(drive.rates(DOWN), -up, atol=1e-6)
+    assert drive.rates(DOWN) == pytest.approx([-rate for rate in up], abs=1e-6)

@@ -9,7 +9,7 @@ JOINTS = 6
 
 
 def rates() -> ResolvedRates:
-    return ResolvedRates(np.full(JOINTS, -2.0), np.full(JOINTS, 2.0), np.full(JOINTS, 1.5))
+    return ResolvedRates([-2.0] * JOINTS, [2.0] * JOINTS, [1.5] * JOINTS)
 
 
 def well_conditioned() -> Array:
@@ -18,7 +18,7 @@ def well_conditioned() -> Array:
 
 def test_away_from_limits_and_singularities_the_twist_is_made_exactly() -> None:
     jacobian, twist = well_conditioned(), np.array((0.1, -0.05, 0.02, 0.1, 0.0, -0.1))
-    resolution = rates().resolve(jacobian, twist, np.zeros(JOINTS))
+    resolution = rates().resolve(jacobian, twist, [0.0] * JOINTS)
     assert jacobian @ resolution.velocities == pytest.approx(twist, abs=1e-9)
     assert resolution.limited == ()
     assert not resolution.lost
@@ -26,7 +26,7 @@ def test_away_from_limits_and_singularities_the_twist_is_made_exactly() -> None:
 
 def test_a_twist_too_fast_is_made_slower_in_the_same_direction() -> None:
     jacobian, twist = well_conditioned(), np.array((5.0, 1.0, 0.0, 0.0, 0.0, 0.0))
-    resolution = rates().resolve(jacobian, twist, np.zeros(JOINTS))
+    resolution = rates().resolve(jacobian, twist, [0.0] * JOINTS)
     made = jacobian @ resolution.velocities
     assert np.abs(resolution.velocities).max() == pytest.approx(1.5)
     assert made / np.linalg.norm(made) == pytest.approx(twist / np.linalg.norm(twist), abs=1e-9)
@@ -35,7 +35,7 @@ def test_a_twist_too_fast_is_made_slower_in_the_same_direction() -> None:
 @pytest.mark.parametrize("smallest", [0.0, 1e-12, 1e-6, 1e-3, 0.01, 0.05])
 def test_near_a_singularity_the_velocities_stay_bounded_and_finite(smallest: float) -> None:
     jacobian = np.diag((0.5, 0.5, smallest, 2.0, 2.0, 2.0))
-    resolution = rates().resolve(jacobian, np.array((0.1, 0.0, 0.1, 0.0, 0.0, 0.0)), np.zeros(JOINTS))
+    resolution = rates().resolve(jacobian, np.array((0.1, 0.0, 0.1, 0.0, 0.0, 0.0)), [0.0] * JOINTS)
     assert np.isfinite(resolution.velocities).all()
     assert np.abs(resolution.velocities).max() <= 1.5
     assert jacobian[0] @ resolution.velocities > 0.05  # the direction that can be made still is
@@ -43,11 +43,11 @@ def test_near_a_singularity_the_velocities_stay_bounded_and_finite(smallest: flo
 
 def test_a_twist_that_cannot_be_made_is_reported() -> None:
     jacobian = np.diag((0.5, 0.5, 0.0, 2.0, 2.0, 2.0))
-    assert rates().resolve(jacobian, np.array((0.0, 0.0, 0.1, 0.0, 0.0, 0.0)), np.zeros(JOINTS)).lost
+    assert rates().resolve(jacobian, np.array((0.0, 0.0, 0.1, 0.0, 0.0, 0.0)), [0.0] * JOINTS).lost
 
 
 def test_a_joint_at_its_limit_does_not_move_on_but_may_move_back() -> None:
-    joints = np.array((2.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    joints = (2.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     twist = np.array((0.1, 0.1, 0.0, 0.0, 0.0, 0.0))
     outwards = rates().resolve(np.eye(JOINTS) * 0.5, twist, joints)
     assert outwards.velocities[0] == 0.0
@@ -59,6 +59,6 @@ def test_a_joint_at_its_limit_does_not_move_on_but_may_move_back() -> None:
 
 
 def test_a_joint_beyond_its_limit_does_not_move_farther() -> None:
-    joints = np.array((0.0, -2.1, 0.0, 0.0, 0.0, 0.0))
+    joints = (0.0, -2.1, 0.0, 0.0, 0.0, 0.0)
     resolution = rates().resolve(np.eye(JOINTS), np.array((0.0, -0.1, 0.0, 0.0, 0.0, 0.0)), joints)
     assert resolution.velocities[1] == 0.0
