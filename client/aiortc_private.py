@@ -50,6 +50,7 @@ __all__ = [
     "use_ice_servers",
 ]
 
+LAST_OF_STUN = b"\x03"  # the largest first byte of its messages
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
 RETRANSMISSION_CEILING = 1.5  # s; above every round trip that one drives over, satellites' included
 ACKNOWLEDGEMENT_DELAY = 0.15  # s; RFC 9260 6.2 allows 0.5 and recommends 0.2
@@ -82,6 +83,8 @@ _parse_message = aioice.stun.parse_message  # aioice's own
 
 
 def _parse_or_refuse(data: bytes) -> aioice.stun.Message:
+    if data[:1] > LAST_OF_STUN:  # RFC 7983 section 7; also spares every RTP packet the attempt
+        raise ValueError("not STUN")
     try:
         return _parse_message(data)
     except struct.error as error:

@@ -3,6 +3,8 @@
 The baseline is plain aiortc (`bench/baseline_server.py`) with as many peers of the main camera, coming and going alike,
 at the same time at the same bridge. Growth compares the medians of the first and the last quarter after a warm-up
 of a quarter of the time (`bench/soak/memory.py`).
+
+After it the same without comings and goings: two hundred observers who stay, headless and counting only.
 """
 
 import asyncio
@@ -12,6 +14,7 @@ from contextlib import AsyncExitStack
 
 from bench.context import Context
 from bench.driving import console_trips
+from bench.idle_crowd import idle_crowd
 from bench.processes import Running, running_process
 from bench.results import Result
 from bench.soak.memory import growth
@@ -23,6 +26,8 @@ __all__ = ["run"]
 SECTION = "memory"
 SECONDS, QUICK_SECONDS = 600, 20
 OBSERVERS, TURNOVER = 5, 5  # that stay; that come and go together
+CROWD, QUICK_CROWD = 200, 5
+CROWD_SECONDS = 300
 STAY = 8.0  # s that a visitor stays
 CONNECT_SECONDS = 60.0
 EVENTS = 10_000_000  # more than fit into the time
@@ -33,6 +38,41 @@ MEGABYTE = 1e6
 
 
 async def run(context: Context) -> list[Result]:
+    return [*await _coming_and_going(context), *await _many(context)]
+
+
+async def _many(context: Context) -> list[Result]:
+    count, seconds = context.scale(CROWD, QUICK_CROWD), float(context.scale(CROWD_SECONDS, QUICK_SECONDS))
+    async with (
+        running_stack(ROBOT) as stack,
+        Console(stack.operator, name="operator", decode=False) as console,
+        idle_crowd(stack.observer, count, context),
+        asyncio.TaskGroup() as tasks,
+    ):
+        await console.take_seat()
+        driving = tasks.create_task(console_trips(console, EVENTS, seconds=seconds))
+        (samples,) = await _samples([stack.console], seconds, context)
+        trips = await driving
+    conditions = f"{seconds / 60:.1f} minutes, {len(trips)} events driven, {count} observers who stay"
+
+    def row(name: str, value: float | None, unit: str, target: float | None = None) -> Result:
+        return Result(
+            section=SECTION,
+            name=f"{count} observers: {name}",
+            value=value,
+            unit=unit,
+            target=target,
+            samples=len(samples),
+            conditions=conditions,
+        )
+
+    return [
+        row("growth after the warm-up", _percent(growth(samples)), "%", GROWTH_TARGET),
+        row("at the end", samples[-1] / MEGABYTE, "MB"),
+    ]
+
+
+async def _coming_and_going(context: Context) -> list[Result]:
     seconds = float(context.scale(SECONDS, QUICK_SECONDS))
     async with running_stack(ROBOT) as stack, AsyncExitStack() as others:
         command = (sys.executable, "-m", "bench.baseline_server", stack.bridge.address)

@@ -1,12 +1,15 @@
 """50, 100 and 200 observers besides one operator: does each get every picture, what does one cost, who is slowed?
 
 The observers are headless clients in a process of their own; they receive all cameras and the sound, count RTP and
-decode nothing. Their processes have the lowest priority: real ones have machines of their own. The operator drives
-from a third process, before they come and while they are there.
+decode nothing. Their processes run when nobody else wants to: real ones have machines of their own. The operator drives
+from a third process, before they come, while they are there and after they have left: the machine's own speed changes
+within a minute.
 
 Every picture: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while
-the pictures are counted, at the console's encoder and at each observer. Both counts must grow by the same number. In a
-crowd observers have an encoder of their own, which takes fewer pictures (docs/quality.md); then it is that one's.
+the pictures are counted, at the console's encoders and at each observer. Missed is what the console dropped because
+somebody's outbox was full, and what was lost on the way, as the gaps in RTP's numbers tell. That nothing else is
+missing is shown by those who were in one tier (docs/quality.md) all the time: they have exactly as many pictures as
+its encoder made. Those whose path looked full for a part of the spell, and who got other pictures meanwhile, are told.
 Cost: processor time of the console's process (proc(5)) with the observers less that without, shared out among them.
 The baseline is the main camera alone on `bench/baseline_server.py`: aiortc encodes it for each peer.
 """
@@ -14,11 +17,11 @@ The baseline is the main camera alone on `bench/baseline_server.py`: aiortc enco
 import asyncio
 import sys
 import time
-from contextlib import AsyncExitStack
 from dataclasses import dataclass
 
 from bench.context import Context
 from bench.driving import console_trips
+from bench.idle_crowd import idle_crowd
 from bench.processes import Running, running_process
 from bench.results import Result
 from bench.samples import median, quantile
@@ -29,20 +32,18 @@ __all__ = ["run"]
 
 SECTION = "observers"
 CROWDS, QUICK_CROWDS = (50, 100, 200), (10,)
-AT_MOST = 100  # observers in one process
-NICE = ("nice", "-n", "19")  # they have machines of their own, and take what the others leave
 EVENTS, QUICK_EVENTS = 400, 60
 BARE_PEERS = 8
 BARE_SECONDS, QUICK_BARE_SECONDS = 8, 3
-CONNECT_SECONDS = 150.0
 ANSWER_SECONDS = 10.0
-SETTLE = 2.0  # s after somebody came
+SETTLE = 3.0  # s after somebody came or left
 CALM, QUICK_CALM = 20, 2  # s until what hundreds of handshakes did to the crowd's pictures is over
 ENCODE = 0.03  # s until what the bridge has sent is encoded
 LOOK, SAME, LOOKS = 0.01, 3, 40  # s between two looks at the observers; looks alike that settle it; looks at most
 ROBOT = "planar"  # the lightest: the machine's cores are for the console and the observers
 CPU_TARGET = 0.5  # % of a core for each of a hundred
 SLOWDOWN_TARGETS = {100: 2.0, 200: 1.2}
+TIERS = ("operator", "high", "crowd", "low")
 CORE = 100.0  # %: what two hundred may use
 
 Received = dict[str, list[int]]  # per stream: frames, and packets lost
@@ -61,10 +62,26 @@ class Spell:
 class Counts:
     """With the bridge held still."""
 
-    taken: dict[str, int]  # pictures that were encoded, by camera
-    thinned: dict[str, int]  # those of them that a crowd gets
-    dropped: float  # frames that did not fit an observer's outbox
+    taken: dict[str, int]  # pictures that were encoded, by camera, each once for however many tiers
+    tiers: dict[str, dict[str, int]]  # what was encoded for each tier, by camera
+    dropped: int  # pictures that did not fit an observer's outbox
     received: list[Received]  # by observer
+
+
+@dataclass(frozen=True)
+class Missed:
+    """Between two counts, of all observers together."""
+
+    received: int  # pictures
+    dropped: int  # at the console
+    lost: int  # packets on the way
+    mixed: int  # observers whose number of pictures is no tier's
+
+    @property
+    def percent(self) -> float:
+        """Of the pictures that were meant for somebody."""
+        missed = self.dropped + self.lost
+        return 100 * missed / (self.received + missed)
 
 
 @dataclass(frozen=True)
@@ -92,19 +109,16 @@ async def run(context: Context) -> list[Result]:
 async def _watched_by(count: int, stack: Stack, operator: Console, events: int, context: Context) -> Watched:
     await operator.take_seat()
     await asyncio.sleep(SETTLE)
-    alone = await _drive(stack, [], operator, events)
-    async with AsyncExitStack() as crowd:
-        audiences = []
-        for size in [min(AT_MOST, count - first) for first in range(0, count, AT_MOST)]:
-            command = (*NICE, sys.executable, "-m", "bench.audience", stack.observer, str(size))
-            audience, ready = await crowd.enter_async_context(running_process(*command, ready_seconds=CONNECT_SECONDS))
-            context.say(f"{size} observers connected within {ready['seconds']} s")
-            audiences.append(audience)
+    before_them = await _drive(stack, [], operator, events)
+    async with idle_crowd(stack.observer, count, context) as audiences:
         await asyncio.sleep(context.scale(CALM, QUICK_CALM))
         before = await _count(stack, audiences)
         await asyncio.sleep(SETTLE)
         watched = await _drive(stack, audiences, operator, events)
         after = await _count(stack, audiences)
+    await asyncio.sleep(SETTLE)
+    after_them = await _drive(stack, [], operator, events)
+    alone = Spell([*before_them.trips, *after_them.trips], (before_them.console_cpu + after_them.console_cpu) / 2, 0.0)
     return Watched(count, alone, watched, before, after)
 
 
@@ -130,16 +144,16 @@ async def _count(stack: Stack, audiences: list[Running]) -> Counts:
 
 
 def counts_from(metrics: Metrics, received: list[Received]) -> Counts:
-    """What the console says of its pictures. A crowd's tier has sound as well, which is left out."""
-    taken = metrics.values("lockstep_media_pictures_taken_total", "stream")  # each once, for however many tiers
-    thinned = metrics.values("lockstep_media_tier_frames_encoded_total", "stream", tier="crowd")
-    dropped = metrics.values("lockstep_media_frames_dropped_total", "stream", stage="peer_busy")
-    return Counts(
-        {camera: int(count) for camera, count in taken.items()},
-        {camera: int(count) for camera, count in thinned.items() if camera in taken},
-        sum(dropped.values()),
-        received,
-    )
+    """What the console says of its pictures; sound is left out."""
+    taken = metrics.values("lockstep_media_pictures_taken_total", "stream")
+
+    def of_cameras(name: str, **where: str) -> dict[str, int]:
+        values = metrics.values(name, "stream", **where)
+        return {stream: int(count) for stream, count in values.items() if stream in taken}
+
+    tiers = {tier: of_cameras("lockstep_media_tier_frames_encoded_total", tier=tier) for tier in TIERS}
+    dropped = of_cameras("lockstep_media_frames_dropped_total", stage="peer_busy")
+    return Counts(of_cameras("lockstep_media_pictures_taken_total"), tiers, sum(dropped.values()), received)
 
 
 async def _settled(audiences: list[Running]) -> list[Received]:
@@ -173,23 +187,23 @@ async def _share(process: Running, seconds: float) -> float:
     return (process.cpu_seconds() - before) / (time.monotonic() - began) * 100
 
 
-def missed_pictures(before: Counts, after: Counts) -> list[int]:
-    """By observer: pictures of all cameras that were encoded for it between the counts and did not come.
-
-    In a crowd an observer is held to the thinned pictures, or to all if its count is nearer to those: one on a bad path
-    gets a tier that is not thinned.
+def missed_between(before: Counts, after: Counts) -> Missed:
+    """What did not come.
 
     Raises:
-        ValueError: none were encoded, so that nothing can be said.
+        ValueError: a camera gave nothing, so that nothing can be said.
     """
-    taken, thinned = _grown(before.taken, after.taken), _grown(before.thinned, after.thinned)
+    taken = _grown(before.taken, after.taken)
     if not taken or min(taken.values()) <= 0:
         raise ValueError(f"a camera without pictures: {taken}")
-    dues = [taken, thinned] if any(thinned.values()) else [taken]
-    return [
-        min(sum(abs(count - (later[camera][0] - earlier[camera][0])) for camera, count in due.items()) for due in dues)
-        for earlier, later in zip(before.received, after.received, strict=True)
-    ]
+    dues = [_grown(before.tiers[tier], after.tiers[tier]) for tier in after.tiers]
+    received = lost = mixed = 0
+    for earlier, later in zip(before.received, after.received, strict=True):
+        came = {camera: later[camera][0] - earlier[camera][0] for camera in taken}
+        received += sum(came.values())
+        lost += sum(later[camera][1] - earlier[camera][1] for camera in taken)
+        mixed += came not in dues
+    return Missed(received, after.dropped - before.dropped, lost, mixed)
 
 
 def _grown(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
@@ -198,12 +212,12 @@ def _grown(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
 
 def _results(found: Watched, bare: dict[int, float]) -> list[Result]:
     count, alone, watched = found.count, found.alone, found.watched
-    missed = missed_pictures(found.before, found.after)
+    missed = missed_between(found.before, found.after)
     taken = sum(_grown(found.before.taken, found.after.taken).values())
-    pictures = sum(_grown(found.before.thinned, found.after.thinned).values()) or taken  # of the observers' tier
     conditions = (
-        f"{count} observers of all cameras and sound, {pictures} pictures each of {taken}, "
-        f"{found.after.dropped - found.before.dropped:.0f} drops at the console; {sum(missed)} pictures missed in all; "
+        f"{count} observers of all cameras and sound, {missed.received / count:.0f} pictures each of {taken}, "
+        f"{missed.dropped} dropped at the console and {missed.lost} packets lost on the way, of all; {missed.mixed} "
+        f"observers had a path that looked full for a while and got other pictures; "
         f"console {watched.console_cpu:.0f} % of a core, {alone.console_cpu:.0f} % without observers; "
         f"the observers' own processes {watched.audience_cpu:.0f} %"
     )
@@ -226,7 +240,7 @@ def _results(found: Watched, bare: dict[int, float]) -> list[Result]:
     ours, theirs = median(watched.trips), median(alone.trips)
     core = {"target": CORE} if count == max(CROWDS) else {}
     return [
-        row("pictures missed", sum(missed) / (count * pictures) * 100, "%", 0.0, "none", target=0.0),
+        row("pictures missed", missed.percent, "%", 0.0, "none", target=0.0),
         row("processor time of each", each, "% of a core", bare[BARE_PEERS], aiortc, target=CPU_TARGET),
         row("console's processor time", watched.console_cpu, "% of a core", count * bare[BARE_PEERS], aiortc, **core),
         row("command → feedback, median", ours, "ms", theirs, without),

@@ -255,11 +255,12 @@ async def test_raw_packets_come_without_threads_or_receivers_and_can_be_reported
     assert forged not in taken
 
 
-def test_data_that_looks_like_stun_is_not_taken_for_it() -> None:
+@pytest.mark.parametrize(("first", "why"), [(0x90, "not STUN"), (0x00, "wrong length")], ids=["RTP", "STUN"])
+def test_data_that_looks_like_stun_is_not_taken_for_it(first: int, why: str) -> None:
     attribute = bytes([0x00, 0x24, 0x00, 0x02]) + bytes(4)  # PRIORITY has four bytes
-    lookalike = bytes([0x90, 0x60, 0x00, len(attribute)]) + bytes(16) + attribute
+    lookalike = bytes([first, 0x60, 0x00, len(attribute)]) + bytes(16) + attribute
     tell_data_from_stun()
-    with pytest.raises(ValueError, match="wrong length"):
+    with pytest.raises(ValueError, match=why):
         aioice.stun.parse_message(lookalike)
 
 

@@ -194,14 +194,17 @@ class QualityDesk:
             watched = [peer for peer in members if not peer.stays_low]
             least = min((peer.path.rate for peer in watched), default=LOW_FLOOR_BPS)
             most = LOW_SHARE * max(self._needs(peer) for peer in members)
-            self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now)
+            # Whoever cannot take what a crowd gets does not get more pictures than it.
+            divisor = self._crowd.divisor if any(peer.in_crowd for peer in members) else 1
+            self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now, divisor)
 
-    def _plan(self, tier: Tier, streams: list[VideoStream], total_bps: float, now: float) -> None:
+    def _plan(self, tier: Tier, streams: list[VideoStream], total_bps: float, now: float, divisor: int = 1) -> None:
+        """`divisor`: the tier gets one picture of so many, at most."""
         maximum = float(self._settings.video_bitrate_bps)
         needs = [CameraNeed(stream.size[0] * stream.size[1] * stream.frame_rate, maximum) for stream in streams]
         for stream, bps in zip(streams, share_out(total_bps, needs), strict=True):
             ladder = self._ladders.setdefault((tier, stream.name), PictureLadder())
-            plan = ladder.plan(bps, stream.frame_rate, stream.size, now)
+            plan = ladder.plan(bps, stream.frame_rate / divisor, stream.size, now)
             self._plans[tier, stream.name] = plan
             for output in stream.outputs_of(tier):
                 output.plan = plan
@@ -238,7 +241,7 @@ class QualityDesk:
             if (passed := camera.stream.measured(camera.target)) is not None:  # as the camera made it
                 (width, height), (rate, bps) = camera.stream.size, passed
             else:
-                thinned |= peer.encoded_as == "crowd"
+                thinned |= peer.in_crowd and self._crowd.divisor > 1
             streams.append(
                 StreamQuality(
                     stream=camera.stream.name,

@@ -151,6 +151,23 @@ async def test_a_crowd_is_told_what_it_gets_and_why() -> None:
         assert value(plane, "tier_peers", tier="crowd") == 0
 
 
+async def test_whoever_has_a_narrow_path_gets_no_more_pictures_than_the_crowd() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+        (far,) = await watching(stack, plane, 1)
+        told: list[Quality] = []
+        far.media.on_quality(told.append)
+        for others in (0, 3):
+            await watching(stack, plane, others)
+            far.media.quality.path.rate = 100_000
+            for _ in range(20):
+                desk(plane).tick()
+        among = told[-1].streams[0]
+        assert (among.tier, among.frames_per_second, told[-1].crowd) == ("low", 15.0, 2)
+        alone = next(each for each in told if each.streams[0].tier == "low")
+        assert (alone.streams[0].frames_per_second, alone.crowd) == (30.0, 0)
+
+
 async def test_operators_thumbnails_and_relays_are_no_crowd() -> None:
     async with AsyncExitStack() as stack:
         plane = await stack.enter_async_context(running_plane(crowd_observers=2))
