@@ -1,5 +1,6 @@
 """Hundreds of observers on this machine who take no time from what is measured."""
 
+import shutil
 import sys
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -11,7 +12,8 @@ __all__ = ["idle_crowd"]
 
 AT_MOST = 100  # in one process
 CONNECT_SECONDS = 150.0
-IDLE = ("chrt", "--idle", "0")  # real ones have machines of their own: these take what the others leave (sched(7))
+# Real ones have machines of their own: these take what the others leave (sched(7)).
+IDLE = ("chrt", "--idle", "0") if shutil.which("chrt") else ("nice", "-n", "19")
 
 
 @asynccontextmanager

@@ -11,7 +11,7 @@ export interface StreamPoint {
 /** One row: the page's state at one moment. Null where nothing is known, so that a chart shows a hole. */
 export interface ChartRow {
   readonly wallMs: number; // since 1970, of a clock that is never set
-  readonly epoch: string;
+  readonly epoch: string; // "" before the session told it: feedback and pictures may come a little earlier
   readonly event: number | null;
   readonly eventRate: number | null; // 1/s
   readonly pictureDelayMs: number | null; // command to picture, measured since the row before
@@ -73,11 +73,12 @@ export function addRow(ring: ChartRing, row: ChartRow): void {
   for (const column of ring.columns.values()) column[at] = NaN;
   set(ring, TIME, at, row.wallMs / 1000);
   set(ring, EPOCH, at, epochNumber(ring, row.epoch));
-  set(ring, "event", at, row.event);
+  const epochKnown = row.epoch !== ""; // an event reference says nothing without it
+  set(ring, "event", at, epochKnown ? row.event : null);
   set(ring, "event_rate", at, row.eventRate);
   set(ring, "picture_delay_ms", at, row.pictureDelayMs);
   set(ring, "round_trip_ms", at, row.roundTripMs);
-  for (const point of row.streams) setStream(ring, at, point);
+  for (const point of row.streams) setStream(ring, at, epochKnown ? point : { ...point, stamp: null });
   ring.next = (at + 1) % ring.capacity;
   ring.count = Math.min(ring.capacity, ring.count + 1);
 }

@@ -51,6 +51,20 @@ describe("the charts' ring", () => {
     expect(window.column("nothing_of_this_name")).toEqual([null, null]);
   });
 
+  it("has no event and no stamp before their epoch is known", () => {
+    const ring = createChartRing(4);
+    for (const [second, epoch] of [
+      [1, ""],
+      [2, "a"],
+    ] as const)
+      addRow(ring, rowAt(second, { epoch, streams: [{ ...overview, stamp: second, gap: 0 }] }));
+    const window = chartWindow(ring, 0, 9);
+    expect(window.epochs()).toEqual(["", "a"]);
+    expect(window.column("event")).toEqual([null, 2]);
+    expect(window.column("overview_stamp")).toEqual([null, 2]);
+    expect(window.column("overview_gap")).toEqual([0, 0]);
+  });
+
   it("keeps each stream's stamp, gap and tolerance, and knows the streams", () => {
     const ring = createChartRing(8);
     addRow(ring, rowAt(1));
