@@ -9,7 +9,8 @@ Every picture: at both ends of the spell the bridge is held still for a moment, 
 the pictures are counted, at the console's encoders and at each observer. Missed is what the console dropped because
 somebody's outbox was full, and what was lost on the way, as the gaps in RTP's numbers tell. That nothing else is
 missing is shown by those who were in one tier (docs/quality.md) all the time: they have exactly as many pictures as
-its encoder made. Those whose path looked full for a part of the spell, and who got other pictures meanwhile, are told.
+its encoder made. How many have a number that is no tier's is told: their path looked full for a part of the spell, so
+that they got other pictures meanwhile, or they missed some.
 Cost: processor time of the console's process (proc(5)) with the observers less that without, shared out among them.
 The baseline is the main camera alone on `bench/baseline_server.py`: aiortc encodes it for each peer.
 """
@@ -217,7 +218,7 @@ def _results(found: Watched, bare: dict[int, float]) -> list[Result]:
     conditions = (
         f"{count} observers of all cameras and sound, {missed.received / count:.0f} pictures each of {taken}, "
         f"{missed.dropped} dropped at the console and {missed.lost} packets lost on the way, of all; {missed.mixed} "
-        f"observers had a path that looked full for a while and got other pictures; "
+        f"observers have a number of pictures that is no tier's; "
         f"console {watched.console_cpu:.0f} % of a core, {alone.console_cpu:.0f} % without observers; "
         f"the observers' own processes {watched.audience_cpu:.0f} %"
     )

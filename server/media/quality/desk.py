@@ -59,6 +59,7 @@ class QualityDesk:
         self._ladders: dict[tuple[Tier, str], PictureLadder] = {}
         self._plans: dict[tuple[Tier, str], PicturePlan] = {}
         self._crowd = Crowd(settings.crowd_observers)
+        self._low_divisor = 1  # the low tier gets one of so many pictures
         self._busy_seconds = busy_seconds
         self._load_at = clock(), busy_seconds()  # the last look at it
         self._ticks = 0
@@ -194,9 +195,10 @@ class QualityDesk:
             watched = [peer for peer in members if not peer.stays_low]
             least = min((peer.path.rate for peer in watched), default=LOW_FLOOR_BPS)
             most = LOW_SHARE * max(self._needs(peer) for peer in members)
-            # Whoever cannot take what a crowd gets does not get more pictures than it.
-            divisor = self._crowd.divisor if any(peer.in_crowd for peer in members) else 1
-            self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now, divisor)
+            # Whoever of a crowd cannot take what it gets does not get more pictures than it. The tier has one encoder:
+            # while somebody else is in it, who is owed all of them, all get them.
+            self._low_divisor = self._crowd.divisor if all(peer.in_crowd for peer in members) else 1
+            self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now, self._low_divisor)
 
     def _plan(self, tier: Tier, streams: list[VideoStream], total_bps: float, now: float, divisor: int = 1) -> None:
         """`divisor`: the tier gets one picture of so many, at most."""
@@ -241,7 +243,9 @@ class QualityDesk:
             if (passed := camera.stream.measured(camera.target)) is not None:  # as the camera made it
                 (width, height), (rate, bps) = camera.stream.size, passed
             else:
-                thinned |= peer.in_crowd and self._crowd.divisor > 1
+                thinned |= (
+                    self._low_divisor if peer.encoded_as == "low" else self._crowd.divisor
+                ) > 1 and peer.in_crowd
             streams.append(
                 StreamQuality(
                     stream=camera.stream.name,

@@ -168,6 +168,23 @@ async def test_whoever_has_a_narrow_path_gets_no_more_pictures_than_the_crowd() 
         assert (alone.streams[0].frames_per_second, alone.crowd) == (30.0, 0)
 
 
+async def test_an_operator_on_a_narrow_path_beside_a_crowd_gets_all_pictures() -> None:
+    async with AsyncExitStack() as stack:
+        plane = await stack.enter_async_context(running_plane(crowd_observers=2))
+        driver, waits = await watching(stack, plane, 2, priority=True)
+        driver.media.drives(True)
+        far = (await watching(stack, plane, 4))[0]
+        told: dict[Viewer, list[Quality]] = {waits: [], far: []}
+        for viewer, said in told.items():
+            viewer.media.on_quality(said.append)
+            viewer.media.quality.path.rate = 100_000
+        for _ in range(20):
+            desk(plane).tick()
+        assert [viewer.media.tier for viewer in told] == ["low", "low"]
+        for said in told.values():
+            assert (said[-1].streams[0].frames_per_second, said[-1].crowd) == (30.0, 0)
+
+
 async def test_operators_thumbnails_and_relays_are_no_crowd() -> None:
     async with AsyncExitStack() as stack:
         plane = await stack.enter_async_context(running_plane(crowd_observers=2))
