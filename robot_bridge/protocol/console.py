@@ -7,10 +7,10 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 |---|---|---|---|
 | control | unordered, 0 retransmits | client | command, rest, report, ping |
 | | | server | feedback, refusal, pong |
-| session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
+| session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note, silence_stops |
 
 | stop | reliable | client | stop, reset |
-| | | server | stop_state, refusal |
+| | | server | stop_state, stop_taken, refusal |
 """
 
 from typing import Annotated, Literal
@@ -31,6 +31,7 @@ from robot_bridge.protocol.messages import (
     Rest,
     Stop,
     StopState,
+    StopTaken,
 )
 
 __all__ = [
@@ -54,6 +55,7 @@ __all__ = [
     "SeatTake",
     "ServerMessage",
     "SharedNote",
+    "SilenceStops",
     "SourceStatus",
     "Sources",
     "SpeedCapMode",
@@ -137,6 +139,13 @@ class SeatRelease(msgspec.Struct, frozen=True, tag_field="type", tag="seat_relea
     """Give the control seat back."""
 
 
+class SilenceStops(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="silence_stops"):
+    """A supervisor silences the link of a peer that keeps pressing STOP, or lets it press again."""
+
+    peer: Name
+    silent: bool = True
+
+
 class Rename(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="rename"):
     """The name that others see."""
 
@@ -215,6 +224,7 @@ class Participant(msgspec.Struct, frozen=True, kw_only=True):
     round_trip_ms: float | None = None
     loss: float | None = None  # 0 to 1, of the media on the way to this peer
     tier: Tier | None = None  # None: receives no video
+    silenced: bool = False  # a supervisor silenced the stops of its link
 
 
 class StreamQuality(msgspec.Struct, frozen=True, kw_only=True):
@@ -325,6 +335,7 @@ ClientMessage = (
     | SeatDecline
     | SeatTake
     | SeatRelease
+    | SilenceStops
     | Rename
     | Note
     | Stop
@@ -346,6 +357,7 @@ ServerMessage = (
     | SharedNote
     | Notice
     | StopStateNotice
+    | StopTaken
 )
 
 _client_decoder: msgspec.json.Decoder[ClientMessage] = msgspec.json.Decoder(ClientMessage)

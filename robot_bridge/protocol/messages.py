@@ -32,6 +32,7 @@ __all__ = [
     "Rest",
     "Stop",
     "StopState",
+    "StopTaken",
     "decode_message",
     "encode_message",
 ]
@@ -44,6 +45,9 @@ IssueNumber = Annotated[int, msgspec.Meta(ge=1)]
 AxisValues = Annotated[list[float], msgspec.Meta(max_length=MAX_AXES)]
 Text = Annotated[str, msgspec.Meta(max_length=500)]
 Proof = Annotated[bytes, msgspec.Meta(max_length=64)]
+PressId = Annotated[str, msgspec.Meta(max_length=64)]
+StopNumber = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # what a JavaScript number holds exactly
+Nonce = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
 
 LinkRole = Literal["robot", "operator", "events", "media"]
 MediaCodec = Literal["yuv420p", "mjpeg", "h264", "pcm_s16le"]
@@ -59,7 +63,13 @@ RefusalReason = Literal[
     "no_seat",  # the sender does not hold the control seat
     "seat_taken",  # somebody else holds the control seat
     "declined",  # the seat's holder said no, or nothing in time
-    "not_neutral",  # a new holder's first command has to be neutral
+    "not_neutral",  # a neutral command has to come first: new holder, stop, new link, fault, restart, suspend
+    "unseen",  # its nonce is not that of the issue that it answers: the sender has not seen it
+    "stale_reset",  # a reset that does not name the newest stop
+    "too_soon",  # a reset within a second after the newest stop, or before a feedback showed that stop
+    "locked_out",  # somebody at the robot keeps it from being driven
+    "warning",  # the robot warns before it moves, and has not warned long enough
+    "silenced",  # a supervisor silenced the stops of this link
     "too_often",  # more notes than anyone can read
     "not_allowed",  # the sender's role does not permit it
     "link_down",  # the console has no robot link
@@ -67,11 +77,15 @@ RefusalReason = Literal[
 
 
 class StopState(msgspec.Struct, frozen=True):
-    """The latched stop. `by` and `reason` are empty unless stopped."""
+    """The latched stop, and the number of the newest one. `by` and `reason` are empty unless stopped."""
 
     stopped: bool = False
-    by: str = ""
+    by: str = ""  # who said the first stop since the last reset
     reason: str = ""
+    number: StopNumber = 0  # of the newest stop, also after its reset; never given twice; 0 before the first
+    press: PressId = ""  # id of the press that became the newest stop
+    kept: bool = True  # whether this state is on the robot's disk
+    locked_out: str = ""  # why somebody at the robot keeps it from being driven; "" when nobody does
 
 
 class Hello(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
@@ -101,6 +115,7 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
     event: EventReference
     issue: IssueNumber
     values: AxisValues  # one per axis of the description, in its units
+    nonce: Nonce = 0  # of the issue that it answers: proof that the sender has seen it
 
 
 class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="feedback"):
@@ -118,6 +133,9 @@ class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     faults: list[str] = []
     limits: list[str] = []  # names of the position limits and geofences that slowed the robot since the last feedback
     unknown: list[str] = []  # names of axes and joints that could not be measured: their values are old
+    nonce: Nonce = 0  # 53 random bits, new in every issue
+    neutral_needed: bool = False  # no moving command executes before a neutral one
+    warning: float = 0.0  # s that the robot still warns before it may move
 
 
 class Refusal(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="refusal"):
@@ -127,6 +145,7 @@ class Refusal(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
     reason: RefusalReason
     current: EventReference
     detail: Text = ""
+    stop: StopNumber = 0  # the stop that a refused reset named; 0 where nothing or something else was refused
 
 
 class EventNotice(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="event"):
@@ -158,16 +177,26 @@ class Rest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="res
 
 
 class Stop(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="stop"):
-    """Latch the stop."""
+    """Latch the stop. Repeats of one press carry its id and are one stop."""
 
     by: Text = ""
     reason: Text = ""
+    press: PressId = ""  # 16 random bytes in hex; "" makes every message a press of its own
+
+
+class StopTaken(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="stop_taken"):
+    """The bridge's answer to a stop, when the stop is on its disk or cannot be kept."""
+
+    press: PressId
+    number: StopNumber  # that this press has
+    kept: bool = True  # False: latched, but not on the disk
 
 
 class Reset(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="reset"):
-    """Release the latched stop. Moves nothing."""
+    """Release the latched stop, if `number` is the newest. Moves nothing."""
 
     by: Text = ""
+    number: StopNumber = 0  # of the newest stop that the sender has seen
 
 
 class Ping(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="ping"):
@@ -188,7 +217,20 @@ class Goodbye(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
 
 
 LinkMessage = (
-    Hello | Challenge | Command | Feedback | Refusal | EventNotice | Media | Rest | Stop | Reset | Ping | Pong | Goodbye
+    Hello
+    | Challenge
+    | Command
+    | Feedback
+    | Refusal
+    | EventNotice
+    | Media
+    | Rest
+    | Stop
+    | StopTaken
+    | Reset
+    | Ping
+    | Pong
+    | Goodbye
 )
 
 _decoder: msgspec.msgpack.Decoder[LinkMessage] = msgspec.msgpack.Decoder(LinkMessage)

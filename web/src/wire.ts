@@ -65,7 +65,7 @@ export interface Camera {
   readonly metres_per_pixel: number | null;
 }
 
-export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | Rename | Note | Stop | Reset;
+export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Stop | Reset;
 
 /** Event `event`, valid only as the answer to issue `issue` of feedback `event - 1`. */
 export interface Command {
@@ -73,6 +73,7 @@ export interface Command {
   readonly event: number;
   readonly issue: number;
   readonly values: readonly (number)[];
+  readonly nonce?: number;
 }
 
 /** A set of bindings that are active together; the operator switches between layers. */
@@ -97,6 +98,9 @@ export interface Feedback {
   readonly faults: readonly (string)[];
   readonly limits: readonly (string)[];
   readonly unknown: readonly (string)[];
+  readonly nonce: number;
+  readonly neutral_needed: boolean;
+  readonly warning: number;
 }
 
 /** How a contact feels to the operator: rumble and tone by newtons. Without it, by the wrench sensor's own range. Of the force between the two, as a share from 0 to 1, `curve` is the exponent: below 1 light contacts are felt more. */
@@ -161,6 +165,7 @@ export interface Participant {
   readonly round_trip_ms: number | null;
   readonly loss: number | null;
   readonly tier: "high" | "low" | "operator" | null;
+  readonly silenced: boolean;
 }
 
 export interface Participants {
@@ -241,9 +246,10 @@ export interface RecordingState {
 export interface Refusal {
   readonly type: "refusal";
   readonly event: number;
-  readonly reason: "declined" | "late" | "link_down" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "not_neutral" | "out_of_order" | "rested" | "seat_taken" | "stopped" | "too_often" | "wrong_size";
+  readonly reason: "declined" | "late" | "link_down" | "locked_out" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "not_neutral" | "out_of_order" | "rested" | "seat_taken" | "silenced" | "stale_reset" | "stopped" | "too_often" | "too_soon" | "unseen" | "warning" | "wrong_size";
   readonly current: number;
   readonly detail: string;
+  readonly stop: number;
 }
 
 /** The name that others see. */
@@ -264,10 +270,11 @@ export interface Report {
   readonly ping?: number | null;
 }
 
-/** Release the latched stop. Moves nothing. */
+/** Release the latched stop, if `number` is the newest. Moves nothing. */
 export interface Reset {
   readonly type: "reset";
   readonly by?: string;
+  readonly number?: number;
 }
 
 /** Bring the axes to rest unless an event newer than `event` was executed; voids moving commands up to `event`. */
@@ -351,7 +358,7 @@ export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken;
 
 /** A note that somebody wrote, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {
@@ -364,6 +371,13 @@ export interface SharedNote {
   readonly epoch: string;
   readonly event: number;
   readonly time: number;
+}
+
+/** A supervisor silences the link of a peer that keeps pressing STOP, or lets it press again. */
+export interface SilenceStops {
+  readonly type: "silence_stops";
+  readonly peer: string;
+  readonly silent?: boolean;
 }
 
 /** A camera or microphone that is attached to the console itself. */
@@ -390,18 +404,23 @@ export interface SpeedCapState {
   readonly why: "" | "delay" | "unknown";
 }
 
-/** Latch the stop. */
+/** Latch the stop. Repeats of one press carry its id and are one stop. */
 export interface Stop {
   readonly type: "stop";
   readonly by?: string;
   readonly reason?: string;
+  readonly press?: string;
 }
 
-/** The latched stop. `by` and `reason` are empty unless stopped. */
+/** The latched stop, and the number of the newest one. `by` and `reason` are empty unless stopped. */
 export interface StopState {
   readonly stopped: boolean;
   readonly by: string;
   readonly reason: string;
+  readonly number: number;
+  readonly press: string;
+  readonly kept: boolean;
+  readonly locked_out: string;
 }
 
 /** The robot's stop state, as the bridge reports it; sent on every change and to newcomers. */
@@ -409,6 +428,14 @@ export interface StopStateNotice {
   readonly type: "stop_state";
   readonly stop: StopState;
   readonly event: number;
+}
+
+/** The bridge's answer to a stop, when the stop is on its disk or cannot be kept. */
+export interface StopTaken {
+  readonly type: "stop_taken";
+  readonly press: string;
+  readonly number: number;
+  readonly kept: boolean;
 }
 
 /** One negotiated medium. */

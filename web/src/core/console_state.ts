@@ -178,6 +178,7 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       state.notes.splice(0, state.notes.length - NOTE_LIMIT);
       return;
     case "pong":
+    case "stop_taken": // the stop sender's
       return;
     default:
       message satisfies never;
