@@ -1,4 +1,17 @@
-import type { Axis, Feedback, Refusal, RobotDescription, RobotState, Seat, Welcome } from "../src/wire";
+import type {
+  Axis,
+  Feedback,
+  Refusal,
+  RobotDescription,
+  RobotState,
+  Seat,
+  StopState,
+  Welcome,
+} from "../src/wire";
+
+export function stopOf(rest: Partial<StopState> = {}): StopState {
+  return { stopped: false, by: "", reason: "", number: 0, press: "", kept: true, locked_out: "", ...rest };
+}
 
 export function feedbackOf(event: number, rest: Partial<Feedback> = {}): Feedback {
   return {
@@ -11,16 +24,19 @@ export function feedbackOf(event: number, rest: Partial<Feedback> = {}): Feedbac
     wrench: [],
     ranges: [],
     at_rest: true,
-    stop: { stopped: false, by: "", reason: "" },
+    stop: stopOf(),
     faults: [],
     limits: [],
     unknown: [],
+    nonce: 0,
+    neutral_needed: false,
+    warning: 0,
     ...rest,
   };
 }
 
 export function refusalOf(event: number, reason: Refusal["reason"]): Refusal {
-  return { type: "refusal", event, reason, current: 1, detail: "" };
+  return { type: "refusal", event, reason, current: 1, detail: "", stop: 0 };
 }
 
 export function axisOf(name: string, rest: Partial<Axis> = {}): Axis {

@@ -64,7 +64,15 @@ export interface ConsoleState {
 
 const LOG_LIMIT = 40;
 const NOTE_LIMIT = 100;
-const NOT_STOPPED: StopState = { stopped: false, by: "", reason: "" };
+const NOT_STOPPED: StopState = {
+  stopped: false,
+  by: "",
+  reason: "",
+  number: 0,
+  press: "",
+  kept: true,
+  locked_out: "",
+};
 
 export function createConsoleState(): ConsoleState {
   return {

@@ -8,7 +8,7 @@ import {
   note,
   robotIsUp,
 } from "../../src/core/console_state";
-import { feedbackOf, refusalOf, robotOf, seatOf, welcomeOf } from "../messages";
+import { feedbackOf, refusalOf, robotOf, seatOf, stopOf, welcomeOf } from "../messages";
 
 describe("the console's state", () => {
   it("knows who we are and whether we may drive", () => {
@@ -26,7 +26,7 @@ describe("the console's state", () => {
 
   it("keeps the newest feedback and its stop state", () => {
     const state = createConsoleState();
-    const stop = { stopped: true, by: "Ada", reason: "test" };
+    const stop = stopOf({ stopped: true, by: "Ada", reason: "test" });
     applyMessage(state, feedbackOf(5, { issue: 2, stop }), 0);
     applyMessage(state, feedbackOf(4, { issue: 9 }), 0);
     applyMessage(state, feedbackOf(5, { issue: 1 }), 0);
@@ -38,7 +38,7 @@ describe("the console's state", () => {
 
   it("takes stop states, participants and pongs", () => {
     const state = createConsoleState();
-    applyMessage(state, { type: "stop_state", stop: { stopped: true, by: "x", reason: "" }, event: 3 }, 0);
+    applyMessage(state, { type: "stop_state", stop: stopOf({ stopped: true, by: "x" }), event: 3 }, 0);
     applyMessage(state, { type: "participants", participants: [] }, 0);
     applyMessage(state, { type: "pong", id: 1 }, 0);
     expect(state.stop.by).toBe("x");
@@ -76,7 +76,7 @@ describe("the console's state", () => {
   it("forgets a connection that ended, but not that the robot is stopped", () => {
     const state = createConsoleState();
     applyMessage(state, welcomeOf("operator"), 0);
-    applyMessage(state, feedbackOf(5, { stop: { stopped: true, by: "x", reason: "" } }), 0);
+    applyMessage(state, feedbackOf(5, { stop: stopOf({ stopped: true, by: "x" }) }), 0);
     forgetConnection(state);
     expect(state).toMatchObject({ welcome: null, feedback: null, seat: null, robot: null });
     expect(state.stop.stopped).toBe(true);

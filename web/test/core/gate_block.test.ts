@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { applyMessage, createConsoleState, forgetConnection } from "../../src/core/console_state";
 import { gateBlock } from "../../src/core/gate_block";
-import { feedbackOf, robotOf, seatOf, welcomeOf } from "../messages";
+import { feedbackOf, robotOf, seatOf, stopOf, welcomeOf } from "../messages";
 
 function driving(): ReturnType<typeof createConsoleState> {
   const state = createConsoleState();
@@ -33,14 +33,14 @@ describe("the gate", () => {
 
   it("is shut while the robot cannot be reached, whatever else holds", () => {
     const state = driving();
-    applyMessage(state, feedbackOf(5, { stop: { stopped: true, by: "Ada", reason: "test" } }), 0);
+    applyMessage(state, feedbackOf(5, { stop: stopOf({ stopped: true, by: "Ada", reason: "test" }) }), 0);
     applyMessage(state, robotOf("down", "silent"), 0);
     expect(gateBlock(state, true)).toBe("robot_down");
   });
 
   it("is shut while the robot is stopped", () => {
     const state = driving();
-    applyMessage(state, feedbackOf(5, { stop: { stopped: true, by: "Ada", reason: "test" } }), 0);
+    applyMessage(state, feedbackOf(5, { stop: stopOf({ stopped: true, by: "Ada", reason: "test" }) }), 0);
     expect(gateBlock(state, true)).toBe("stopped");
   });
 

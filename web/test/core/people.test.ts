@@ -19,6 +19,7 @@ function person(
     round_trip_ms: null,
     loss: null,
     tier: null,
+    silenced: false,
     ...rest,
   };
 }

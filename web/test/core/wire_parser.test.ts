@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { parseServerMessage } from "../../src/core/wire_parser";
-import { descriptionOf, axisOf, feedbackOf, seatOf, welcomeOf } from "../messages";
+import { axisOf, descriptionOf, feedbackOf, seatOf, stopOf, welcomeOf } from "../messages";
 
 const streams = [
   { mid: "0", stream: "front", label: "Front", kind: "video", codec: "VP8", carrier: "capture-time" },
@@ -13,9 +13,9 @@ describe("the wire parser", () => {
     { ...welcomeOf("operator"), streams },
     { type: "pong", id: 4 },
     { type: "notice", level: "info", text: "hello" },
-    { type: "refusal", event: 0, reason: "late", current: 3, detail: "" },
+    { type: "refusal", event: 0, reason: "late", current: 3, detail: "", stop: 0 },
     { type: "participants", participants: [] },
-    { type: "stop_state", stop: { stopped: true, by: "x", reason: "" }, event: 2 },
+    { type: "stop_state", stop: stopOf({ stopped: true, by: "x" }), event: 2 },
     { type: "robot", link: "up", epoch: "e", description: descriptionOf([axisOf("x")]), detail: "" },
   ])("reads a $type", (message) => {
     expect(parseServerMessage(JSON.stringify(message))).toEqual({ kind: "message", message });
