@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 import av
 import numpy as np
+import numpy.typing as npt
 from av.codec.context import Flags
 from av.error import FFmpegError
 from av.video.codeccontext import VideoCodecContext
+from av.video.plane import VideoPlane
 
 from robot_bridge.protocol.messages import Media
 from server.media.errors import PayloadError, UnsupportedCodecError
@@ -15,9 +17,14 @@ __all__ = ["PictureDecoder"]
 
 MIN_SIDE = 16  # pixels
 
+Plane = npt.NDArray[np.uint8]
+
 
 class PictureDecoder:
-    """Turns `yuv420p`, `mjpeg` and `h264` payloads into yuv420p frames. Used from one thread."""
+    """Turns `yuv420p`, `mjpeg` and `h264` payloads into yuv420p frames. Used from one thread.
+
+    A side with an odd number of pixels loses its last one.
+    """
 
     def __init__(self) -> None:
         self._mjpeg: VideoCodecContext | None = None
@@ -53,7 +60,7 @@ class PictureDecoder:
             raise PayloadError("not a whole JPEG picture")
         frame = frames[-1]
         _check_size(frame.width, frame.height)
-        return frame.reformat(format="yuv420p", dst_color_range="MPEG")
+        return _even(frame.reformat(format="yuv420p", dst_color_range="MPEG"))
 
     def _from_h264(self, group: Sequence[Media]) -> av.VideoFrame:
         if not group:
@@ -78,12 +85,39 @@ class PictureDecoder:
 def _from_yuv420p(media: Media) -> av.VideoFrame:
     width, height = media.width, media.height
     _check_size(width, height)
-    if len(media.payload) != width * height * 3 // 2:
+    chroma = (width + 1) // 2 * ((height + 1) // 2)
+    if len(media.payload) != width * height + 2 * chroma:
         raise PayloadError(f"{len(media.payload)} bytes are not a yuv420p picture of {width}x{height}")
-    planes = np.frombuffer(media.payload, np.uint8).reshape(height * 3 // 2, width)
-    return av.VideoFrame.from_numpy_buffer(planes, format="yuv420p")  # without a copy
+    if width % 2 == 0 and height % 4 == 0:  # PyAV takes whole groups of six rows of such an array, and no other
+        rows = np.frombuffer(media.payload, np.uint8).reshape(height * 3 // 2, width)
+        return av.VideoFrame.from_numpy_buffer(rows, format="yuv420p")  # without a copy
+    luma, u, v = np.split(np.frombuffer(media.payload, np.uint8), (width * height, width * height + chroma))
+    half = ((height + 1) // 2, (width + 1) // 2)
+    return _frame(luma.reshape(height, width), u.reshape(half), v.reshape(half))
+
+
+def _even(frame: av.VideoFrame) -> av.VideoFrame:
+    """Without the last row or column where there is an odd number: H.264 and VP8 encoders take even sides only."""
+    if frame.width % 2 == 0 and frame.height % 2 == 0:
+        return frame
+    luma, u, v = (_rows(plane)[: plane.height, : plane.width] for plane in frame.planes)
+    return _frame(luma, u, v)
+
+
+def _frame(luma: Plane, u: Plane, v: Plane) -> av.VideoFrame:
+    """A frame of these planes, less what makes a side odd."""
+    height, width = luma.shape
+    frame = av.VideoFrame(width - width % 2, height - height % 2, "yuv420p")
+    for plane, values in zip(frame.planes, (luma, u, v), strict=True):
+        _rows(plane)[: plane.height, : plane.width] = values[: plane.height, : plane.width]
+    return frame
+
+
+def _rows(plane: VideoPlane) -> Plane:
+    """The plane's memory, row by row with what pads each of them; writing to it changes the plane."""
+    return np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
 
 
 def _check_size(width: int, height: int) -> None:
-    if width < MIN_SIDE or height < MIN_SIDE or width % 2 or height % 2:
-        raise PayloadError(f"{width}x{height}: sides must be even and at least {MIN_SIDE} pixels")
+    if width < MIN_SIDE or height < MIN_SIDE:
+        raise PayloadError(f"{width}x{height}: sides must have at least {MIN_SIDE} pixels")

@@ -119,21 +119,34 @@ def _from_rgb(pixels: Pixels, order: tuple[int, int, int]) -> bytes:
 
 
 def _quartered(channel: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
+    """Sums of two by two pixels; beyond an odd side the last pixel stands twice."""
+    height, width = channel.shape
+    if height % 2 or width % 2:
+        channel = np.pad(channel, ((0, height % 2), (0, width % 2)), mode="edge")
     rows = channel[0::2] + channel[1::2]
     return rows[:, 0::2] + rows[:, 1::2]
 
 
 def _from_grey(pixels: Pixels) -> bytes:
     luma = ((pixels.astype(np.uint16) * 220) >> 8) + 16  # 0 to 255 becomes 16 to 235
-    return luma.astype(np.uint8).tobytes() + bytes([128]) * (luma.size // 2)
+    height, width = luma.shape
+    return luma.astype(np.uint8).tobytes() + bytes([128]) * (2 * ((height + 1) // 2) * ((width + 1) // 2))
 
 
 def _from_yuv422(pixels: Pixels, order: tuple[int, int, int]) -> bytes:
-    """Two rows share their chroma."""
+    """Two rows share their chroma.
+
+    Raises:
+        BadPicture: an odd width, where two pixels share four bytes.
+    """
     first, u_at, v_at = order
     height, width, _ = pixels.shape
-    pairs = pixels.reshape(height, width // 2, 4)
-    luma = pixels[:, :, first % 2]
+    if width % 2:
+        raise BadPicture("picture of an odd width in a 4:2:2 encoding")
+    if height % 2:
+        pixels = np.concatenate((pixels, pixels[-1:]))
+    pairs = pixels.reshape(-1, width // 2, 4)
+    luma = pixels[:height, :, first % 2]
     u, v = (
         (pairs[0::2, :, at].astype(np.uint16) + pairs[1::2, :, at].astype(np.uint16) + 1) >> 1 for at in (u_at, v_at)
     )

@@ -125,8 +125,8 @@ class CameraTopic(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     label: str = ""
     topic: Topic
     message: Literal["Image", "CompressedImage"] = "Image"
-    width: Annotated[int, Meta(ge=16, le=8192, multiple_of=2)]
-    height: Annotated[int, Meta(ge=16, le=8192, multiple_of=2)]
+    width: Annotated[int, Meta(ge=16, le=8192)]
+    height: Annotated[int, Meta(ge=16, le=8192)]
     frame_rate: Annotated[float, Meta(ge=0.1, le=120)] = 15.0  # Hz; more than that is left out
     captured: Literal["header", "arrival"] = "header"  # what tells the time of capture
     latency: Annotated[float, Meta(ge=0, le=5)] = 0.0  # s, taken off that time besides

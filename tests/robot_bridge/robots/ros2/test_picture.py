@@ -95,6 +95,21 @@ def test_yuv422_keeps_its_luma_and_halves_its_chroma(encoding: str, name: str) -
     assert abs(rgb_of(payload) - smooth()).mean() < 4
 
 
+@pytest.mark.parametrize("encoding", ["rgb8", "mono8", "yuyv"])
+@pytest.mark.parametrize(("width", "height"), [(126, 63), (127, 64), (127, 63)])
+def test_an_odd_side_has_colours_for_half_of_it_rounded_up(encoding: str, width: int, height: int) -> None:
+    depth = {"rgb8": 3, "mono8": 1, "yuyv": 2}[encoding]
+    shade = Image(encoding, array.array("B", bytes([100]) * (width * height * depth)), width * depth)
+    shade.width, shade.height = width, height
+    if encoding == "yuyv" and width % 2:
+        with pytest.raises(BadPicture, match="odd width"):
+            from_image(shade, width, height)
+        return
+    planes = np.frombuffer(from_image(shade, width, height).data, np.uint8)
+    assert planes.size == width * height + 2 * ((width + 1) // 2) * ((height + 1) // 2)
+    assert len(set(planes[: width * height])) == len(set(planes[width * height :])) == 1
+
+
 @pytest.mark.parametrize("encoding", ["16UC1", "32FC1", "bayer_rggb8", "nv12", "", "x" * 5000])
 def test_an_encoding_that_is_not_supported_is_named(encoding: str) -> None:
     with pytest.raises(BadPicture, match="is not supported") as caught:
