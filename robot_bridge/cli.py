@@ -17,7 +17,14 @@ import uvloop
 
 from robot_bridge.bridge import Bridge
 from robot_bridge.check_link import check_link
-from robot_bridge.errors import BridgeError
+from robot_bridge.errors import (
+    BridgeError,
+    DescriptionError,
+    InsecureLink,
+    ModelError,
+    SettingsError,
+    UnknownRobot,
+)
 from robot_bridge.link_tls import LinkTls
 from robot_bridge.protocol.errors import SecretError
 from robot_bridge.protocol.link_secret import LinkSecret
@@ -28,8 +35,12 @@ from robot_bridge.settings import BridgeSettings
 __all__ = ["main", "robot_app", "run"]
 
 SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+# Wrong however often it is tried; the rest may go away by itself, as a robot that is not switched on.
+CANNOT_BE_MEANT = (UnknownRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
 
-robot_app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+robot_app = typer.Typer(pretty_exceptions_enable=False)
 
 
 @robot_app.callback(invoke_without_command=True, context_settings={"allow_interspersed_args": True})
@@ -77,10 +88,10 @@ def run(
         uvloop.run(_serve(label, make, settings, as_json))
     except (BridgeError, SecretError) as error:
         typer.echo(f"lockstep robot: {error.detail}", err=True)
-        raise typer.Exit(1) from error
+        raise typer.Exit(EXIT_USAGE if isinstance(error, CANNOT_BE_MEANT) else EXIT_FAILED) from error
     except OSError as error:
         typer.echo(f"lockstep robot: {error}", err=True)
-        raise typer.Exit(1) from error
+        raise typer.Exit(EXIT_FAILED) from error
 
 
 def _secret(path: Path | None) -> LinkSecret | None:

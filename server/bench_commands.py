@@ -1,9 +1,14 @@
-"""Commands that measure or draw. They live in `bench/`, which nothing here imports: loaded when one is asked for."""
+"""Commands that measure or draw. They live in `bench/`, which nothing here imports: loaded when one is asked for.
 
-from importlib import import_module
+Where `bench/` is not installed, as in the images, there are no such commands.
+"""
+
+from importlib.util import find_spec
 from typing import Any
 
 import typer
+
+from server.cli_extras import load_extra
 
 __all__ = ["add_bench_commands"]
 
@@ -31,6 +36,8 @@ COMMANDS = {
 
 
 def add_bench_commands(app: typer.Typer) -> None:
+    if find_spec("bench") is None:
+        return
     for name in COMMANDS:
         _add(app, name)
 
@@ -39,11 +46,13 @@ def _add(app: typer.Typer, name: str) -> None:
     module, function, about = COMMANDS[name]
 
     def run(context: typer.Context) -> None:
-        command: Any = getattr(import_module(module), function)
+        command: Any = getattr(load_extra(module, "dev"), function)
         measuring = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
         measuring.command()(command)
         measuring(context.args, prog_name=f"lockstep {name}")
 
     # Its own parser sees everything, --help included.
     everything = {"ignore_unknown_options": True, "allow_extra_args": True}
-    app.command(name, help=about, add_help_option=False, context_settings=everything)(run)
+    app.command(
+        name, help=about, add_help_option=False, context_settings=everything, rich_help_panel="Measure and try"
+    )(run)

@@ -2,9 +2,11 @@
 
 import faulthandler
 import logging
+import os
 import sys
 from collections.abc import Mapping
 from enum import StrEnum
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
@@ -51,6 +53,7 @@ from server.serve import PortTaken, bind
 from server.settings import Settings
 from server.state import open_state
 from server.state_dir import StateDirUnusable
+from server.unknown_settings import unknown_settings
 
 __all__ = ["app", "main"]
 
@@ -68,9 +71,27 @@ class Switch(StrEnum):
     OFF = "off"
 
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
-app.add_typer(robot_app, name="robot")
-add_bench_commands(app)
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Drive a robot from a browser. `lockstep up` runs a simulated robot and the console.",
+)
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"lockstep {version('lockstep')}")
+        raise typer.Exit
+
+
+@app.callback()
+def lockstep(
+    _version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_say_version, is_eager=True)
+    ] = False,
+) -> None:
+    """The options of all commands."""
+
 
 Host = Annotated[str | None, typer.Option(help="Address to listen on; 127.0.0.1 unless set.")]
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the console; 0 takes any free one.")]
@@ -159,6 +180,9 @@ def up(
     kinds = _simulated(robot)
     if options and "" not in kinds:
         raise _usage("--ros2 and --mjcf are for one robot; run the others by `lockstep robot` and use `lockstep serve`")
+    unknown = [] if options else sorted(set(kinds.values()) - set(robot_names()))
+    if unknown:
+        raise _usage(f"no robot {unknown[0]!r}; there are {', '.join(robot_names())}")
     for number, (name, kind) in enumerate(kinds.items()):
         log = [] if event_log is None else ["--event-log", str(own_event_log(event_log, name))]
         port_of_bridge = robot_port + number if robot_port else 0
@@ -299,6 +323,8 @@ def _settings(**flags: object) -> Settings:
 
 def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool, quiet: bool) -> None:
     configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
+    for each in unknown_settings(os.environ, Settings):
+        say(each)
     sys.setswitchinterval(SWITCH_INTERVAL)
     share_arenas()
     raise_file_limit()
@@ -333,8 +359,10 @@ def _check_files(settings: Settings) -> None:
         raise typer.Exit(EXIT_USAGE) from error
 
 
+app.add_typer(robot_app, name="robot", help="Run a robot and its bridge until interrupted.")
 add_access_commands(app, _settings)
 add_recording_commands(app, _settings)
+add_bench_commands(app)
 
 
 def _usage(text: str) -> typer.Exit:

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from datetime import datetime
 from enum import StrEnum
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +15,7 @@ import typer
 
 from server.access import Access
 from server.cli_access import MakeSettings, RobotOption, StateDirOption
+from server.cli_extras import load_extra
 from server.console_address import read_address
 from server.recording.errors import RecordingError
 from server.recording.recorder import recordings_directory
@@ -144,7 +144,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         """Write a recording in another form."""
         path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         # Loaded only here: parquet and lerobot need pyarrow, the extra "export".
-        exporter: Any = import_module(f"server.recording.export_{to.value}")
+        exporter: Any = load_extra(f"server.recording.export_{to.value}", "export")
         written = _or_usage(lambda: exporter.export(path, out, task))
         for each in written:
             sys.stdout.write(f"{each}\n")

@@ -7,7 +7,8 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 |---|---|---|---|
 | control | unordered, 0 retransmits | client | command, rest, report, ping |
 | | | server | feedback, refusal, pong |
-| session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note, silence_stops |
+| session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
+| | | client | silence_stops |
 
 | stop | reliable | client | stop, reset |
 | | | server | stop_state, stop_taken, refusal |

@@ -1,8 +1,8 @@
 """`lockstep export --to lerobot`: a LeRobot dataset, version 3, of one episode. Needs pyarrow.
 
 One frame is one event `s`: the state is feedback `s`, the action command `s+1`, which answered it, and each picture the
-first one stamped `s`, or the newest older one. So a frame holds what belongs to the same state of the robot, and its
-number, not the clock, is its time.
+first one stamped `s`, or the newest older one. So a frame holds what belongs to the same state of the robot. The rate
+is the median one of the events that were recorded.
 """
 
 import json
@@ -71,11 +71,20 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
     if not frames:
         raise RecordingDamaged("no event has a feedback, a command that answers it, and a picture of every camera")
     root.mkdir(parents=True)
-    fps = max(1, round(description.max_event_rate))
+    fps = _rate([frame.feedback.time for frame in frames])
     events = [frame.feedback.event for frame in frames]
     exported = [_write_video(path, root, topic, events, fps) for topic in cameras]
     _write_tables(root, description, frames, exported, fps, task)
     return [root]
+
+
+def _rate(times: list[float]) -> int:
+    """Events per second as they happened: of the median interval, so that pauses do not count; at least 1 Hz.
+
+    A dataset of this version has one rate for all its frames, in whole hertz.
+    """
+    intervals = [later - earlier for earlier, later in pairwise(times) if later > earlier]
+    return max(1, round(1 / float(np.median(intervals)))) if intervals else 1
 
 
 def _frames(reader: RecordingReader, description: RobotDescription) -> Iterator[Frame]:
@@ -202,8 +211,8 @@ def _write_tables(
 
 
 def _arrow(values: Array) -> pa.Array:
-    if values.ndim == 1:
-        return pa.array(values)
+    if values.ndim == 1 or values.shape[1] == 1:  # LeRobot reads a feature of the shape (1,) as a plain number
+        return pa.array(values.reshape(-1))
     return pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
 
 

@@ -48,7 +48,7 @@ async def test_it_prints_its_address_once_ready_and_leaves_cleanly(how: signal.S
 
 def test_an_unknown_robot_is_answered_with_those_there_are() -> None:
     result = CliRunner().invoke(cli.robot_app, ["tractor", "--port", "0"])
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "no robot 'tractor'" in result.output
     assert "planar" in result.output
 
@@ -71,7 +71,7 @@ def test_an_event_log_that_cannot_be_written_is_an_error_and_not_a_traceback(tmp
 
 def test_beyond_loopback_it_does_not_start_without_a_secret_and_says_what_to_do() -> None:
     result = CliRunner().invoke(cli.robot_app, ["planar", "--port", "0", "--host", "0.0.0.0"])
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "--link-secret-file" in result.output
 
 
@@ -83,7 +83,7 @@ def test_a_secret_that_is_too_short_is_refused(tmp_path: Path) -> None:
         ([], {"LOCKSTEP_LINK_SECRET_FILE": str(tmp_path / "secret")}),
     ):
         result = CliRunner().invoke(cli.robot_app, ["planar", "--port", "0", *arguments], env=environment)
-        assert result.exit_code == 1
+        assert result.exit_code == 2
         assert "at least 32 bytes" in result.output
 
 

@@ -5,6 +5,7 @@ import os
 import signal
 import socket
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import httpx
@@ -100,7 +101,7 @@ async def test_a_port_in_use_is_said_clearly() -> None:
     [
         (("serve", "--robot", "nonsense"), 2, "is not tcp://host:port"),
         (("serve", "--ice-host", "example"), 2, "ice_hosts"),
-        (("up", "--robot", "teapot", "--port", "0", "--robot-port", "0"), 4, "teapot"),
+        (("up", "--robot", "teapot", "--port", "0", "--robot-port", "0"), 2, "teapot"),
         (("up", "--ros2", "none.yaml", "--port", "0", "--robot-port", "0"), 4, "none.yaml: No such file"),
         (("up", "--robot-python", "/none/python", "--port", "0", "--robot-port", "0"), 4, "/none/python"),
         (("serve", "--port", "70000"), 2, "65535"),
@@ -142,3 +143,31 @@ async def test_up_runs_several_robots_each_with_a_name_and_ends_them_all(tmp_pat
 def test_robots_that_cannot_be_meant_are_refused_by_name(arguments: tuple[str, ...], name: str) -> None:
     asked = CliRunner().invoke(app, arguments)
     assert (asked.exit_code, name in asked.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("robots", [["tractor"], ["left=planar", "right=tractor"]])
+def test_up_names_the_robots_there_are_when_one_is_unknown(robots: list[str]) -> None:
+    asked = CliRunner().invoke(app, ["up", *(word for robot in robots for word in ("--robot", robot))])
+    assert asked.exit_code == 2
+    assert "no robot 'tractor'; there are" in asked.stderr
+
+
+def test_the_version_is_that_of_the_distribution() -> None:
+    asked = CliRunner().invoke(app, ["--version"])
+    assert (asked.exit_code, asked.stdout.split()) == (0, ["lockstep", version("lockstep")])
+
+
+def test_help_begins_with_what_a_newcomer_needs_and_puts_measuring_apart() -> None:
+    said = CliRunner().invoke(app, ["--help"], terminal_width=100).stdout
+    places = [said.index(f" {name} ") for name in ("up", "serve", "invite", "record", "experiment", "soak")]
+    assert places == sorted(places)
+    assert said.index("Measure and try") < said.index(" experiment ")
+
+
+async def test_a_misspelt_setting_of_the_environment_is_named_at_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LOCKSTEP_PORTT", "1")
+    async with running_stack(tmp_path, extra=("--robot-port", "0")) as stack:
+        pass
+    assert any("LOCKSTEP_PORTT is no setting" in line for line in stack.output)

@@ -1,0 +1,51 @@
+"""Names variables of the environment that look like settings and are none. No I/O."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import get_args
+
+from pydantic import BaseModel
+
+__all__ = ["unknown_settings"]
+
+PREFIX = "LOCKSTEP_"
+# Read by other programs that a deployment runs with the same environment (deploy/), or by other commands.
+OTHERS = frozenset(
+    {
+        "LOCKSTEP_ROBOT_PYTHON",
+        "LOCKSTEP_ROBOT_NAME",
+        "LOCKSTEP_SITE",
+        "LOCKSTEP_HTTP_PORT",
+        "LOCKSTEP_HTTPS_PORT",
+        "LOCKSTEP_ONE",
+        "LOCKSTEP_TWO",
+        "LOCKSTEP_EXTERNAL_IP",
+    }
+)
+
+
+def unknown_settings(environment: Iterable[str], settings: type[BaseModel], more: Iterable[str] = ()) -> list[str]:
+    """A sentence for each variable of `environment` that begins as a setting and that nothing reads.
+
+    Args:
+        environment: names of variables
+        settings: what reads them
+        more: further names that are read
+    """
+    known = {*_names(settings, PREFIX), *OTHERS, *more}
+    found = [name for name in sorted(environment) if name.upper().startswith(PREFIX) and name.upper() not in known]
+    return [_sentence(name, known) for name in found]
+
+
+def _names(settings: type[BaseModel], prefix: str) -> Iterable[str]:
+    """The variables of all fields, and of the fields of their own fields."""
+    for name, field in settings.model_fields.items():
+        yield f"{prefix}{name.upper()}"
+        for kind in (field.annotation, *get_args(field.annotation)):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                yield from _names(kind, f"{prefix}{name.upper()}__")
+
+
+def _sentence(name: str, known: Iterable[str]) -> str:
+    near = get_close_matches(name.upper(), known, 1)
+    return f"{name} is no setting and has no effect{f'; did you mean {near[0]}?' if near else ''}"
