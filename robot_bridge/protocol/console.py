@@ -9,7 +9,8 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 | | | server | feedback, refusal, pong |
 | session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
 | | | client | silence_stops |
-
+| | | server | welcome, robot, seat, participants, quality, speed_cap, sources, voice, recording, note_shared |
+| | | server | notice, refusal |
 | stop | reliable | client | stop, reset |
 | | | server | stop_state, stop_taken, refusal |
 """

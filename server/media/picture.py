@@ -115,7 +115,7 @@ def _frame(luma: Plane, u: Plane, v: Plane) -> av.VideoFrame:
 
 def _rows(plane: VideoPlane) -> Plane:
     """The plane's memory, row by row with what pads each of them; writing to it changes the plane."""
-    return np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
+    return np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)
 
 
 def _check_size(width: int, height: int) -> None:

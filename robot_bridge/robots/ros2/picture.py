@@ -129,8 +129,9 @@ def _quartered(channel: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
 
 def _from_grey(pixels: Pixels) -> bytes:
     luma = ((pixels.astype(np.uint16) * 220) >> 8) + 16  # 0 to 255 becomes 16 to 235
-    height, width = luma.shape
-    return luma.astype(np.uint8).tobytes() + bytes([128]) * (2 * ((height + 1) // 2) * ((width + 1) // 2))
+    height, width = (int(side) for side in luma.shape)
+    chroma = 2 * ((height + 1) // 2) * ((width + 1) // 2)
+    return luma.astype(np.uint8).tobytes() + bytes([128]) * chroma
 
 
 def _from_yuv422(pixels: Pixels, order: tuple[int, int, int]) -> bytes:

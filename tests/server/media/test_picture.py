@@ -42,7 +42,7 @@ def jpeg(width: int, height: int) -> Media:
     context.width, context.height, context.pix_fmt, context.time_base = width, height, "yuvj420p", Fraction(1, 30)
     frame = av.VideoFrame(width, height, "yuvj420p")
     for plane, values in zip(frame.planes, zip(*QUARTERS, strict=True), strict=True):
-        rows = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
+        rows = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)
         rows[: plane.height, : plane.width] = quartered(plane.width, plane.height, values)
     frame.pts = 0
     payload = b"".join(map(bytes, [*context.encode(frame), *context.encode(None)]))
@@ -51,7 +51,7 @@ def jpeg(width: int, height: int) -> Media:
 
 def corners(frame: av.VideoFrame) -> list[list[tuple[int, int, int]]]:
     """Y, U and V near and at the outer edge of each quarter."""
-    planes = [np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size) for plane in frame.planes]
+    planes = [np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size) for plane in frame.planes]
 
     def at(row: int, column: int) -> tuple[int, int, int]:
         luma, u, v = planes
