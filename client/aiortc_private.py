@@ -9,6 +9,7 @@ Why each is needed:
   the next one begins;
 - aioice takes data for a STUN message by their length alone, and then raises what its caller does not expect;
 - aioice never gathers loopback, and takes its STUN and TURN servers before anybody could ask the console for them;
+- aioice closes a connection after six checks whose answers took over half a second, as all do on a long path;
 - its SCTP waits at least one second before it repeats a lost message, three while it connects, and then sends one
   packet at a time; it acknowledges every single packet;
 - its DTLS takes one record from OpenSSL for each datagram that comes in. A record that waits there, as one that
@@ -24,7 +25,7 @@ from typing import Any, Protocol
 
 import aioice.stun
 import pylibsrtp
-from aioice.ice import TransportPolicy
+from aioice.ice import Connection, StunProtocol, TransportPolicy
 from aiortc import RTCIceServer, RTCPeerConnection, RTCRtpReceiver
 from aiortc.rtcdtlstransport import RTCDtlsTransport
 from aiortc.rtcicetransport import connection_kwargs
@@ -35,6 +36,7 @@ from OpenSSL import SSL
 from client.frame_assembler import MediaPacket
 from client.rtp_header import find_extension
 from robot_bridge.protocol.carriers import unpack_capture_moment
+from robot_bridge.protocol.ice_consent import keep_consent, require_consent_hooks
 
 __all__ = [
     "PacketSink",
@@ -42,6 +44,7 @@ __all__ = [
     "gather_here",
     "gather_only_on",
     "hasten_sctp",
+    "keep_path",
     "send_control",
     "take_packets",
     "take_raw_rtp",
@@ -49,6 +52,8 @@ __all__ = [
     "transport_of",
     "use_ice_servers",
 ]
+
+require_consent_hooks(Connection, StunProtocol)
 
 LAST_OF_STUN = b"\x03"  # the largest first byte of its messages
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
@@ -110,6 +115,14 @@ def gather_here(connection: Any, addresses: Sequence[str]) -> None:
         return await gather(component=component, addresses=chosen)
 
     connection.get_component_candidates = gather_chosen
+
+
+def keep_path(pc: RTCPeerConnection, on_expired: Callable[[], None] = lambda: None) -> None:
+    """Take the other side's answers to ICE checks for valid however late they come. Call before setLocalDescription.
+
+    `on_expired`: there was none for 30 s, and the connection closes.
+    """
+    keep_consent(transport_of(pc).transport.iceGatherer._connection, on_expired)
 
 
 def use_ice_servers(pc: RTCPeerConnection, servers: list[RTCIceServer], *, relay_only: bool) -> None:

@@ -21,6 +21,7 @@ from aiortc.rtcicetransport import candidate_to_aioice
 from aiortc.sdp import candidate_from_sdp, candidate_to_sdp
 
 from client.aiortc_private import gather_here, transport_of
+from robot_bridge.protocol.ice_consent import keep_consent
 
 __all__ = ["IceRestart"]
 
@@ -47,6 +48,7 @@ class IceRestart:
         self._gatherer = gatherer
         connection: Any = gatherer._connection
         self._next = connection
+        keep_consent(connection)
         self._next._queue = _DataOnly(self._transport._connection._queue)
         if addresses is not None:
             gather_here(self._next, addresses)

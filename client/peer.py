@@ -23,6 +23,7 @@ from client.aiortc_private import (
     drain_dtls,
     gather_only_on,
     hasten_sctp,
+    keep_path,
     send_control,
     take_packets,
     take_raw_rtp,
@@ -153,6 +154,7 @@ class Peer:
         use_ice_servers(self._pc, self._ice_servers, relay_only=self._relay_only)
         if self._gather_on is not None:
             gather_only_on(self._pc, self._gather_on)
+        keep_path(self._pc, lambda: self.lose("the console answered nothing for 30 s"))
         hasten_sctp(self._pc)
         drain_dtls(self._pc)
         offer = await self._pc.createOffer()

@@ -12,7 +12,15 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidHandshake, WebSocketException
 from websockets.typing import Subprotocol
 
-from client.aiortc_private import PacketSink, drain_dtls, hasten_sctp, send_control, take_packets, take_raw_rtp
+from client.aiortc_private import (
+    PacketSink,
+    drain_dtls,
+    hasten_sctp,
+    keep_path,
+    send_control,
+    take_packets,
+    take_raw_rtp,
+)
 from client.errors import ConnectFailed
 from client.finish import within
 from client.sdp import Section, read_sections
@@ -109,6 +117,7 @@ class RelayMedia:
             raise ConnectFailed(f"the relay's offer cannot be used: {error}") from error
         # Janus tells a subscriber of data only when the subscriber has a channel of its own.
         self._listen(self._pc.createDataChannel("feedback", ordered=False, maxRetransmits=0))
+        keep_path(self._pc)
         hasten_sctp(self._pc)
         drain_dtls(self._pc)
         return _named(read_sections(offer), heard.data, {stream.mid: stream.stream for stream in streams})

@@ -19,14 +19,17 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import structlog
+from aioice.ice import Connection, StunProtocol
 from aiortc import RTCIceCandidate, RTCIceGatherer, RTCPeerConnection
 from aiortc.rtcicetransport import RTCIceTransport, candidate_to_aioice
 
+from robot_bridge.protocol.ice_consent import keep_consent, require_consent_hooks
 from server.peer_guards_private import guard_ice
 
-__all__ = ["IceSession", "LocalIce"]
+__all__ = ["IceSession", "LocalIce", "keep_path"]
 
 log = structlog.get_logger(__name__)
+require_consent_hooks(Connection, StunProtocol)
 
 MAX_CANDIDATES = 100  # of the peer, in one session
 LINGER = 2.0  # s in which datagrams on the old path still count
@@ -79,8 +82,10 @@ class IceSession:
         self._restarting = asyncio.Lock()
         self._next: Any = None  # the connection that is to take over
         self._taking_over: asyncio.Task[None] | None = None
+        # Called when the peer has answered no check of the current path for 30 s; the connection closes then.
+        self.on_expired: Callable[[], None] = lambda: None
         if self._transport is not None:
-            guard_ice(self._transport._connection, on_refused)
+            self._prepare(self._transport._connection)
         self._lingering: set[asyncio.Task[None]] = set()
 
     @property
@@ -101,7 +106,7 @@ class IceSession:
             await self._give_up()
             gatherer = self._gatherer()
             connection: Any = gatherer._connection
-            guard_ice(connection, self._on_refused)
+            self._prepare(connection)
             connection._queue = _DataOnly(_queue_of(self._transport))
             self._next, self._candidates = connection, 0
             try:
@@ -139,6 +144,14 @@ class IceSession:
             task.cancel()
         await asyncio.gather(*self._lingering, return_exceptions=True)
 
+    def _prepare(self, connection: Any) -> None:
+        guard_ice(connection, self._on_refused)
+        keep_consent(connection, lambda: self._expired(connection))
+
+    def _expired(self, connection: Any) -> None:
+        if self._transport is not None and self._transport._connection is connection:
+            self.on_expired()
+
     async def _give_up(self) -> None:
         """End the session that has not taken over."""
         task, self._taking_over = self._taking_over, None
@@ -166,6 +179,13 @@ class IceSession:
         task = asyncio.get_running_loop().create_task(_close_later(old), name="ice linger")
         self._lingering.add(task)
         task.add_done_callback(self._lingering.discard)
+
+
+def keep_path(pc: RTCPeerConnection) -> None:
+    """The same patience with checks for a connection without an `IceSession`. Call before it connects."""
+    transport = _transport_of(pc)
+    if transport is not None:
+        keep_consent(transport._connection)
 
 
 def _transport_of(pc: RTCPeerConnection) -> RTCIceTransport | None:

@@ -30,6 +30,7 @@ class WebRtcPeer(Peer):
         self.resource = secrets.token_urlsafe(16)  # secret: the path of the WHEP resource
         self.pc = pc
         self.ice = ice
+        ice.on_expired = lambda: self.end("consent expired")
         self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
         pc.on("datachannel", self._channel_offered)
         pc.on("connectionstatechange", self._connection_changed)

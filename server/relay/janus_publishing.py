@@ -11,6 +11,7 @@ from robot_bridge.protocol.console import StreamInfo
 from robot_bridge.protocol.janus import Heard, complete_description
 from server.channel_writer import ChannelWriter
 from server.data_transport_private import tune_data_transport
+from server.ice_restart_private import keep_path
 from server.media.peer_media import PeerMedia
 from server.media.publishing_private import ask_for_no_delay, keep_answered_extensions
 from server.relay.errors import RelayRefused, RelaySilent
@@ -56,6 +57,7 @@ async def publish(
         given = media.publish(pc, codec)
         writer = ChannelWriter(pc.createDataChannel(FEEDBACK, ordered=False, maxRetransmits=0))
         tune_data_transport(pc)
+        keep_path(pc)
         offer = await pc.createOffer()
         await pc.setLocalDescription(RTCSessionDescription(ask_for_no_delay(offer.sdp), "offer"))
         mids = [transceiver.mid or "" for transceiver in pc.getTransceivers()]
