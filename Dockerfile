@@ -1,7 +1,7 @@
 # Three images from one file: `robot` (bridge and simulated robot), `console` (the service and its page), and `proxy`
 # (TLS). All run as a user of their own.
 
-FROM node:20-bookworm-slim AS page
+FROM node:24-bookworm-slim AS page
 WORKDIR /src/web
 COPY web/package.json web/package-lock.json ./
 RUN npm ci --no-audit --no-fund
@@ -13,7 +13,7 @@ ENV PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_
 WORKDIR /src
 COPY requirements.lock ./
 RUN pip install --require-hashes -r requirements.lock
-COPY pyproject.toml README.md LICENSE ./
+COPY pyproject.toml README.md LICENSE NOTICE ./
 COPY robot_bridge ./robot_bridge
 COPY server ./server
 COPY client ./client

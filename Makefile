@@ -35,10 +35,11 @@ test-unit: $(VENV)/.dev $(ROS2)/.installed
 test-browser: $(VENV)/.dev $(ROS2)/.installed server/web_dist/index.html
 	$(BIN)/python -m pytest -q -m browser
 
-check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, generated files and known vulnerabilities
+check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, dependencies, generated files and known vulnerabilities
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/deptry --no-ansi .
 	$(BIN)/python -m scripts.generate_wire --check
 	cd web && npm run --silent check
 	$(BIN)/python -m scripts.audit
@@ -96,6 +97,7 @@ $(ROS2)/.installed: requirements-ros2.lock | $(BIN)/python
 	@touch $@
 
 web/node_modules/.installed: web/package-lock.json
+	@scripts/check-node
 	@echo "Installing the page's packages"
 	@cd web && npm ci --silent --no-audit --no-fund
 	@touch $@

@@ -25,6 +25,7 @@ from robot_bridge.metronome import Metronome
 from robot_bridge.motion_limits import MotionLimits
 from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop
 from robot_bridge.robots.base import MediaSource, Robot, Stamp
+from robot_bridge.robots.event_strip import with_event_strip
 from robot_bridge.settings import BridgeSettings
 
 __all__ = ["Bridge"]
@@ -294,7 +295,7 @@ class Bridge:
     def _emit(self, media: Media) -> None:
         self.counters.media += 1
         self._record("media", media.stamp, stream=media.stream, captured=media.time)
-        self._links.publish_media(media)
+        self._links.publish_media(with_event_strip(media) if self._settings.event_strip else media)
 
     # reporting
 

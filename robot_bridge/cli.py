@@ -70,6 +70,9 @@ def run(
     insecure_link: Annotated[
         bool, typer.Option(help="Listen beyond loopback although anybody there could drive the robot.")
     ] = False,
+    event_strip: Annotated[
+        bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the address as one JSON line once ready.")] = False,
 ) -> None:
     """Run a robot and its bridge until interrupted."""
@@ -82,6 +85,7 @@ def run(
             secret=_secret(link_secret_file),
             tls=_tls(link_tls_cert, link_tls_key, link_tls_ca),
             insecure=insecure_link,
+            event_strip=event_strip,
         )
         check_link(settings)  # before the robot is made, which can take long
         label, make = _choice(name, ros2, mjcf)

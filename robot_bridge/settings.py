@@ -21,4 +21,5 @@ class BridgeSettings:
     secret: LinkSecret | None = None  # that clients have to know
     tls: LinkTls | None = None
     insecure: bool = False  # listen beyond loopback although anybody could drive
+    event_strip: bool = False  # draw the stamp into raw pictures, for tests and measurements
     log_interval: float = 60.0  # s between log lines with the counters

@@ -129,6 +129,9 @@ def up(
         int, typer.Option(min=0, max=65535, help="Port of the bridge, and of the first of several; 0: any free one.")
     ] = 5600,
     event_log: Annotated[Path | None, typer.Option(help="The bridge appends what happens to events here.")] = None,
+    event_strip: Annotated[
+        bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")
+    ] = False,
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
@@ -174,13 +177,14 @@ def up(
     )
     options = [] if ros2 is None else ["--ros2", str(ros2)]
     options += [] if mjcf is None else ["--mjcf", str(mjcf)]
+    options += ["--event-strip"] if event_strip else []
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
     bridges = {}
     kinds = _simulated(robot)
-    if options and "" not in kinds:
+    if (ros2 or mjcf) and "" not in kinds:
         raise _usage("--ros2 and --mjcf are for one robot; run the others by `lockstep robot` and use `lockstep serve`")
-    unknown = [] if options else sorted(set(kinds.values()) - set(robot_names()))
+    unknown = [] if ros2 or mjcf else sorted(set(kinds.values()) - set(robot_names()))
     if unknown:
         raise _usage(f"no robot {unknown[0]!r}; there are {', '.join(robot_names())}")
     for number, (name, kind) in enumerate(kinds.items()):

@@ -1,10 +1,24 @@
+import { readFileSync } from "node:fs";
+
+import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
+
+/** The font comes in by a style sheet, where Vite's own list of licences does not look. */
+const fontLicence: Plugin = {
+  name: "font-licence",
+  generateBundle() {
+    const source = readFileSync("node_modules/@fontsource-variable/inter/LICENSE", "utf8");
+    this.emitFile({ type: "asset", fileName: "licenses-inter.txt", source });
+  },
+};
 
 export default defineConfig({
   base: "./",
+  plugins: [fontLicence],
   build: {
     outDir: "../server/web_dist",
     emptyOutDir: true,
+    license: { fileName: "licenses.md" },
     target: "es2023",
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },

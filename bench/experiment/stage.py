@@ -44,7 +44,7 @@ async def running_stage(
             "LOCKSTEP_SECRET": secrets.token_urlsafe(32),
             "LOCKSTEP_SCENE": "false",
         }
-        robot_command = (lockstep, "robot", robot, "--port", "0", "--event-log", str(log), "--json")
+        robot_command = (lockstep, "robot", robot, "--port", "0", "--event-log", str(log), "--event-strip", "--json")
         async with running_process(*robot_command) as (bridge, ready):
             host, _, port = ready["robot"].removeprefix("tcp://").rpartition(":")
             async with NetworkProcess(profile, robot=(host, int(port)) if robot_link else None, seed=seed) as network:

@@ -11,12 +11,14 @@ makes the strip unreadable. So does wrong parity, and an event of 0. The cells s
 survives scaling and compression.
 """
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from robot_bridge.protocol.messages import Media
 from robot_bridge.protocol.serial import is_event
 
-__all__ = ["CELLS", "draw_event_strip", "read_event_strip", "strip_height"]
+__all__ = ["CELLS", "draw_event_strip", "read_event_strip", "strip_height", "with_event_strip"]
 
 Luma = npt.NDArray[np.uint8]
 
@@ -38,6 +40,16 @@ def draw_event_strip(luma: Luma, event: int) -> None:
     for index in range(CELLS):
         left, right = _columns(index, width)
         luma[: strip_height(height), left:right] = WHITE if _bit(event, index) else BLACK
+
+
+def with_event_strip(media: Media) -> Media:
+    """The medium with its stamp drawn over the top, where it is a raw picture; any other as it is."""
+    pixels = media.width * media.height
+    if media.codec != "yuv420p" or not 0 < pixels <= len(media.payload):
+        return media
+    payload = bytearray(media.payload)
+    draw_event_strip(np.frombuffer(payload, np.uint8, pixels).reshape(media.height, media.width), media.stamp)
+    return msgspec.structs.replace(media, payload=bytes(payload))
 
 
 def read_event_strip(luma: npt.NDArray[np.generic]) -> int | None:

@@ -15,7 +15,7 @@ from server.board.seal import Seal
 
 __all__ = ["Board", "BoardHost", "check_board", "make_board"]
 
-NOT_INSTALLED = "a board needs the package redis: pip install 'lockstep[redis]'"
+NOT_INSTALLED = "a board needs the package redis: .venv/bin/python -m pip install -e '.[redis]'"
 NO_ADDRESS = "a board needs --public-url: the pages of other consoles lead here"
 
 

@@ -13,7 +13,7 @@ from server.relay.relay_url import RelayUrl, parse_relay_url
 __all__ = ["RelaySettings"]
 
 SHORTEST_SECRET = 32  # bytes: HS256 asks for a key of at least 256 bits (RFC 7518 3.2)
-NO_CLIENT = "livekit: needs LiveKit's client, which is not installed: pip install 'lockstep[livekit]'"
+NO_CLIENT = "livekit: needs LiveKit's client, which is not installed: .venv/bin/python -m pip install -e '.[livekit]'"
 
 
 class RelaySettings(BaseSettings):

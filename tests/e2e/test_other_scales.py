@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
 
 async def test_the_page_is_in_micrometres_when_the_robot_is(tmp_path: Path, chromium: Browser) -> None:
     async with (
-        running_stack(tmp_path, robot="micromanipulator") as stack,
+        running_stack(tmp_path, robot="micromanipulator", extra=("--event-strip",)) as stack,
         open_console(chromium, stack.operator) as console,
     ):
         await console.until_live()

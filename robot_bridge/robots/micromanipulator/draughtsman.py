@@ -15,7 +15,7 @@ __all__ = ["Draughtsman"]
 
 
 class Draughtsman:
-    """Both pictures are drawn one after the other, each in yuv420p with the event in its strip."""
+    """Both pictures are drawn one after the other, each in yuv420p."""
 
     def __init__(self) -> None:
         self._thread = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="draw")

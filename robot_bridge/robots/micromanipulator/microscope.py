@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
-from robot_bridge.robots.event_strip import draw_event_strip
 from robot_bridge.robots.micromanipulator.dent import draw_dent
 from robot_bridge.robots.micromanipulator.description import MICROSCOPE
 from robot_bridge.robots.micromanipulator.samples import MICRO
@@ -47,7 +46,7 @@ class Microscope:
         self._count = 0
 
     def draw(self, state: "MicromanipulatorState", event: int) -> bytes:
-        """A yuv420p picture of the state, with the event in its strip."""
+        """A yuv420p picture of the state."""
         slide = self._seen_slide(state)
         picture = slide.copy()
         draw_dent(picture, slide, self._slide.cover, state, self._scale)
@@ -59,7 +58,6 @@ class Microscope:
             self._lay(picture, needle, state.light)
         self._count = (self._count + 1) % GRAINS
         picture.y += self._grains[self._count]
-        draw_event_strip(picture.y, event)
         return picture.buffer.tobytes()
 
     def _seen_slide(self, state: "MicromanipulatorState") -> Picture:

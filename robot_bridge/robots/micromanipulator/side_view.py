@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
-from robot_bridge.robots.event_strip import draw_event_strip
 from robot_bridge.robots.micromanipulator.description import HEADING, SIDE, SLOPE, TAPER
 from robot_bridge.robots.micromanipulator.needle import TIP_RADIUS
 from robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES
@@ -41,7 +40,7 @@ class SideView:
         self._heights = (self._floor - np.arange(height, dtype=np.float32)[:, None]) * np.float32(self._scale)
 
     def draw(self, state: "MicromanipulatorState", event: int) -> bytes:
-        """A yuv420p picture of the state, with the event in its strip. The tip stays in the middle."""
+        """A yuv420p picture of the state. The tip stays in the middle."""
         x = self._from_middle + np.float32(state.tip[0])
         picture = self._picture
         picture.y[:], picture.u[:], picture.v[:] = SKY
@@ -56,7 +55,6 @@ class SideView:
             self._fill((self._heights > 0) & (self._heights < surface), _colour(sample.rgb))
         self._fill(np.abs(self._heights - state.focus) < self._scale * 0.5, FOCUS, every=4)
         self._fill(self._needle(x, state), STEEL)
-        draw_event_strip(picture.y, event)
         return picture.buffer.tobytes()
 
     def _needle(self, x: Plane, state: "MicromanipulatorState") -> npt.NDArray[np.bool_]:

@@ -1,11 +1,14 @@
+from typing import Literal
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robot_bridge.protocol.messages import Media
 from robot_bridge.protocol.serial import MAX_EVENT
-from robot_bridge.robots.event_strip import CELLS, draw_event_strip, read_event_strip, strip_height
+from robot_bridge.robots.event_strip import CELLS, draw_event_strip, read_event_strip, strip_height, with_event_strip
 from tests.robot_bridge.protocol.strategies import events
 
 sizes = st.sampled_from([(480, 640), (240, 320), (720, 1280), (120, 160), (360, 642)])
@@ -57,3 +60,18 @@ def test_a_picture_too_small_for_a_strip_reads_as_none() -> None:
 
 def test_the_largest_event_fits() -> None:
     assert read_event_strip(picture(240, 320, MAX_EVENT)) == MAX_EVENT
+
+
+def medium(codec: Literal["yuv420p", "mjpeg"], payload: bytes) -> Media:
+    return Media(stream="camera", codec=codec, stamp=77, time=0.0, payload=payload, width=320, height=240)
+
+
+def test_a_raw_picture_gets_its_stamp_and_keeps_the_rest() -> None:
+    drawn = np.frombuffer(with_event_strip(medium("yuv420p", bytes([100]) * (320 * 360))).payload, np.uint8)
+    assert read_event_strip(drawn[: 320 * 240].reshape(240, 320)) == 77
+    assert set(drawn[320 * strip_height(240) :]) == {100}
+
+
+@pytest.mark.parametrize("media", [medium("mjpeg", bytes(320 * 240)), medium("yuv420p", b"too short")])
+def test_what_is_no_raw_picture_stays_as_it_is(media: Media) -> None:
+    assert with_event_strip(media) is media
