@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-unit test-web test-browser check format bench fuzz lock generate clean
+.PHONY: help setup run test test-unit test-web test-browser test-long check format bench fuzz lock generate clean
 
 help: ## List the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/  make \1|\2/' | column -t -s '|'
@@ -30,10 +30,14 @@ test-web: web/node_modules/.installed
 	cd web && npm test --silent
 
 test-unit: $(VENV)/.dev $(ROS2)/.installed
-	$(BIN)/python -m pytest -q -m "not browser" -n 2 --dist loadfile
+	$(BIN)/python -m pytest -q -m "not browser and not long" -n 2 --dist loadfile
 
 test-browser: $(VENV)/.dev $(ROS2)/.installed server/web_dist/index.html
-	$(BIN)/python -m pytest -q -m browser
+	$(BIN)/python -m pytest -q -m "browser and not long"
+
+test-long: $(VENV)/.dev setup ## Run the tests that take minutes by their nature
+	@scripts/system-packages $(TEST_PACKAGES)
+	$(BIN)/python -m pytest -q -m long
 
 check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, dependencies, generated files and known vulnerabilities
 	$(BIN)/ruff format --check .

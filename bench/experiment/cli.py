@@ -13,6 +13,7 @@ import uvloop
 from bench.emulator.errors import ProfileError
 from bench.emulator.profile import Profile, load_profile
 from bench.experiment.choices import PROFILES, Choices, Mode, media_of, round_trip_of
+from bench.experiment.endurance_run import EnduranceClient, run_endurance
 from bench.experiment.findings import Cell, Findings
 from bench.experiment.growth import run_growth
 from bench.experiment.matrix import GROWTH_SECONDS, OUTAGE_SECONDS, matrix_of
@@ -32,6 +33,8 @@ EXIT_USAGE = 2
 EXIT_FAILED = 3  # something did not run
 GROWTH_PROFILE = "hong-kong"
 RUN_SECONDS = 25.0
+ENDURANCE_SECONDS = 600.0
+ENDURANCE_WORDS = ("connections", "reconnections", "seat_losses", "pictures", "violations")
 OWN_TOLERANCE = -1  # the profile's
 
 Found = TypeVar("Found")
@@ -42,7 +45,7 @@ def experiment_command(
         str,
         typer.Argument(
             help=f"A network: {', '.join(PROFILES)}, or the file of one. Or growth: how large the gap gets without a "
-            "gate. Or outage: the network is cut in mid-drive. Or all of these."
+            "gate. Or outage: the network is cut in mid-drive. Or all of these. Or endurance: whether connections last."
         ),
     ],
     mode: Annotated[
@@ -50,7 +53,10 @@ def experiment_command(
     ] = "feedback",
     seconds: Annotated[
         float | None,
-        typer.Option(min=1, max=3600, help="How long; unless given 25 s a run, 6 s a rate for growth, 10 s of outage."),
+        typer.Option(
+            min=1,
+            help="How long; unless given 25 s a run, 6 s a rate for growth, 10 s of outage, 600 s of endurance.",
+        ),
     ] = None,
     tolerance: Annotated[
         int | None, typer.Option(min=0, max=1000, help="Largest gap, in events; unless given, the profile's own.")
@@ -58,6 +64,10 @@ def experiment_command(
     seed: Annotated[int, typer.Option(help="Of the network and the operator.")] = 1,
     robot: Annotated[str, typer.Option(help=f"{', '.join(robot_names())}.")] = "planar",
     browser: Annotated[bool, typer.Option("--browser", help="The operator is a page in Chromium.")] = False,
+    network: Annotated[str, typer.Option(help="Of endurance: a network, or the file of one.")] = "satellite",
+    client: Annotated[
+        EnduranceClient | None, typer.Option(help="Of endurance; unless given, as --browser says.")
+    ] = None,
     watchers: Annotated[
         bool | None,
         typer.Option(help="Clients in the other gate modes beside the operator; unless given, without a browser."),
@@ -82,7 +92,11 @@ def experiment_command(
     )
     session = _Session(report)
     try:
-        _work(session, choices, seconds)
+        if profile == "endurance":
+            lasting = replace(choices, profile=network, seconds=seconds or ENDURANCE_SECONDS)
+            session.endure(lasting, client or ("chromium" if browser else "headless"))
+        else:
+            _work(session, choices, seconds)
     except KeyboardInterrupt:
         _say("interrupted: this is what was found so far")
     session.publish(json_to)
@@ -129,6 +143,14 @@ class _Session:
         found = self._run("outage", run_outages(choices, _say))
         if found is not None:
             self._findings.outages.append(found)
+            self._keep()
+
+    def endure(self, choices: Choices, client: EnduranceClient) -> None:
+        profile, choices = _fitted(choices)
+        found = self._run(f"endurance, {profile.name}", run_endurance(choices, profile, client, _say))
+        if found is not None:
+            self._findings.endurances.append(found)
+            _say(", ".join(f"{name} {found[name]}" for name in ENDURANCE_WORDS))
             self._keep()
 
     def _keep(self) -> None:

@@ -27,13 +27,14 @@ class Findings:
     cells: list[Cell] = field(default_factory=list)
     growth: Growth | None = None
     outages: list[dict[str, Any]] = field(default_factory=list)
+    endurances: list[dict[str, Any]] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)  # what did not come to an end, and why
     machine: dict[str, Any] = field(default_factory=dict)
 
     def results(self) -> list[dict[str, Any]]:
         """For JSON."""
         growth = [] if self.growth is None else [self.growth.fields()]
-        return [*(cell.result for cell in self.cells), *growth, *self.outages]
+        return [*(cell.result for cell in self.cells), *growth, *self.outages, *self.endurances]
 
     @property
     def broken(self) -> bool:

@@ -6,7 +6,7 @@ import pytest
 
 from bench.browsers.sound_card import SoundCard
 from bench.emulator import Network
-from tests.support.firefox import Firefox
+from bench.browsers.firefox import Firefox
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]

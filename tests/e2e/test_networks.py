@@ -5,7 +5,7 @@ from playwright.async_api import Browser
 
 from bench.browsers.console_page import open_console
 from bench.emulator import Network
-from tests.support.firefox import Firefox
+from bench.browsers.firefox import Firefox
 from tests.support.stack import Stack
 
 SHOWN = """(() => {

@@ -1,4 +1,4 @@
-// Drives Firefox through WebDriver BiDi for the Python tests: one JSON request a line in, one answer a line out.
+// Drives Firefox through WebDriver BiDi for Python: one JSON request a line in, one answer a line out.
 import { createInterface } from "node:readline";
 import { createRequire } from "node:module";
 
@@ -24,6 +24,7 @@ const errors = [];
 page.on("pageerror", (error) => errors.push(String(error)));
 
 const verbs = {
+  prepare: ({ script }) => page.evaluateOnNewDocument(script).then(() => null),
   open: ({ url }) => page.goto(url).then(() => null),
   evaluate: ({ expression }) => page.evaluate(expression),
   wait: ({ expression, timeout }) => waitFor(expression, timeout),

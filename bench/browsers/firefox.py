@@ -1,4 +1,4 @@
-"""Firefox for a test, through WebDriver BiDi (puppeteer-core in a Node process of its own)."""
+"""Firefox for a test or a measurement, through WebDriver BiDi (puppeteer-core in a Node process of its own)."""
 
 import asyncio
 import json
@@ -19,6 +19,10 @@ class Firefox:
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self._process = process
+
+    async def prepare(self, script: str) -> None:
+        """Run `script` in every document from now on, before anything of the document's own."""
+        await self._ask("prepare", script=script)
 
     async def open(self, url: str) -> None:
         await self._ask("open", url=url)
