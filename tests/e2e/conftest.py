@@ -7,8 +7,8 @@ import pytest
 from playwright.async_api import Browser
 
 from bench.browsers.chromium import running_chromium
-from bench.browsers.sound_card import SoundCard, running_sound_card
 from bench.browsers.firefox import Firefox, running_firefox
+from bench.browsers.sound_card import SoundCard, running_sound_card
 from tests.support.stack import Stack, running_stack
 
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+from bench.browsers.firefox import Firefox
 from bench.browsers.sound_card import SoundCard
 from bench.emulator import Network
-from bench.browsers.firefox import Firefox
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]

@@ -4,8 +4,8 @@ import pytest
 from playwright.async_api import Browser
 
 from bench.browsers.console_page import open_console
-from bench.emulator import Network
 from bench.browsers.firefox import Firefox
+from bench.emulator import Network
 from tests.support.stack import Stack
 
 SHOWN = """(() => {
