@@ -118,12 +118,14 @@ async def audit(
     request: Request,
     caller: Caller,
     after: int = 0,
+    before: Annotated[int, Query(ge=0)] = 0,
     limit: Annotated[int, Query(ge=1, le=MAX_RECORDS)] = 100,
 ) -> Response:
-    """Records behind number `after`; the newest ones for -1."""
+    """Records behind number `after`; the newest ones for -1; the last ones in front of `before`."""
     require_role(caller, "supervisor")
     log = services(request).audit
-    return _json(AuditPage(records=log.tail.after(after, limit), last=log.next_number - 1, trouble=log.trouble))
+    found = log.tail.before(before, limit) if before else log.tail.after(after, limit)
+    return _json(AuditPage(records=found, last=log.next_number - 1, trouble=log.trouble))
 
 
 async def _update(here: Services, change: Callable[[Invitations], Result]) -> Result:

@@ -1,26 +1,44 @@
-"""The audit log on disk: JSON lines, only ever appended to; a full file is set aside and a new one begun."""
+"""The audit log on disk: JSON lines, only ever appended to; a full file is set aside and a new one begun.
+
+Each line carries the hash of the line before (`server.evidence.chain`), over files and restarts.
+"""
 
 import os
 from collections.abc import Iterator
 from contextlib import suppress
+from heapq import merge
 from pathlib import Path
 
 import msgspec
 
 from server.audit import AuditRecord
+from server.evidence.chain import GENESIS, ChainedLine, Place, line_hash
 
-__all__ = ["AuditFile", "last_records", "rotated", "stored_records"]
+__all__ = ["AuditFile", "chained_lines", "chatter_path", "last_records", "rotated", "stored_records"]
 
 TAIL_BYTES = 1 << 20  # looked at when the console starts; thousands of records
+
+
+class _Line(AuditRecord, frozen=True, kw_only=True, omit_defaults=True):
+    """A record as it stands in the file."""
+
+    before: str  # hash of the line before
+
 
 _encoder = msgspec.json.Encoder()
 _decoder = msgspec.json.Decoder(AuditRecord)
 
 
 class AuditFile:
-    """Blocks: used from the writer's thread only. Every method may raise OSError; what was whole stays whole."""
+    """Blocks: used from the writer's thread only. Every method may raise OSError; what was whole stays whole.
+
+    Attributes:
+        last: number of the last record that was written or found; 0: there is none
+        head: hash of its line
+    """
 
     def __init__(self, path: Path, max_bytes: int, files: int) -> None:
+        self.last, self.head = 0, GENESIS
         self._path = path
         self._max_bytes = max_bytes
         self._files = files
@@ -29,11 +47,12 @@ class AuditFile:
 
     def write(self, records: list[AuditRecord]) -> None:
         """All of them, safely on disk, or none."""
-        data = b"".join(_encoder.encode(record) + b"\n" for record in records)
-        if self._handle is not None and self._size and self._size + len(data) > self._max_bytes:
+        self.open()
+        data, head = self._chained(records)
+        if self._size and self._size + len(data) > self._max_bytes:
             self.close()
             self._rotate()
-        handle = self._open()
+        handle = self._opened()
         try:
             self._write_all(handle, data)
             os.fsync(handle)
@@ -43,13 +62,30 @@ class AuditFile:
             self.close()  # what is on disk is looked at anew before the next attempt
             raise
         self._size += len(data)
+        if records:
+            self.last, self.head = records[-1].n, head
+
+    def open(self) -> None:
+        """Find the end of the chain. Done by the first `write` too."""
+        if self._handle is None:
+            self._opened()
+            self.last, self.head = _end_of(self._path)
+
+    def _chained(self, records: list[AuditRecord]) -> tuple[bytes, str]:
+        """Their lines, and the hash of the last one."""
+        lines, head = [], self.head
+        for record in records:
+            line = _encoder.encode(_Line(**msgspec.structs.asdict(record), before=head))
+            head = line_hash(line)
+            lines.append(line + b"\n")
+        return b"".join(lines), head
 
     def close(self) -> None:
         if self._handle is not None:
             handle, self._handle = self._handle, None
             os.close(handle)
 
-    def _open(self) -> int:
+    def _opened(self) -> int:
         if self._handle is None:
             handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)
             self._handle, self._size = handle, os.fstat(handle).st_size
@@ -78,15 +114,31 @@ def rotated(path: Path, number: int) -> Path:
     return path if number == 0 else path.with_name(f"{path.name}.{number}")
 
 
+def chatter_path(path: Path) -> Path:
+    """The file beside the audit's own in which stands what a link can cause as often as it likes."""
+    return path.with_name(f"{path.stem}-chatter{path.suffix}")
+
+
 def stored_records(path: Path) -> Iterator[AuditRecord]:
-    """All that is kept, oldest first; lines that cannot be understood are passed over."""
-    numbers = 0
-    while rotated(path, numbers + 1).exists():
-        numbers += 1
-    for number in range(numbers, -1, -1):
+    """All that is kept, in both files, in the order of their numbers; what cannot be understood is passed over."""
+    own, chatter = (_stored(each) for each in (path, chatter_path(path)))
+    return merge(own, chatter, key=lambda record: record.n)
+
+
+def _stored(path: Path) -> Iterator[AuditRecord]:
+    for _, line in chained_lines(path):
+        with suppress(msgspec.DecodeError, UnicodeError, RecursionError):
+            yield _decoder.decode(line)
+
+
+def chained_lines(path: Path) -> Iterator[ChainedLine]:
+    """Of one file and of those that were set aside, oldest first."""
+    numbers = [int(each.suffix[1:]) for each in path.parent.glob(f"{path.name}.*") if each.suffix[1:].isdigit()]
+    for number in (*sorted(numbers, reverse=True), 0):
         try:
             with open(rotated(path, number), "rb") as file:
-                yield from _parsed(file)
+                for count, line in enumerate(file, 1):
+                    yield ChainedLine(Place(rotated(path, number).name, count), line.rstrip(b"\n"))
         except FileNotFoundError:
             continue
 
@@ -94,22 +146,30 @@ def stored_records(path: Path) -> Iterator[AuditRecord]:
 def last_records(path: Path) -> list[AuditRecord]:
     """Those at the end of the log; empty when there is none or it cannot be read."""
     found: list[AuditRecord] = []
+    for each in (path, chatter_path(path)):
+        found += [record for record, _ in _last_lines(each)]
+    return sorted(found, key=lambda record: record.n)
+
+
+def _end_of(path: Path) -> tuple[int, str]:
+    """Number and hash of the last line that is a record."""
+    last = (0, GENESIS)
+    for record, line in _last_lines(path):
+        last = record.n, line_hash(line)
+    return last
+
+
+def _last_lines(path: Path) -> Iterator[tuple[AuditRecord, bytes]]:
     for each in (rotated(path, 1), path):
         try:
             with open(each, "rb") as file:
                 file.seek(max(0, os.fstat(file.fileno()).st_size - TAIL_BYTES))
-                found += _parsed(iter(file.read(TAIL_BYTES).splitlines()))
+                lines = file.read(TAIL_BYTES).split(b"\n")
         except OSError:
             continue
-    return found
-
-
-def _parsed(lines: Iterator[bytes]) -> Iterator[AuditRecord]:
-    for line in lines:
-        try:
-            yield _decoder.decode(line)
-        except (msgspec.DecodeError, UnicodeError, RecursionError):
-            continue
+        for line in lines:
+            with suppress(msgspec.DecodeError, UnicodeError, RecursionError):
+                yield _decoder.decode(line), line
 
 
 def _ends_line(path: Path, size: int) -> bool:

@@ -3,17 +3,22 @@
 import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import structlog
 
 from server.audit import AuditRecord
-from server.audit_file import AuditFile, last_records
+from server.audit_file import last_records
+from server.audit_store import AuditStore
 from server.audit_tail import AuditTail
 from server.audit_writer import AuditWriter, RecordFile
+from server.evidence.anchors import ANCHORS_NAME, Anchor, AnchorFile
+from server.evidence.signer import Signer
+from server.recording.settings import recordings_directory
 from server.settings import Settings
 from server.state_dir import StateDir, StateDirUnusable
 
-__all__ = ["AuditLog", "open_audit_log"]
+__all__ = ["AuditLog", "anchors_path", "open_audit_log"]
 
 log = structlog.get_logger(__name__)
 
@@ -26,11 +31,18 @@ class AuditLog:
         trouble: why it cannot be written at present, "" when it can
         on_trouble: called on the loop whenever `trouble` changes
         on_record: called with every record
+        newest_anchor: the newest signed head, from any thread; None: there is none yet
     """
 
-    def __init__(self, file: RecordFile, earlier: list[AuditRecord]) -> None:
+    def __init__(
+        self,
+        file: RecordFile,
+        earlier: list[AuditRecord],
+        newest_anchor: Callable[[], Anchor | None] = lambda: None,
+    ) -> None:
         self.tail = AuditTail(earlier)
         self.trouble = ""
+        self.newest_anchor = newest_anchor
         self.on_trouble: Callable[[str], None] = _ignore
         self.on_record: Callable[[AuditRecord], None] = _ignore_record
         self._loop = asyncio.get_running_loop()
@@ -78,17 +90,30 @@ class AuditLog:
 
 
 @contextmanager
-def open_audit_log(directory: StateDir, settings: Settings) -> Iterator[AuditLog]:
-    """Continues the numbers of the last run. Without a place for it, records stay in memory; `trouble` says why."""
+def open_audit_log(
+    directory: StateDir, settings: Settings, robot: str = "", signer: Signer | None = None
+) -> Iterator[AuditLog]:
+    """Continues the numbers of the last run. Without a place for it, records stay in memory; `trouble` says why.
+
+    Args:
+        signer: signs heads of it; None: they are not signed
+    """
     with ExitStack() as opened:
         try:
             path = opened.enter_context(directory.own_log("audit"))
         except StateDirUnusable as error:
             found = AuditLog(_Nowhere(error.reason), [])
         else:
-            found = AuditLog(AuditFile(path, settings.audit_bytes, settings.audit_files), last_records(path))
+            anchors = AnchorFile(anchors_path(settings, directory.path), settings.audit_bytes)
+            store = AuditStore(path, settings.audit_bytes, settings.audit_files, robot, signer, anchors)
+            found = AuditLog(store, last_records(path), lambda: store.newest_anchor)
         opened.callback(found.close)
         yield found
+
+
+def anchors_path(settings: Settings, directory: Path) -> Path:
+    """Where signed heads of the audit in that directory go: the second place that the settings name, or the files."""
+    return settings.audit_anchor or recordings_directory(settings.recording, directory) / ANCHORS_NAME
 
 
 class _Nowhere:
@@ -99,6 +124,9 @@ class _Nowhere:
 
     def write(self, records: list[AuditRecord]) -> None:
         raise OSError(self._reason)
+
+    def settle(self) -> None:
+        pass
 
     def close(self) -> None:
         pass

@@ -6,13 +6,15 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from robot_bridge.protocol.console import Seat
-from server.audit import Actor, AuditKind, AuditMerger, AuditRecord
+from server.audit import LIMITED, Actor, AuditBudget, AuditKind, AuditMerger, AuditRecord
 from server.event_clock import EventClock
 
 __all__ = ["AuditTrail", "RecordKeeper"]
 
 NOBODY = Actor()
+BEYOND = "counted together: too many for one link"
 MERGE_SECONDS = 1.0  # repetitions become one record
+SLOW_TICKS = 60  # of that: what is beyond a link's budget becomes one record
 
 
 class RecordKeeper(Protocol):
@@ -33,11 +35,21 @@ class AuditTrail:
         self._log = log
         self._next = log.next_number
         self._merger = AuditMerger()
+        self._budget = AuditBudget()
+        self._beyond = AuditMerger()  # the budget
+        self._ticks = 0
         self._holder = Actor()
         self._claims: list[str] = []
+        self._description = next((each.what for each in reversed([*log]) if each.kind == "epoch"), "")
 
-    def record(self, kind: AuditKind, actor: Actor = NOBODY, what: str = "", detail: str = "", count: int = 1) -> None:
-        """Write down `kind`, now."""
+    def record(self, kind: AuditKind, actor: Actor = NOBODY, what: str = "", detail: str = "") -> None:
+        """Write down `kind`, now. Of some kinds, what is beyond the link's budget is only counted."""
+        if kind in LIMITED and not self._budget.take(kind, actor.link, time.monotonic()):
+            self._beyond.add(kind, _link_alone(actor), what)
+        else:
+            self._write(kind, actor, what, detail)
+
+    def _write(self, kind: AuditKind, actor: Actor, what: str, detail: str = "", count: int = 1) -> None:
         feedback = self._clock.feedback
         self._log.append(
             AuditRecord(
@@ -56,6 +68,17 @@ class AuditTrail:
             )
         )
         self._next += 1
+
+    def started(self, console: str, page: str, protocol: int) -> None:
+        """The console begins, with that software."""
+        self.record("start", what=f"console {console}", detail=f"page {page}, robot link protocol {protocol}")
+
+    def epoch(self, label: str, description: str) -> None:
+        """Another run of the bridge, whose robot's description has this hash. A hash other than the last is said."""
+        what = f"description {description}"
+        changed = f"; was {self._description}" if self._description not in ("", what) else ""
+        self.record("epoch", what=what, detail=f"{label}{changed}")
+        self._description = what
 
     def seat(self, seat: Seat, holder: Actor, by: Actor) -> None:
         """The seat is another one now: `holder` has it, or nobody; or other peers claim it; because of `by`."""
@@ -81,11 +104,25 @@ class AuditTrail:
         try:
             while True:
                 await asyncio.sleep(MERGE_SECONDS)
-                self.flush()
+                self._ticks += 1
+                self.flush(beyond=self._ticks % SLOW_TICKS == 0)
         finally:
-            self.flush()
+            self.flush(beyond=True)
 
-    def flush(self) -> None:
-        """Write down what was merged until now."""
+    def flush(self, *, beyond: bool = False) -> None:
+        """Write down what was merged until now; with `beyond` also what went beyond the links' budgets."""
+        now = time.monotonic()
         for kind, actor, what, count in self._merger.take():
-            self.record(kind, actor, what, count=count)
+            if self._budget.take(kind, actor.link, now):
+                self._write(kind, actor, what, count=count)
+            else:
+                self._beyond.add(kind, _link_alone(actor), what, count)
+        if beyond:
+            self._budget.forget_idle(now)
+            for kind, actor, what, count in self._beyond.take():
+                self._write(kind, actor, what, BEYOND, count)
+
+
+def _link_alone(actor: Actor) -> Actor:
+    """All that came by one link counts together, whatever its peers are called."""
+    return Actor(role=actor.role, link=actor.link)

@@ -16,11 +16,13 @@ log = structlog.get_logger(__name__)
 
 MAX_WAITING = 4096  # records; then the oldest of those that could not be written go
 RETRY_SECONDS = 2.0
+SETTLE_SECONDS = 5.0  # between two looks at the file while nothing comes
 CLOSE_SECONDS = 3.0
 
 
 class RecordFile(Protocol):
     def write(self, records: list[AuditRecord]) -> None: ...
+    def settle(self) -> None: ...
     def close(self) -> None: ...
 
 
@@ -67,11 +69,13 @@ class AuditWriter:
     def _run(self) -> None:
         waiting: deque[AuditRecord] = deque()
         while not self._closing.is_set():
-            self._wake.wait()
+            self._wake.wait(SETTLE_SECONDS)
             self._wake.clear()
             while not self._attempt(waiting):
                 if self._closing.wait(self._retry_seconds):
                     break
+            else:
+                self._file.settle()
         self._attempt(waiting)
         self.lost += len(waiting)
         self._file.close()

@@ -1,5 +1,6 @@
 """What every app of a console begins and ends with, for one robot or several: house, errors, front door."""
 
+import structlog
 from fastapi import Depends, FastAPI
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import HTTPConnection
@@ -16,6 +17,8 @@ from server.settings import Settings
 from server.state import ConsoleState, open_state
 
 __all__ = ["bare_app", "guard_app", "open_house"]
+
+log = structlog.get_logger(__name__)
 
 LOOPBACK = "127.0.0.1"
 
@@ -48,6 +51,7 @@ def open_house(
     _restrict_ice(settings)
     house = House(opened, Guard(settings), metrics, max_peers, reserved)
     app.state.house = house
+    log.info("audit and recordings are signed", public_key=opened.signer.public_key)
     return house
 
 

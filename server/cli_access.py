@@ -17,17 +17,21 @@ import typer
 from robot_bridge.protocol.console import Role
 from server.audit import AuditRecord
 from server.audit_file import last_records, stored_records
+from server.audit_log import anchors_path
+from server.cli_audit import verify_audit
 from server.console_address import read_address
 from server.durations import duration_words, parse_duration
 from server.errors import ConsoleError
+from server.evidence.signer import KEY_FILE, evidence_signer, is_public_key
 from server.invitations import Invitation
 from server.links import console_link
 from server.settings import Settings
-from server.state import ConsoleState, open_state, robot_directory
-from server.state_dir import StateDirUnusable
+from server.state import ConsoleState, open_state, robot_directory, state_path
+from server.state_dir import StateDir, StateDirUnusable
 
 __all__ = ["RobotOption", "StateDirOption", "add_access_commands"]
 
+EXIT_BROKEN = 1  # the audit is not as it was written
 EXIT_USAGE = 2
 FOLLOW_SECONDS = 0.5  # between two looks at the log
 
@@ -112,14 +116,38 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what happens from now on.")] = False,
         after: Annotated[int, typer.Option(help="Only records behind this number.")] = 0,
         file: Annotated[Path | None, typer.Option(help="Another log than the state directory's audit.jsonl.")] = None,
+        directory: Annotated[
+            Path | None, typer.Argument(metavar="[DIR]", help="The audit of this directory.", show_default=False)
+        ] = None,
+        verify: Annotated[
+            bool, typer.Option("--verify", help="Say whether it was cut, changed or reordered; then exit code 1.")
+        ] = False,
+        anchors: Annotated[
+            Path | None, typer.Option(help="Where its signed heads are; unset: where the settings say.")
+        ] = None,
+        signed_by: Annotated[
+            str, typer.Option(help="Public key of the signed heads; unset: that of the state directory.")
+        ] = "",
+        key: Annotated[bool, typer.Option("--key", help="Print the public key that signs, and end.")] = False,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
         """Show who drove when, stops, refusals, hand-overs, people and notes, with their event references."""
-        path = file or robot_directory(make_settings(state_dir=state_dir), robot) / "audit.jsonl"
+        settings = make_settings(state_dir=state_dir)
+        if key:
+            sys.stdout.write(_state(settings).signer.public_key + "\n")
+            return
+        folder = directory or robot_directory(settings, robot)
+        path = file or folder / "audit.jsonl"
         if not follow and not path.exists():
             raise _usage(f"there is no audit log at {path}")
+        if verify:
+            place = anchors or anchors_path(settings, folder)
+            _verify(
+                path, robot, place, signed_by or _public_key(folder if directory else state_path(settings)), as_json
+            )
+            return
         last = after
         records: Iterable[AuditRecord] = stored_records(path)
         try:
@@ -137,6 +165,31 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             return
         except OSError as error:
             raise _usage(f"{path}: {error.strerror}") from error
+
+
+def _verify(path: Path, robot: str, anchors: Path, key: str, as_json: bool) -> None:
+    if key and not is_public_key(key):
+        raise _usage("a public key has 64 hexadecimal digits")
+    try:
+        verdict = verify_audit(path, robot, anchors, key)
+    except OSError as error:
+        raise _usage(f"{error.filename}: {error.strerror}") from error
+    if as_json:
+        sys.stdout.write(verdict.as_json().decode() + "\n")
+    else:
+        verdict.say(path)
+    if not verdict.ok:
+        raise typer.Exit(EXIT_BROKEN)
+
+
+def _public_key(directory: Path) -> str:
+    """That of a state directory; "" where none was made, and none is made by looking."""
+    if not (directory / KEY_FILE).exists():
+        return ""
+    try:
+        return evidence_signer(StateDir(directory)).public_key
+    except StateDirUnusable as error:
+        raise _usage(str(error)) from error
 
 
 def _state(settings: Settings) -> ConsoleState:

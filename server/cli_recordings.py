@@ -18,8 +18,8 @@ from server.cli_access import MakeSettings, RobotOption, StateDirOption
 from server.cli_extras import load_extra
 from server.console_address import read_address
 from server.recording.errors import RecordingError
-from server.recording.recorder import recordings_directory
 from server.recording.replay_app import create_replay_app
+from server.recording.settings import recordings_directory
 from server.recording.shelf import RecordingEntry, Shelf
 from server.recording.verify import Verdict
 from server.recording.verify_file import verify_file

@@ -26,6 +26,7 @@ from robot_bridge.protocol.console import (
 )
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import (
+    PROTOCOL_VERSION,
     Command,
     Feedback,
     Media,
@@ -56,6 +57,7 @@ from server.seat_keeper import SeatKeeper
 from server.session_tap import SessionTap
 from server.settings import Settings
 from server.speed_cap import SpeedCap
+from server.versions import console_version, description_hash, page_build
 
 __all__ = ["Console", "FeedbackViewer", "MediaFeed"]
 
@@ -109,7 +111,7 @@ class Console:
 
     async def run(self) -> None:
         """Until cancelled. The peers end before the links: the last thing that leaves is the rest."""
-        self.audit.record("start")
+        self.audit.started(console_version(), page_build(), PROTOCOL_VERSION)
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._guard("feedback", self._fanout.run))
             tasks.create_task(self._guard("seat", self.seat.watch))
@@ -265,7 +267,7 @@ class Console:
         self._desk.epoch_ends()
         self.clock.begin(epoch)
         self.speed_cap.forget()
-        self.audit.record("epoch", detail=description.label)
+        self.audit.epoch(description.label, description_hash(description))
         self._shown_stop = StopState()
         self.peers.end_all("new epoch")
         self._media.configure(description)

@@ -110,6 +110,7 @@ VIEW = Parameter("view", "query", {"type": "string", "enum": ["thumbnail"]})
 PEER = Parameter("peer", "query", {"type": "string", "maxLength": 16})
 LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
 AFTER = Parameter("after", "query", {"type": "integer", "default": 0})
+BEFORE = Parameter("before", "query", {"type": "integer", "minimum": 0, "default": 0})
 LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS, "default": 100})
 RECORDING = Parameter("recording_id", "path", {"type": "string"}, required=True)
 CHUNK = Parameter("number", "path", {"type": "integer"}, required=True)
@@ -178,7 +179,7 @@ OPERATIONS: tuple[Operation, ...] = (
     Operation(
         *("get", "/api/audit", "Who did what.", 200, AuditPage),
         errors=(NotAllowed, BadParameter),
-        parameters=(AFTER, LIMIT),
+        parameters=(AFTER, BEFORE, LIMIT),
     ),
     Operation("get", "/api/recordings", "Whether the session is recorded, and what was.", 200, RecordingList),
     Operation(

@@ -14,8 +14,9 @@ from server.media.plane import MediaPlane
 from server.media.sources.desk import SourceDesk
 from server.metrics import Metrics
 from server.recording.library import ConsoleLibrary
-from server.recording.recorder import Recorder, recordings_directory
+from server.recording.recorder import Recorder
 from server.recording.service import RecordingService
+from server.recording.settings import recordings_directory
 from server.recording.shelf import Shelf
 from server.relay.desk import RelayDesk, RelayedMedia
 from server.relay.engines import relay_engines
@@ -38,7 +39,7 @@ async def running_session(
         directory: where it keeps what is its own
         robot: its name in a fleet; "" is the only robot of a console
     """
-    with open_audit_log(directory, settings) as audit:
+    with open_audit_log(directory, settings, robot, house.state.signer) as audit:
         async with _session(settings, house, metrics, directory, robot, audit) as made:
             house.wardens.append(made.warden)
             try:

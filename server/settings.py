@@ -50,6 +50,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     observer_feedback_hz: Annotated[float, Field(gt=0, le=100)] = 12.5
     audit_bytes: Annotated[int, Field(ge=4096)] = 10_000_000  # of one file of the audit log
     audit_files: Annotated[int, Field(ge=1, le=1000)] = 10  # then the oldest goes
+    audit_anchor: Path | None = None  # folder or file for signed heads of the audit; None: beside the recordings
     seat_timeout: Annotated[float, Field(gt=0)] = 3.0  # of silence, then the seat is free and the robot rests
     seat_idle_seconds: Annotated[float, Field(gt=0)] = 300.0  # without an intention to move, then the seat is free
     seat_claim_seconds: Annotated[float, Field(gt=0)] = 60.0  # until a claim on the seat counts as declined
@@ -92,7 +93,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
             ipaddress.ip_address(address)
         return value
 
-    @field_validator("secret", "state_dir", "link_secret", "link_secret_file", mode="before")
+    @field_validator("secret", "state_dir", "audit_anchor", "link_secret", "link_secret_file", mode="before")
     @classmethod
     def _empty_is_unset(cls, value: object) -> object:
         return None if value == "" else value

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import structlog
 
 from server.access import Access
+from server.evidence.signer import Signer, evidence_signer
 from server.invitation_store import InvitationStore
 from server.settings import Settings
 from server.state_dir import StateDamaged, StateDir, StateDirUnusable, default_state_dir
@@ -20,6 +21,7 @@ class ConsoleState(NamedTuple):
     directory: StateDir
     invitations: InvitationStore
     access: Access
+    signer: Signer  # of the audit's heads and of recordings
 
     def signing_key(self, settings: Settings) -> str:
         """What everything is derived from that only this console may know."""
@@ -67,4 +69,4 @@ def _open(settings: Settings, path: Path) -> ConsoleState:
     secret = settings.secret.get_secret_value() if settings.secret is not None else directory.signing_key()
     invitations = InvitationStore(directory)
     access = Access(secret, settings.token_seconds, settings.scene_ticket_seconds, invitations.is_revoked)
-    return ConsoleState(directory, invitations, access)
+    return ConsoleState(directory, invitations, access, evidence_signer(directory))

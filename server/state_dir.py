@@ -4,7 +4,7 @@ import fcntl
 import os
 import secrets
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -57,20 +57,25 @@ class StateDir:
 
     def signing_key(self) -> str:
         """Made at the first call; two consoles that start at once agree on one."""
-        path = self.path / KEY_FILE
+        data = self.secret(KEY_FILE, lambda: secrets.token_urlsafe(KEY_BYTES).encode())
+        key = data.decode(errors="replace").strip()
+        if len(key.encode()) < KEY_BYTES:
+            raise StateDamaged(self.path / KEY_FILE, f"not a key of {KEY_BYTES} bytes or more")
+        return key
+
+    def secret(self, name: str, fresh: Callable[[], bytes]) -> bytes:
+        """The file of this name, of mode 0600. It is made once: whoever is late takes what the first one made."""
+        path = self.path / name
         with _named(path):
             if not path.exists():
-                fresh = self._temporary(secrets.token_urlsafe(KEY_BYTES).encode())
+                made = self._temporary(fresh())
                 try:
                     with suppress(FileExistsError):
-                        os.link(fresh, path)
+                        os.link(made, path)
                 finally:
-                    os.unlink(fresh)
+                    os.unlink(made)
             path.chmod(0o600)
-            key = path.read_text(errors="replace").strip()
-        if len(key.encode()) < KEY_BYTES:
-            raise StateDamaged(path, f"not a key of {KEY_BYTES} bytes or more")
-        return key
+            return path.read_bytes()
 
     def read(self, name: str) -> bytes | None:
         """None when there is no such file."""

@@ -18,6 +18,11 @@ class TokenBucket:
         self._at = now
         return self._level >= 1
 
+    def is_full(self, now: float) -> bool:
+        """Whether it is as if nobody had ever taken anything."""
+        self.has(now)
+        return self._level >= self._burst
+
     def take(self, now: float) -> bool:
         """Whether it may be done now; then it counts."""
         if not self.has(now):

@@ -5,7 +5,6 @@ import secrets
 import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Literal, Protocol, TypedDict, cast
 
 import structlog
@@ -47,7 +46,7 @@ from server.recording.shelf import Shelf
 from server.recording.times import LinkTimes, RecordClock
 from server.session_tap import SessionTap
 
-__all__ = ["RecordedMedia", "Recorder", "recordings_directory"]
+__all__ = ["RecordedMedia", "Recorder"]
 
 log = structlog.get_logger(__name__)
 
@@ -368,7 +367,3 @@ class Recorder(SessionTap):
 
 def _fresh_id() -> str:
     return f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(2)}"
-
-
-def recordings_directory(settings: RecordingSettings, state_directory: Path) -> Path:
-    return settings.directory or state_directory / "recordings"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, Field
 
-__all__ = ["RecordingSettings"]
+__all__ = ["RecordingSettings", "recordings_directory"]
 
 
 class RecordingSettings(BaseModel):
@@ -17,3 +17,7 @@ class RecordingSettings(BaseModel):
     age_days: float = Field(default=30.0, gt=0)  # older ones go
     free_bytes: int = Field(default=500_000_000, ge=0)  # that stay free on the disk; else recording ends
     keyframe_seconds: float = Field(default=4.0, ge=0.5, le=60.0)  # between two keyframes, twice that without room
+
+
+def recordings_directory(settings: RecordingSettings, state_directory: Path) -> Path:
+    return settings.directory or state_directory / "recordings"

@@ -50,7 +50,7 @@ async def test_vp8_that_a_headless_client_takes_is_recorded_and_nothing_else_is_
             encoded = await _encoded(stack, *CAMERAS)
         captured = {(each["stream"], each["event"]) for each in stack.events("media")}
     assert {codec for (codec, _), count in encoded.items() if count} == {"VP8"}
-    (path,) = directory.iterdir()
+    (path,) = directory.glob("*.mcap")
     verdict = verify_file(path)
     assert [name for name, check in verdict.checks.items() if not check.ok] == []
     for camera in CAMERAS:
@@ -97,7 +97,7 @@ async def test_pcmu_that_all_take_is_recorded_and_opus_from_when_somebody_takes_
         await _heard(console, 50)
         await _ask(stack, "POST", "/api/recordings/stop")
     assert {codec for (codec, _), count in encoded.items() if count} == {"PCMU"}
-    (path,) = directory.iterdir()
+    (path,) = directory.glob("*.mcap")
     assert [name for name, check in verify_file(path).checks.items() if not check.ok] == []
     with RecordingReader(path) as reader:
         records = list(reader.records(topics={f"/microphone/{MICROPHONE}"}))

@@ -43,7 +43,7 @@ async def _recorded(directory: Path) -> Session:
         newest = max(record["event"] for record in stack.events("executed"))
         await until_logged(stack, "feedback", lambda record: record["event"] >= newest)
         log = list(stack.records())
-    (path,) = recordings.iterdir()
+    (path,) = recordings.glob("*.mcap")
     return Session(path, log)
 
 

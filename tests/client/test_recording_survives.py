@@ -28,7 +28,7 @@ async def test_a_killed_consoles_recording_opens_and_is_completed(tmp_path: Path
             killed = time.time()
             await stack.process.wait()
         log = list(stack.records())
-    (path,) = directory.iterdir()
+    (path,) = directory.glob("*.mcap")
     with RecordingReader(path) as reader:
         assert reader.interrupted
         assert killed - reader.index.ended / 1e6 < LOST + SLOW

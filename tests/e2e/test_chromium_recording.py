@@ -35,7 +35,7 @@ async def test_the_operator_records_and_the_observer_sees_it_and_cannot(
         await button.click()
         await expect(button).to_have_text("Record", timeout=15_000)
         await expect(shown).to_be_hidden()
-    (path,) = (tmp_path / "state" / "recordings").iterdir()
+    (path,) = (tmp_path / "state" / "recordings").glob("*.mcap")
     verdict = await asyncio.to_thread(verify_file, path)
     assert [name for name, check in verdict.checks.items() if not check.ok] == []
     assert verdict.events >= 5

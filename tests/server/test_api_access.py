@@ -1,6 +1,7 @@
 """Invitations, revocations and the audit over HTTP, and what becomes of the peers."""
 
 import asyncio
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,11 @@ import jwt
 import pytest
 
 from client import Console, SignallingRefused
+from robot_bridge.bridge import Bridge
 from robot_bridge.protocol.console import Notice, Role, SeatTake
 from robot_bridge.protocol.messages import Stop
+from robot_bridge.robots.registry import create_robot
+from robot_bridge.settings import BridgeSettings
 from server.access import Identity
 from server.invitation_store import InvitationStore
 from server.invitations import MAX_LIVE
@@ -93,6 +97,28 @@ async def test_there_are_only_so_many() -> None:
         rig.services.state.invitations.update(fill)
         answer = await _invite(rig, "operator")
         assert (answer.status_code, answer.json()["error"]) == (409, "too_many_invitations")
+
+
+async def test_the_audit_names_the_software_and_the_description_and_says_when_that_is_another_one(
+    tmp_path: Path,
+) -> None:
+    seen = []
+    for robot in ("planar", "planar", "micromanipulator"):
+        async with (
+            Bridge(create_robot(robot), BridgeSettings(port=0)) as bridge,
+            running_console(bridge.address[1], state_dir=tmp_path) as rig,
+        ):
+            await rig.services.console.robot.reached.wait()
+            seen.append([each for each in rig.services.audit if each.kind in ("start", "epoch")][-2:])
+    (start, first), (_, again), (_, other) = seen
+    assert start.what.startswith("console ")
+    assert "page " in start.detail
+    assert "protocol " in start.detail
+    assert re.fullmatch("description [0-9a-f]{64}", first.what)
+    assert again.what == first.what
+    assert "was" not in again.detail
+    assert other.what != first.what
+    assert other.detail.endswith(f"; was {first.what}")
 
 
 async def test_a_disk_that_is_full_is_said_by_name_and_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -211,6 +237,8 @@ async def test_the_audit_has_pages_and_the_event_references() -> None:
         newest = (await rig.http.get("/api/audit?after=-1&limit=1", headers=headers)).json()
         assert rest["records"][-1]["n"] == newest["records"][0]["n"] == rest["last"]
         assert rest["trouble"] == ""
+        older = (await rig.http.get("/api/audit?before=3&limit=500", headers=headers)).json()
+        assert older["records"] == page["records"]
         stop = next(record for record in rest["records"] if record["kind"] == "stop")
         assert (stop["who"], stop["role"], stop["what"], stop["detail"]) == (
             *("supervisor", "supervisor", "stop"),

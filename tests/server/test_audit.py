@@ -1,8 +1,21 @@
 """What becomes a record, and with what."""
 
+from itertools import count
+
 from robot_bridge.protocol.console import Seat, SeatClaim
 from robot_bridge.protocol.messages import Feedback
-from server.audit import MAX_PENDING, Actor, AuditMerger, AuditRecord
+from server.audit import (
+    BURST,
+    CHATTER,
+    MAX_BUDGETS,
+    MAX_PENDING,
+    RATE,
+    Actor,
+    AuditBudget,
+    AuditKind,
+    AuditMerger,
+    AuditRecord,
+)
 from server.audit_tail import KEPT, AuditTail
 from server.audit_trail import AuditTrail
 from server.event_clock import EventClock
@@ -85,6 +98,77 @@ def test_what_is_merged_is_bounded() -> None:
     assert found[-1] == ("refusal", Actor(), "others", 5)
     assert found[0][3] == 2
     assert list(merger.take()) == []
+
+
+def test_a_link_that_renames_itself_over_and_over_gets_one_record_a_minute_beyond_its_budget() -> None:
+    trail, tail, _ = _trail()
+    for number in range(2000):
+        trail.record("renamed", ADA._replace(name=f"Ada {number}", peer=f"p{number % 20}"), detail="was Ada")
+    alone = len(list(tail))
+    assert BURST <= alone < BURST + 5
+    trail.flush()
+    assert len(list(tail)) == alone, "a minute is not over"
+    trail.flush(beyond=True)
+    beyond = _last(tail)
+    assert (beyond.kind, beyond.link, beyond.count) == ("renamed", "link1", 2000 - alone)
+    trail.record("renamed", GRACE, detail="was Grace")
+    assert (_last(tail).who, _last(tail).count) == ("Grace", 1), "another link has a budget of its own"
+
+
+def test_repeated_stops_draw_on_a_budget_and_a_first_stop_a_reset_and_a_hand_over_never_do() -> None:
+    trail, tail, _ = _trail()
+    for _ in range(200):
+        trail.again("stop", ADA, "stop, again")
+        trail.flush()
+    assert len(list(tail)) < BURST + 5
+    before = len(list(tail))
+    for _ in range(100):
+        trail.record("stop", ADA, "http")
+        trail.record("reset", ADA, "http")
+        trail.seat(Seat(holder="a1", why="request"), ADA, ADA)
+        trail.seat(Seat(why="released"), Actor(), ADA)
+    assert len(list(tail)) == before + 400
+
+
+def test_budgets_refill_and_their_number_is_bounded() -> None:
+    budget = AuditBudget()
+    while budget.take("joined", "link1", 0.0):
+        pass
+    assert not budget.take("joined", "link1", 0.9 / RATE)
+    assert budget.take("left", "link1", 0.0), "each kind has its own"
+    assert budget.take("joined", "link1", 1.1 / RATE)
+    for number in range(2 * MAX_BUDGETS):
+        budget.take("joined", f"other {number}", 0.0)
+    assert not budget.take("joined", "one more", 0.0), "further links share one"
+    budget.forget_idle(1e6)
+    assert budget.take("joined", "one more", 1e6)
+
+
+def test_refusals_renames_notes_and_joins_push_nothing_else_out_of_the_tail() -> None:
+    tail = AuditTail()
+    kinds: tuple[AuditKind, ...] = ("seat", "stop", "reset", "revocation", "invitation", "start")
+    numbers = count(1)
+    for kind in kinds:
+        for _ in range(100):
+            tail.append(AuditRecord(n=next(numbers), time=0.0, kind=kind, link="someone"))
+    tail.append(AuditRecord(n=next(numbers), time=0.0, kind="refusal", link="quiet", what="late"))
+    for _ in range(KEPT):
+        for chatter in sorted(CHATTER):
+            tail.append(AuditRecord(n=next(numbers), time=0.0, kind=chatter, link="loud"))
+    kept = list(tail)
+    assert len(kept) == KEPT
+    assert [record.n for record in kept] == sorted(record.n for record in kept)
+    for kind in kinds:
+        assert sum(record.kind == kind for record in kept) == 100
+    assert any(record.link == "quiet" for record in kept), "of a kind the loudest link gives way first"
+
+
+def test_pages_backwards_find_all_that_is_kept_where_numbers_have_gaps() -> None:
+    tail = AuditTail(AuditRecord(n=n, time=0.0, kind="note") for n in range(1, 10_000, 1000))
+    assert [record.n for record in tail.before(9001, 3)] == [6001, 7001, 8001]
+    assert [record.n for record in tail.before(6001, 500)] == [1, 1001, 2001, 3001, 4001, 5001]
+    assert tail.before(1, 500) == []
+    assert tail.next_number == 9002
 
 
 def test_the_tail_gives_pages_and_the_newest_and_is_bounded() -> None:

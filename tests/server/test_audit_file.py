@@ -4,7 +4,8 @@ from pathlib import Path
 import pytest
 
 from server.audit import AuditRecord
-from server.audit_file import AuditFile, last_records, rotated, stored_records
+from server.audit_file import AuditFile, chained_lines, last_records, rotated, stored_records
+from server.evidence.chain import check_chain, line_hash
 
 
 def _record(n: int, detail: str = "") -> AuditRecord:
@@ -28,7 +29,9 @@ def test_records_are_appended_over_restarts_and_only_the_owner_can_read_them(tmp
         file.close()
     assert _numbers(path) == [1, 11, 2, 12]
     assert path.stat().st_mode & 0o777 == 0o600
-    assert path.read_text().splitlines()[0] == '{"n":1,"time":1.0,"kind":"note"}', "what is empty is left out"
+    first, second, *_ = path.read_bytes().splitlines()
+    assert first == b'{"n":1,"time":1.0,"kind":"note","before":"%s"}' % (b"0" * 64), "what is empty is left out"
+    assert second.endswith(b',"before":"%s"}' % line_hash(first).encode())
 
 
 def test_a_full_file_is_set_aside_and_the_oldest_goes(tmp_path: Path) -> None:
@@ -104,3 +107,32 @@ def test_the_end_of_the_log_is_found_quickly_and_a_missing_log_is_empty(tmp_path
     found = [record.n for record in last_records(path)]
     assert found[-1] == 20_000
     assert 5_000 < len(found) < 20_000
+
+
+def test_the_chain_goes_on_over_rotation_restarts_and_a_line_that_was_cut_off(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    for first in range(1, 61, 20):
+        file = _file(path, max_bytes=2000, files=20)
+        for n in range(first, first + 20):
+            file.write([_record(n)])
+        file.close()
+        with path.open("a") as cut:
+            cut.write('{"n":99,"ti')
+    assert rotated(path, 2).exists()
+    report = check_chain(chained_lines(path))
+    assert (report.records, report.first, report.last, report.count) == (60, 1, 60, 0)
+    assert len(report.unreadable) == 3
+
+
+def test_a_log_of_an_earlier_version_is_continued_and_what_it_held_is_bound_by_the_first_new_record(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "audit.jsonl"
+    path.write_text('{"n":1,"time":1.0,"kind":"note"}\n{"n":2,"time":1.0,"kind":"note"}\n')
+    file = _file(path)
+    file.write([_record(3)])
+    file.close()
+    report = check_chain(chained_lines(path))
+    assert (report.unchained, report.count) == (2, 0)
+    path.write_text(path.read_text().replace('"n":2,"time":1.0', '"n":2,"time":2.0'))
+    assert check_chain(chained_lines(path)).faults[0].kind == "changed"

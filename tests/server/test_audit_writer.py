@@ -27,6 +27,9 @@ class FakeFile:
             raise OSError(28, "No space left on device")
         self.written += [record.n for record in records]
 
+    def settle(self) -> None:
+        pass
+
     def close(self) -> None:
         self.closed = True
 

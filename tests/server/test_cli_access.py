@@ -13,7 +13,10 @@ from client import Console, ConsoleLost, SignallingRefused
 from server.access import Identity
 from server.audit import AuditRecord
 from server.audit_file import AuditFile
+from server.audit_log import anchors_path
+from server.audit_store import AuditStore
 from server.cli import app
+from server.evidence.anchors import AnchorFile
 from server.settings import Settings
 from server.state import open_state
 from tests.support.stack import running_stack
@@ -145,3 +148,42 @@ def test_the_audit_is_shown_for_people_and_from_a_number_on(tmp_path: Path) -> N
         assert part in shown[1]
     assert len(_lockstep(tmp_path, "audit", "--after", "1").stdout.splitlines()) == 1
     assert json.loads(_lockstep(tmp_path, "audit", "--after", "1", "--json").stdout)["n"] == 2
+
+
+async def test_the_audit_of_a_console_that_ran_is_verified_and_an_edit_and_a_cut_are_named(tmp_path: Path) -> None:
+    async with running_stack(tmp_path):
+        pass
+    state = tmp_path / "state"
+    key = _lockstep(state, "audit", "--key").stdout.strip()
+    good = _lockstep(state, "audit", "--verify")
+    assert good.exit_code == 0, good.output
+    assert f"signed by {key}" in good.stdout
+    assert json.loads(_lockstep(tmp_path / "other", "audit", str(state), "--verify", "--json").stdout)["ok"]
+    wrong = _lockstep(state, "audit", "--verify", "--signed-by", "0" * 64)
+    assert "none of this audit and key" in wrong.stdout
+    assert _lockstep(state, "audit", "--verify", "--signed-by", "key").exit_code == 2
+    path = state / "audit.jsonl"
+    whole = path.read_bytes()
+    first, rest = whole.split(b"\n", 1)
+    assert b'"kind":"start","what":"console ' in first
+    path.write_bytes(first.replace(b"console ", b"Console ") + b"\n" + rest)
+    edited = _lockstep(state, "audit", "--verify")
+    assert edited.exit_code == 1
+    assert "FAIL" in edited.stdout
+    assert "does not fit record 1" in edited.stdout
+    path.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
+    cut = _lockstep(state, "audit", "--verify")
+    assert cut.exit_code == 1
+    assert "the end was cut off" in cut.stdout
+
+
+def test_signed_heads_go_to_the_folder_that_the_setting_names(tmp_path: Path) -> None:
+    settings = Settings(state_dir=tmp_path / "state", audit_anchor=tmp_path / "elsewhere")
+    state = open_state(settings)
+    anchors = AnchorFile(anchors_path(settings, state.directory.path), 1000)
+    store = AuditStore(state.directory.path / "audit.jsonl", 10_000, 2, "", state.signer, anchors)
+    store.write([AuditRecord(n=1, time=0.0, kind="stop")])
+    store.close()
+    assert (tmp_path / "elsewhere" / "audit-anchors.jsonl").exists()
+    shown = _lockstep(tmp_path / "state", "audit", "--verify", "--anchors", str(tmp_path / "elsewhere"))
+    assert "ok    1 signed heads fit" in shown.stdout, shown.output

@@ -38,6 +38,7 @@ const KINDS: ReadonlyMap<string, AuditGroup> = new Map([
   ["left", "people"],
   ["invitation", "people"],
   ["revocation", "people"],
+  ["renamed", "people"],
   ["note", "notes"],
 ]);
 

@@ -35,6 +35,11 @@ export class SessionApi {
     return parseAudit(await this.ask("GET", `/api/audit?after=${after}&limit=${AUDIT_LINES}`));
   }
 
+  /** The last lines in front of number `before`, of those that the console keeps at hand. */
+  async olderAudit(before: number): Promise<AuditPage> {
+    return parseAudit(await this.ask("GET", `/api/audit?before=${before}&limit=${AUDIT_LINES}`));
+  }
+
   /** Starts or ends the recording of the session; the new state comes to everyone as a message. */
   async record(start: boolean): Promise<void> {
     await this.ask("POST", start ? "/api/recordings" : "/api/recordings/stop");

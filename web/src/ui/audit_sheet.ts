@@ -1,12 +1,12 @@
-import { mergeAudit, type AuditEntry } from "../core/audit";
+import { mergeAudit, type AuditEntry, type AuditPage } from "../core/audit";
 import { AUDIT_LINES, type SessionApi } from "../rtc/session_api";
 import { createAuditView, type AuditAnswer } from "./audit_view";
 import type { SheetContent } from "./sheet";
 
 /** What happened at this robot. */
 export function createAuditSheet(api: SessionApi): SheetContent {
-  const ask = async (after: number): Promise<AuditAnswer<AuditEntry>> => {
-    const { entries, trouble } = await api.audit(after);
+  let isWhole = false; // nothing older than what is known is kept at hand
+  const told = ({ entries, trouble }: AuditPage): AuditAnswer<AuditEntry> => {
     const words = trouble === "" ? "" : `The console cannot write the trail at present: ${trouble}.`;
     return { entries, trouble: words };
   };
@@ -16,9 +16,13 @@ export function createAuditSheet(api: SessionApi): SheetContent {
     className: "",
     second: [],
     cells: () => [],
-    newest: (known) => ask(known[0]?.n ?? -1),
-    hasOlder: (known) => oldest(known) > 1,
-    older: (known) => ask(Math.max(0, oldest(known) - 1 - AUDIT_LINES)),
+    newest: async (known) => told(await api.audit(known[0]?.n ?? -1)),
+    hasOlder: (known) => !isWhole && oldest(known) > 1,
+    older: async (known) => {
+      const found = await api.olderAudit(oldest(known));
+      isWhole = found.entries.length < AUDIT_LINES;
+      return told(found);
+    },
     merged: mergeAudit,
   });
 }

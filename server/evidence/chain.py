@@ -1,0 +1,126 @@
+"""Lines that each carry the hash of the line before, and what is wrong with a chain of them. No I/O, no clock.
+
+The canonical bytes of a line are the bytes of the file, without the line's end. The first line carries `GENESIS`.
+"""
+
+import hashlib
+from collections.abc import Iterable
+from typing import Literal, NamedTuple
+
+import msgspec
+
+__all__ = ["GENESIS", "ChainReport", "ChainedLine", "Fault", "Place", "check_chain", "line_hash"]
+
+GENESIS = "0" * 64
+MOST = 100  # faults that are kept
+
+FaultKind = Literal["changed", "reordered", "unchained", "cut", "anchor"]
+
+
+class Place(NamedTuple):
+    """Where a line stands."""
+
+    file: str
+    line: int  # from 1 on
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}"
+
+
+class ChainedLine(NamedTuple):
+    place: Place
+    data: bytes  # without the end of the line
+
+
+class Fault(msgspec.Struct, frozen=True):
+    """Something that is not as it was written."""
+
+    kind: FaultKind
+    n: int  # of the record
+    text: str
+
+
+class ChainReport(msgspec.Struct, kw_only=True):
+    """What a chain says. `hashes` are those of the records that are kept, by number."""
+
+    records: int = 0
+    first: int = 0  # number of the oldest record; 0: there is none
+    last: int = 0
+    head: str = GENESIS  # hash of the last line
+    earlier: bool = False  # records before the first are not kept any more
+    unchained: int = 0  # of a version without a chain, in front of all others
+    unreadable: list[str] = []  # places of lines that are no record: a write that was cut off
+    faults: list[Fault] = []
+    count: int = 0  # of faults; only the first are kept
+    hashes: dict[int, str] = {}
+
+    def fault(self, kind: FaultKind, n: int, text: str) -> None:
+        self.count += 1
+        if len(self.faults) < MOST:
+            self.faults.append(Fault(kind, n, text))
+
+
+class _Link(msgspec.Struct):
+    n: int
+    before: str = ""
+
+
+_decoder = msgspec.json.Decoder(_Link)
+
+
+def line_hash(line: bytes) -> str:
+    """SHA-256 (FIPS 180-4) of the canonical bytes, in hexadecimal digits."""
+    return hashlib.sha256(line).hexdigest()
+
+
+def check_chain(lines: Iterable[ChainedLine]) -> ChainReport:
+    """Of one file with those that were set aside before it, oldest first."""
+    report = ChainReport()
+    numbers: dict[str, int] = {}  # of the records seen, by hash
+    chained = False
+    for place, data in lines:
+        try:
+            link = _decoder.decode(data)
+        except (msgspec.DecodeError, UnicodeError, RecursionError):
+            if len(report.unreadable) < MOST:
+                report.unreadable.append(str(place))
+            continue
+        if not report.records:
+            _begin(report, link)
+        elif link.before and link.before != report.head:
+            _say_broken(report, numbers, link, place)
+        elif link.before and link.n <= report.last:
+            report.fault("reordered", link.n, f"{place}: record {link.n} stands behind record {report.last}")
+        if link.before:
+            chained = True
+        elif chained:
+            report.fault("unchained", link.n, f"{place}: record {link.n} carries no hash of the one before")
+        else:
+            report.unchained += 1
+        report.records += 1
+        report.last, report.head = link.n, line_hash(data)
+        numbers[report.head] = link.n
+        report.hashes[link.n] = report.head
+    return report
+
+
+def _begin(report: ChainReport, link: _Link) -> None:
+    report.first, report.earlier = link.n, bool(link.before) and link.before != GENESIS
+    if report.earlier and report.unreadable:
+        text = f"{report.unreadable[0]} is no record, and stands where the one in front of record {link.n} should"
+        report.fault("changed", link.n, text)
+
+
+def _say_broken(report: ChainReport, numbers: dict[str, int], link: _Link, place: Place) -> None:
+    if link.n <= report.last:
+        text = f"{place}: record {link.n} stands behind record {report.last}: the order was changed"
+        report.fault("reordered", link.n, text)
+    elif link.before in numbers:
+        text = f"{place}: record {link.n} was written behind record {numbers[link.before]}, not behind {report.last}"
+        report.fault("reordered", link.n, text)
+    else:
+        text = (
+            f"{place}: record {link.n} does not fit record {report.last} in front of it: that one was changed, "
+            "or records between them were taken out"
+        )
+        report.fault("changed", link.n, text)
