@@ -15,7 +15,7 @@ Limiter = Callable[[list[float], list[float]], list[float]]  # values, the same 
 
 
 class AxisShaper:
-    """Call `drive` at execution, `rest` to come to rest early, and `step` once a tick."""
+    """Call `drive` at execution, `rest` to come to rest early, and `step` or, after a failure, `brake` once a tick."""
 
     def __init__(self, axes: Sequence[Axis], *, hold: float, limiter: Limiter | None = None) -> None:
         self._axes = tuple(axes)
@@ -46,6 +46,17 @@ class AxisShaper:
     def rest(self) -> None:
         """Come to rest at the brake rate from the next step on."""
         self._targets = None
+
+    def brake(self, dt: float) -> list[float]:
+        """One step towards rest at the brake rate, whatever was aimed for; the limiter is not asked."""
+        self._targets = None
+        self._values = self._braked(dt)
+        return list(self._values)
+
+    def cut(self) -> None:
+        """The values are at rest from now on, without a ramp: nobody knows what the robot has done meanwhile."""
+        self._targets = None
+        self._values = list(self._rest_values)
 
     def step(self, now: float, dt: float) -> list[float]:
         """The values for a tick of `dt` seconds that begins now."""

@@ -1,8 +1,10 @@
 """Puts the bridge together: link server, event core, axis shaper, robot, media sources, event log."""
 
 import asyncio
+import atexit
 import contextlib
 import logging
+import math
 import secrets
 import time
 from collections import Counter
@@ -13,6 +15,7 @@ from typing import Self
 from robot_bridge.axis_shaper import AxisShaper
 from robot_bridge.check_description import check_description
 from robot_bridge.check_link import check_link
+from robot_bridge.coming_to_rest import ComingToRest
 from robot_bridge.counters import BridgeCounters
 from robot_bridge.errors import RobotFailed
 from robot_bridge.event_core import Answered, EventCore, Executed, Refused
@@ -24,7 +27,7 @@ from robot_bridge.link_session import BadInput
 from robot_bridge.metronome import Metronome
 from robot_bridge.motion_limits import MotionLimits
 from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop
-from robot_bridge.robots.base import MediaSource, Robot, Stamp
+from robot_bridge.robots.base import Measurement, MediaSource, Robot, Stamp
 from robot_bridge.robots.event_strip import with_event_strip
 from robot_bridge.settings import BridgeSettings
 
@@ -77,7 +80,9 @@ class Bridge:
         self._running: asyncio.Task[None] | None = None
         self._at_rest = asyncio.Event()  # nothing is driven
         self._rested = True  # at the last tick
-        self._robot_error: Exception | None = None
+        self._robot_error: BaseException | None = None
+        self._stop_due = False  # the robot's own stop follows when the axes are at rest
+        self._failure = ""  # why the run has ended, "robot failed: OSError: ..."; "" while it goes on
         self._closed = False
 
     @property
@@ -111,13 +116,14 @@ class Bridge:
             raise
         self._record("start", self._core.current, epoch=self.epoch)
         self._issue(time.monotonic())
+        atexit.register(self._rest_at_exit)
         self._running = asyncio.get_running_loop().create_task(self._run(), name="bridge")
 
     async def wait(self) -> None:
         """Until closed.
 
         Raises:
-            RobotFailed: the robot adapter raised; the bridge has come to an end.
+            RobotFailed: the robot adapter or a part of the bridge raised; the robot rests and the bridge has ended.
         """
         if self._running is not None:
             await asyncio.wait([self._running])
@@ -129,16 +135,33 @@ class Bridge:
         if self._closed:
             return
         self._closed = True
-        await self._links.close()
-        if self._running is not None:
-            await self._come_to_rest(self._running)
-            self._running.cancel()
-            await asyncio.wait([self._running])
-            if not self._running.cancelled():
-                self._running.exception()  # `wait` raises it; here it only must not count as unnoticed
-        self._robot.close()
-        if self._log is not None:
-            await asyncio.to_thread(self._log.close)
+        try:
+            await self._links.close()
+            if self._running is not None:
+                await self._come_to_rest(self._running)
+        finally:
+            await self._end_run()
+            try:
+                self._robot.close()
+            finally:
+                if self._log is not None:
+                    await asyncio.to_thread(self._log.close)
+
+    async def _end_run(self) -> None:
+        """The ticks end with the rest values and the robot's own stop, however they end."""
+        if self._running is None:
+            return
+        self._running.cancel()
+        await asyncio.wait([self._running])
+        if not self._running.cancelled():
+            self._running.exception()  # `wait` raises it; here it only must not count as unnoticed
+        atexit.unregister(self._rest_at_exit)
+
+    def _rest_at_exit(self) -> None:
+        """The process ends and nobody has closed the bridge: its loop is gone."""
+        leaving = self._coming_to_rest()
+        leaving.at_once()
+        leaving.stop()
 
     async def _come_to_rest(self, running: asyncio.Task[None]) -> None:
         """Let the ticks go on until nothing is driven; gives up when they ended or take too long."""
@@ -205,19 +228,21 @@ class Bridge:
     def _stop(self, stop: Stop) -> None:
         if self._core.stop(stop.by, stop.reason):
             self._shaper.rest()
-            self._call_robot(self._robot.stop)
+            self._stop_due = True
             self._record("stop", self._core.current, by=stop.by, reason=stop.reason)
 
     def _reset(self, reset: Reset) -> None:
         if self._core.reset():
-            self._call_robot(self._robot.reset)
+            if not self._stop_due:  # else the robot has not been told yet
+                self._call_robot(self._robot.reset)
+            self._stop_due = False
             self._record("reset", self._core.current, by=reset.by)
 
     def _call_robot(self, call: Callable[[], None]) -> None:
         """An adapter that raises ends the bridge at the next tick, not the link that happened to ask."""
         try:
             call()
-        except Exception as error:
+        except BaseException as error:
             self._robot_error = error
 
     # the tick
@@ -225,25 +250,82 @@ class Bridge:
     async def _run(self) -> None:
         try:
             async with asyncio.TaskGroup() as group:
+                group.create_task(self._run_ticks())  # first: it brings the robot to rest, however the others end
                 group.create_task(self._links.run())
-                group.create_task(self._run_ticks())
                 group.create_task(self._run_reports())
-                for source in self._robot.sources():
-                    group.create_task(self._run_source(source))
-        except* Exception as errors:
-            error = errors.exceptions[0]
-            _logger.error("the robot failed: %s", error, exc_info=error)
-            with contextlib.suppress(Exception):
-                self._robot.stop()
-            await self._links.close()
-            raise RobotFailed(f"{type(error).__name__}: {error}") from error
+                group.create_task(self._run_sources(group))
+        except (asyncio.CancelledError, GeneratorExit):
+            raise
+        except BaseException as errors:
+            error = first_cause(errors)
+            self._fail(error)
+            self._tell_failure()
+            await self._links.close(self._failure)
+            raise error if isinstance(error, RobotFailed) else RobotFailed(named(error)) from error
 
     async def _run_ticks(self) -> None:
+        """However the ticks end, the robot is brought to rest and stopped before this does."""
+        try:
+            await self._tick_on()
+        except GeneratorExit:  # the loop is gone: nothing can be awaited any more
+            self._rest_at_exit()
+            raise
+        except asyncio.CancelledError:
+            await self._leave()
+            raise
+        except BaseException as error:
+            self._fail(error)
+            await self._leave()
+            raise
+
+    async def _leave(self) -> None:
+        leaving = self._coming_to_rest()
+        try:
+            while True:
+                if leaving.step(time.monotonic()):
+                    break
+                await asyncio.sleep(self._robot.tick_seconds)
+        finally:  # also when this is cancelled once more
+            if not leaving.rests:
+                leaving.at_once()
+            leaving.stop()
+            if not self._rested:
+                self._rested = True
+                self._record("at_rest", self._core.current)
+
+    def _coming_to_rest(self) -> ComingToRest:
+        return ComingToRest(self._robot, self._shaper, self.description.hold, time.monotonic())
+
+    def _fail(self, error: BaseException) -> None:
+        """Latch the stop: whoever starts the bridge again, nothing moves until somebody resets it."""
+        if self._failure:
+            return
+        self._failure = f"robot failed: {named(error)}"[:500]
+        _logger.error("%s", self._failure, exc_info=error)
+        if self._core.stop("", self._failure):
+            self._record("stop", self._core.current, by="", reason=self._failure)
+
+    def _tell_failure(self) -> None:
+        """Feed back what has happened, with what was measured last where nothing can be measured any more."""
+        try:
+            measured = self._robot.measure()
+        except BaseException:  # the robot is not to be trusted with anything any more
+            axes, joints = ([math.nan] * len(each) for each in (self.description.axes, self.description.joints))
+            measured = Measurement(axes=axes, joints=joints, wrench=[], ranges=[], at_rest=False, faults=[])
+        try:
+            self._issue_measured(measured._replace(faults=[*measured.faults, self._failure]), time.monotonic())
+        except Exception as error:
+            _logger.error("the failure cannot be fed back: %s", error, exc_info=error)
+
+    async def _tick_on(self) -> None:
         metronome = Metronome(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
         while True:
             await asyncio.sleep(metronome.wait(time.monotonic()))
             self.counters.skipped_ticks = metronome.skipped
-            self._tick(time.monotonic())
+            try:
+                self._tick(time.monotonic())
+            except BaseException as error:  # an adapter may raise what would end the loop, or cancel the task
+                raise RobotFailed(named(error)) from error
 
     def _tick(self, now: float) -> None:
         if self._robot_error is not None:
@@ -254,6 +336,9 @@ class Bridge:
             self._note_limits(self._limits.acting)
         if self._shaper.at_rest:
             self._at_rest.set()
+            if self._stop_due:
+                self._stop_due = False
+                self._robot.stop()
         if self._shaper.at_rest != self._rested:
             self._rested = self._shaper.at_rest
             self._record("at_rest" if self._rested else "driven", self._core.current)
@@ -261,7 +346,10 @@ class Bridge:
             self._issue(time.monotonic())
 
     def _issue(self, now: float) -> None:
-        measured, unknown = self._last_known.settle(self._robot.measure())
+        self._issue_measured(self._robot.measure(), now)
+
+    def _issue_measured(self, measured: Measurement, now: float) -> None:
+        measured, unknown = self._last_known.settle(measured)
         if self._source_faults or self._limits.blind:
             blind = [f"no motion: the position is unknown ({name})" for name in sorted(self._limits.blind)]
             measured = measured._replace(faults=[*measured.faults, *self._source_faults, *blind])
@@ -283,14 +371,31 @@ class Bridge:
 
     # media
 
+    async def _run_sources(self, group: asyncio.TaskGroup) -> None:
+        try:
+            sources = list(self._robot.sources())
+        except BaseException as error:
+            self._note_source_fault(error)
+            return
+        for source in sources:
+            group.create_task(self._run_source(source))
+
     async def _run_source(self, source: MediaSource) -> None:
         """A source that breaks is a fault of the robot, not the end of the bridge."""
         try:
             await source.run(_Stamper(self._core, self._times), self._emit)
-        except Exception as error:
-            _logger.error("a media source failed: %s", error, exc_info=error)
-            self._source_faults.append(f"media: {type(error).__name__}: {error}"[:200])
-            self._core.want_issue()
+        except GeneratorExit:
+            raise
+        except BaseException as error:
+            task = asyncio.current_task()
+            if isinstance(error, asyncio.CancelledError) and task is not None and task.cancelling():
+                raise
+            self._note_source_fault(error)
+
+    def _note_source_fault(self, error: BaseException) -> None:
+        _logger.error("a media source failed: %s", error, exc_info=error)
+        self._source_faults.append(f"media: {type(error).__name__}: {error}"[:200])
+        self._core.want_issue()
 
     def _emit(self, media: Media) -> None:
         self.counters.media += 1
@@ -342,3 +447,15 @@ class _Stamper:
 
     def at(self, time: float) -> Stamp | None:
         return self._times.at(time)
+
+
+def first_cause(error: BaseException) -> BaseException:
+    """The first that a group of tasks ended with."""
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error
+
+
+def named(error: BaseException) -> str:
+    """As "OSError: no such device"; what a RobotFailed names already."""
+    return error.detail if isinstance(error, RobotFailed) else f"{type(error).__name__}: {error}"

@@ -137,7 +137,7 @@ def _mjcf(path: Path) -> Robot:
 async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings, as_json: bool) -> None:
     stopping = asyncio.Event()
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # SIGHUP: its terminal was closed
         loop.add_signal_handler(number, stopping.set)
     async with Bridge(make(), settings) as bridge:
         _announce(name, bridge, "tcp" if settings.tls is None else "tls", as_json)

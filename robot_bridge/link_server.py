@@ -163,15 +163,15 @@ class LinkServer:
             for peer in list(self._connections):
                 peer.tick()
 
-    async def close(self) -> None:
-        """Stop listening, say goodbye to all, and wait until they are gone."""
+    async def close(self, reason: str = "the bridge is closing") -> None:
+        """Stop listening, say goodbye to all with this reason, and wait until they are gone."""
         server, self._server = self._server, None
         if isinstance(server, TlsAcceptor):
             await server.close()
         elif server is not None:
             server.close()
         for peer in list(self._connections):
-            peer.end("closing", "the bridge is closing")
+            peer.end("closing", reason)
         try:
             async with asyncio.timeout(CLOSE_TIMEOUT):
                 while self._connections:

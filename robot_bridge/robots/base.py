@@ -60,6 +60,10 @@ class Robot(ABC):
 
     Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`.
     Values reach `apply` already clamped, slew-limited and, when there is nothing to execute, at rest.
+
+    A method that raises ends the bridge. Before it does, the rest values are applied at the axes' brake rates, again
+    after each failure, then `stop` is called, then `close`; each call is made whatever the others raised.
+    A new object is in the state that `reset` leaves behind; the bridge stops it when it was stopped before.
     """
 
     tick_seconds: float = 0.004
@@ -93,8 +97,15 @@ class Robot(ABC):
         """
         return None
 
+    @abstractmethod
     def stop(self) -> None:
-        """The stop was latched: also engage brakes or cut power where the robot can."""
+        """Keep the robot standing by the strongest means that software has: engage brakes, cut power, hold the place.
+
+        Called when a stop was latched and the axes are back at their rest values (stop category 1 of IEC 60204-1 where
+        power is cut), when the bridge ends for whatever reason, and after a failure of any other method. May be called
+        again. Until `reset`, whatever reaches `apply` must not move the robot. Raising makes the bridge try again,
+        twice, and end.
+        """
 
     def reset(self) -> None:
         """The stop was released: undo `stop`. Must not move anything."""

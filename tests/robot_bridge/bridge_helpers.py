@@ -83,9 +83,11 @@ class RecordingRobot(PlanarRobot):
 
     def stop(self) -> None:
         self.calls.append("stop")
+        super().stop()
 
     def reset(self) -> None:
         self.calls.append("reset")
+        super().reset()
 
     def close(self) -> None:
         self.calls.append("close")

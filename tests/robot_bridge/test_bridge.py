@@ -53,7 +53,7 @@ async def test_commands_move_the_robot_and_each_feedback_belongs_to_its_command(
         assert driver.feedback.joints[0] > 0.0
         assert driver.feedback.axes[0] > 0.1
         assert bridge.counters.executed == 30
-    assert robot.calls == ["close"]
+    assert robot.calls == ["stop", "close"]
 
 
 async def test_events_go_on_over_the_wrap() -> None:
@@ -168,7 +168,7 @@ async def test_stop_latches_and_reset_moves_nothing() -> None:
         await driver.heard(lambda feedback: not feedback.stop.stopped)
         assert robot.applied[-1][1] == NEUTRAL
         await driver.drive()
-    assert robot.calls == ["stop", "reset", "close"]
+    assert robot.calls == ["stop", "reset", "stop", "close"]
 
 
 async def test_a_repeat_of_the_current_event_gets_its_feedback_again_and_executes_nothing() -> None:
@@ -280,7 +280,7 @@ async def test_closing_the_bridge_says_so_and_leaves_the_robot_at_rest() -> None
                 await driver.next(Goodbye)
         await bridge.close()
     assert robot.applied[-1][1] == NEUTRAL
-    assert robot.calls == ["close"]
+    assert robot.calls == ["stop", "close"]
 
 
 async def test_a_robot_that_raises_ends_the_bridge_with_its_reason() -> None:

@@ -43,6 +43,7 @@ class Micromanipulator(Robot):
         self._needle = Needle(self._holder())
         self._light = MicromanipulatorState().light
         self._values: list[float] = [0.0] * len(DESCRIPTION.axes)
+        self._stopped = False  # no drive is told to step
         self._draughtsman = Draughtsman()
         self._sound = Sound()
         self._sources: tuple[MediaSource, ...] = (
@@ -55,7 +56,7 @@ class Micromanipulator(Robot):
         return DESCRIPTION
 
     def apply(self, values: Sequence[float]) -> None:
-        self._values[:] = values
+        self._values = [0.0] * len(DESCRIPTION.axes) if self._stopped else list(values)
 
     def tick(self) -> None:
         dt = self.tick_seconds
@@ -90,6 +91,13 @@ class Micromanipulator(Robot):
             focus=self._drives[3].position,
             light=self._light,
         )
+
+    def stop(self) -> None:
+        self._stopped = True
+        self._values = [0.0] * len(DESCRIPTION.axes)
+
+    def reset(self) -> None:
+        self._stopped = False
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources

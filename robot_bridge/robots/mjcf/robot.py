@@ -57,7 +57,9 @@ class MjcfRobot(Robot):
         self._wrench = wrench_sense(model)
         self._ranges = range_sense(model, data)
         cameras = cameras_of(model)
-        self._values = [drive.axis.rest for drive in self._drives]
+        self._rest_values = [drive.axis.rest for drive in self._drives]
+        self._values = self._rest_values
+        self._stopped = False  # every drive holds its place, whatever is applied
         self._moving = self._moving_dofs()
         self._description = self._describe(path.stem, tuple(cameras))
         step = float(model.opt.timestep)
@@ -80,7 +82,7 @@ class MjcfRobot(Robot):
         return self._description
 
     def apply(self, values: Sequence[float]) -> None:
-        self._values[:] = values
+        self._values = self._rest_values if self._stopped else list(values)
 
     def tick(self) -> None:
         before = self.data.time
@@ -99,13 +101,20 @@ class MjcfRobot(Robot):
             joints=[short(value) for value in self.positions()],
             wrench=[] if self._wrench is None else [short(value) for value in self._wrench.value.tolist()],
             ranges=[] if self._ranges is None else [short(value) for value in self._ranges.read(data)],
-            at_rest=is_still and self._values == [drive.axis.rest for drive in self._drives],
+            at_rest=is_still and self._values == self._rest_values,
             faults=self._faults(),
         )
 
     def positions(self) -> Sequence[float]:
         qpos = self.data.qpos
         return [value for joint in self._joints for value in joint.values(qpos)]
+
+    def stop(self) -> None:
+        self._stopped = True
+        self._values = self._rest_values
+
+    def reset(self) -> None:
+        self._stopped = False
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources

@@ -43,7 +43,9 @@ class MobileManipulator(Robot):
         self._ranges = RangeSensors(model)
         self._hearing = Hearing(model)
         self._sound = Sound(MICROPHONE.sample_rate, round(MICROPHONE.sample_rate * SEGMENT_SECONDS))
-        self._values: Sequence[float] = [0.0] * len(self._description.axes)
+        self._rest_values = [0.0] * len(self._description.axes)
+        self._values: Sequence[float] = self._rest_values
+        self._stopped = False  # the base is parked and the arm holds its posture, whatever is applied
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)
         self._sources: tuple[MediaSource, ...] = (
             *(CameraSource(each, self._renderer.drawing(each), self.simulation.snapshot) for each in CAMERAS),
@@ -54,7 +56,7 @@ class MobileManipulator(Robot):
         return self._description
 
     def apply(self, values: Sequence[float]) -> None:
-        self._values = values
+        self._values = self._rest_values if self._stopped else values
 
     def tick(self) -> None:
         data = self.simulation.data
@@ -85,6 +87,13 @@ class MobileManipulator(Robot):
     def joint_rates(self, values: Sequence[float]) -> Sequence[float]:
         """The base's rates are left out: no limit by posture needs them."""
         return [0.0, 0.0, 0.0, *self._arm.rates(values[BASE.stop :])]
+
+    def stop(self) -> None:
+        self._stopped = True
+        self._values = self._rest_values
+
+    def reset(self) -> None:
+        self._stopped = False
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources

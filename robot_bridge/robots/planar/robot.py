@@ -40,6 +40,7 @@ class PlanarRobot(Robot):
     def __init__(self, state: PlanarState | None = None) -> None:
         self._state = state or PlanarState()
         self._command = (0.0, 0.0, 0.0)
+        self._braked = False  # the stop holds the wheels
         self._sound = Synthesiser()
         drawings = ((OVERVIEW, OverviewDrawing), (FRONT, FrontDrawing))
         self._sources: tuple[MediaSource, ...] = (
@@ -55,7 +56,7 @@ class PlanarRobot(Robot):
         return DESCRIPTION
 
     def apply(self, values: Sequence[float]) -> None:
-        vx, vy, wz = values
+        vx, vy, wz = (0.0, 0.0, 0.0) if self._braked else values
         self._command = (vx, vy, wz)
 
     def tick(self) -> None:
@@ -98,6 +99,13 @@ class PlanarRobot(Robot):
 
     def positions(self) -> Sequence[float]:
         return self._state[:3]
+
+    def stop(self) -> None:
+        self._braked = True
+        self._command = (0.0, 0.0, 0.0)
+
+    def reset(self) -> None:
+        self._braked = False
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources

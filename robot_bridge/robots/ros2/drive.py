@@ -32,6 +32,8 @@ class Drive(ABC):
         self._topic = topic
         self._publisher = ros.publisher(kind, topic)
         self._stream = CommandStream(rate, [0.0] * size, tick_seconds)
+        self._owes_zero = False  # the last word that got out was not zero
+        self._stopped = False
         self._heard = False  # whether somebody listens
         self._looked = float("-inf")  # s, when that was looked up
 
@@ -40,24 +42,37 @@ class Drive(ABC):
         now = time.monotonic()
         if now - self._looked >= LOOK_INTERVAL:
             self._heard, self._looked = self._publisher.get_subscription_count() > 0, now
-        step = self._stream.step(values, not (self._heard and self.seen(now)), now)
-        message = self.advance(step.said, step.values, dt)
-        if message is not None:
-            self._publisher.publish(message)
+        lost = self._stopped or not (self._heard and self.seen(now))
+        step = self._stream.step(values, lost, now)
+        self._say(step.said, step.values, dt)
 
     def end(self) -> None:
         """The bridge closes: say zero if the last word was another."""
-        if self._stream.end():
-            message = self.advance(Said.ZERO, [0.0] * self.size, 0.0)
-            if message is not None:
-                self._publisher.publish(message)
+        self._stream.end()
+        if self._owes_zero:
+            self._say(Said.ZERO, [0.0] * self.size, 0.0)
+
+    def stop(self) -> None:
+        """Say zero if the last word was another, and no moving values until `reset`."""
+        self._stopped = True
+        self.end()
+
+    def reset(self) -> None:
+        self._stopped = False
+
+    def _say(self, said: Said, values: list[float], dt: float) -> None:
+        message = self.advance(said, values, dt)
+        if message is not None:
+            self._owes_zero = True  # also when publishing raises
+            self._publisher.publish(message)
+            self._owes_zero = said is not Said.ZERO
 
     def faults(self, now: float) -> list[str]:
         """What keeps this part from being driven, for a person."""
         found = self.sensor_faults(now)
         if not self._heard:
             found.append(f"{self._topic}: nobody listens for {self._kind.__name__}")
-        if self._stream.withheld and not found:
+        if self._stream.withheld and not self._stopped and not found:
             found.append(f"{self._topic}: let go once; the robot's side was lost while it was driven")
         return found
 

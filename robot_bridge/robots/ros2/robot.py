@@ -1,7 +1,7 @@
 """A robot behind ROS 2 topics, as the bridge sees it."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.robots.base import Measurement, MediaSource, Robot
@@ -74,10 +74,31 @@ class Ros2Robot(Robot):
         now = time.monotonic()
         return [value for drive in self._drives for value in drive.joints(now)]
 
+    def stop(self) -> None:
+        """Says zero to every part whose last word was another, and no motion until `reset`."""
+        call_all([drive.stop for drive in self._drives])
+
+    def reset(self) -> None:
+        for drive in self._drives:
+            drive.reset()
+
     def sources(self) -> Sequence[MediaSource]:
         return self._cameras
 
     def close(self) -> None:
-        for drive in self._drives:
-            drive.end()
-        self._ros.close()
+        try:
+            call_all([drive.end for drive in self._drives])
+        finally:
+            self._ros.close()
+
+
+def call_all(calls: Sequence[Callable[[], None]]) -> None:
+    """Makes every call, also when one raises; raises what the first of those raised."""
+    errors: list[Exception] = []
+    for call in calls:
+        try:
+            call()
+        except Exception as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]
