@@ -1,9 +1,15 @@
-"""A console with the planar robot, browsers, and a sound card that can be listened to, for each test."""
+"""A console with the planar robot for each test; one Chromium and one sound card for all, since they start slowly.
+
+A test has browser contexts of its own: nothing is shared that a page can change. All run on one event loop, because the
+browser belongs to the loop that started it.
+"""
 
 from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
+import pytest_asyncio
 from playwright.async_api import Browser
 
 from bench.browsers.chromium import running_chromium
@@ -11,26 +17,64 @@ from bench.browsers.firefox import Firefox, running_firefox
 from bench.browsers.sound_card import SoundCard, running_sound_card
 from tests.support.stack import Stack, running_stack
 
+HERE = Path(__file__).parent
 
-@pytest.fixture
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    on_one_loop = pytest.mark.asyncio(loop_scope="session")
+    for item in items:
+        if HERE in item.path.parents and pytest_asyncio.is_async_test(item):
+            item.add_marker(on_one_loop, append=False)
+
+
+@pytest_asyncio.fixture(loop_scope="session")
 async def stack(tmp_path: Path) -> AsyncIterator[Stack]:
     async with running_stack(tmp_path) as running:
         yield running
 
 
-@pytest.fixture
-async def sound_card(tmp_path: Path) -> AsyncIterator[SoundCard]:
-    async with running_sound_card(tmp_path) as card:
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
+async def sound_card(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[SoundCard]:
+    async with running_sound_card(tmp_path_factory.mktemp("sound")) as card:
         yield card
 
 
-@pytest.fixture
-async def chromium(sound_card: SoundCard) -> AsyncIterator[Browser]:
-    async with running_chromium(sound_card.environment) as browser:
-        yield browser
+class ChromiumKeeper:
+    """Starts Chromium when it is first asked for, and again when it has crashed."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        self._environment = environment
+        self._running = AsyncExitStack()
+        self._browser: Browser | None = None
+
+    async def browser(self) -> Browser:
+        if self._browser is None or not self._browser.is_connected():
+            await self.close()
+            self._browser = await self._running.enter_async_context(running_chromium(self._environment))
+        return self._browser
+
+    async def close(self) -> None:
+        self._browser = None
+        await self._running.aclose()
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
+async def chromium_keeper(sound_card: SoundCard) -> AsyncIterator[ChromiumKeeper]:
+    keeper = ChromiumKeeper(sound_card.environment)
+    yield keeper
+    await keeper.close()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def chromium(chromium_keeper: ChromiumKeeper) -> AsyncIterator[Browser]:
+    """Without any page open, before and after."""
+    browser = await chromium_keeper.browser()
+    yield browser
+    for context in browser.contexts:  # what a test that failed has left
+        await context.close()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
 async def firefox(sound_card: SoundCard) -> AsyncIterator[Firefox]:
     async with running_firefox(sound_card.environment) as browser:
         yield browser

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+import pytest_asyncio
 from playwright.async_api import Browser, Response, expect
 
 from bench.browsers.chromium import open_page
@@ -37,7 +38,7 @@ def _console(directory: Path, robot: str, port: int, settings: dict[str, str]) -
     return running_fleet(directory, {robot: "planar"}, port=port, settings=settings)
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def consoles(tmp_path: Path) -> AsyncIterator[Consoles]:
     port = free_port()
     entry = f"http://localhost:{port}"

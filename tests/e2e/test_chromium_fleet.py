@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
+import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
 from bench.browsers.chromium import open_page
@@ -20,13 +21,13 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
 NAMES = ("left", "middle", "right")
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def fleet(tmp_path: Path) -> AsyncIterator[Stack]:
     async with running_fleet(tmp_path, dict.fromkeys(NAMES, "planar")) as running:
         yield running
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def lone(tmp_path: Path) -> AsyncIterator[Stack]:
     """A fleet of one."""
     async with running_fleet(tmp_path, {"left": "planar"}) as running:

@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
+import pytest_asyncio
 
 from bench.browsers.console_page import ConsolePage, open_console
 from bench.emulator.errors import NamespacesUnavailable
@@ -20,7 +21,7 @@ window.WebSocket = class extends Real {
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def stage(tmp_path: Path) -> AsyncIterator[RelayStage]:
     try:
         async with relay_stage(tmp_path) as ready:

@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
+import pytest_asyncio
 from playwright.async_api import Browser
 
 from bench.browsers.console_page import open_console
@@ -21,7 +22,7 @@ SPREAD = """(name) => {
 }"""
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def manipulator(tmp_path: Path) -> AsyncIterator[Stack]:
     async with running_stack(tmp_path, robot="mobile-manipulator") as running:
         yield running

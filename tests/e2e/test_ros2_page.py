@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
+import pytest_asyncio
 from playwright.async_api import Browser, expect
 
 from bench.browsers.console_page import LEFT_Y, RB, open_console
@@ -17,13 +18,13 @@ pytestmark = [
 ]
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def node(tmp_path: Path) -> AsyncIterator[RosRobot]:
     async with running_ros_robot(tmp_path) as robot:
         yield robot
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def base(tmp_path: Path, node: RosRobot) -> AsyncIterator[Stack]:
     extra = ("--ros2", str(EXAMPLES / "base.yaml"), "--robot-python", ros_python())
     async with running_stack(tmp_path, extra=extra, settings=node.environment) as stack:
