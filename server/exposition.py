@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Iterable
+from copy import copy
 
 from prometheus_client import CollectorRegistry, Metric, generate_latest
 from prometheus_client.registry import Collector
@@ -44,10 +45,14 @@ class Exposition:
 
 
 class _Only(Collector):
-    """One family where a registry is expected."""
+    """One family where a registry is expected, without the times at which its counters were made.
+
+    They would double the page, and nothing here is made later than the console.
+    """
 
     def __init__(self, family: Metric) -> None:
-        self._family = family
+        self._family = copy(family)
+        self._family.samples = [sample for sample in family.samples if not sample.name.endswith("_created")]
 
     def collect(self) -> Iterable[Metric]:
         return (self._family,)

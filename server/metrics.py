@@ -1,12 +1,29 @@
 """Counters and gauges of the console, in a registry of their own. Names: docs/console-api.md."""
 
+import platform
 from collections import Counter as Totals
+from importlib.metadata import version
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
 
 from server.exposition import Exposition
 
-__all__ = ["Metrics"]
+__all__ = ["Metrics", "certificate_end", "describe_process"]
+
+
+def describe_process(registry: CollectorRegistry) -> None:
+    """What runs, for dashboards and for whoever compares two consoles."""
+    labels = {"version": version("lockstep"), "python": platform.python_version()}
+    Gauge("lockstep_build_info", "1, with what runs as labels", list(labels), registry=registry).labels(**labels).set(1)
+
+
+def certificate_end(registry: CollectorRegistry) -> Gauge:
+    """Set by whoever serves TLS."""
+    return Gauge(
+        "lockstep_tls_certificate_end_seconds",
+        "When the certificate ends, s since 1970; 0 without TLS",
+        registry=registry,
+    )
 
 
 class Metrics:
@@ -22,6 +39,8 @@ class Metrics:
         registry = self.registry
         if process:
             ProcessCollector(registry=registry)
+            describe_process(registry)
+            self.certificate_end = certificate_end(registry)
         self.bad_input = Counter(
             "lockstep_bad_input", "Input refused, by where and why", ["where", "reason"], registry=registry
         )
@@ -47,6 +66,12 @@ class Metrics:
             registry=registry,
         )
         self.stopped = Gauge("lockstep_stopped", "1 while the robot is stopped", registry=registry)
+        self.recording_failed = Gauge(
+            "lockstep_recording_failed", "1 while a recording is wanted and cannot be written", registry=registry
+        )
+        self.free_bytes = Gauge(
+            "lockstep_recording_free_bytes", "Free space where recordings are written", registry=registry
+        )
         self.audit_failing = Gauge("lockstep_audit_failing", "1 while the log cannot be written", registry=registry)
         self.audit_lost = Counter("lockstep_audit_lost", "Audit records that were never written", registry=registry)
         self.audit_failures = Counter("lockstep_audit_failures", "Failed writes of the audit log", registry=registry)

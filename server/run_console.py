@@ -26,7 +26,7 @@ from server.serve import running, wait_for_signal
 from server.settings import Settings
 from server.state import ConsoleState
 from server.state_dir import StateDirUnusable, default_state_dir
-from server.tls import Certificate, fingerprint, own_names, self_signed
+from server.tls import Certificate, ends_at, fingerprint, own_names, self_signed
 
 __all__ = ["run_console", "say"]
 
@@ -54,6 +54,8 @@ async def run_console(
             return
         settings = _with_addresses(settings, addresses)
         application = _application(settings, state)
+        if certificate is not None:
+            application.state.house.metrics.certificate_end.set(ends_at(certificate))
         http = guarded_by(settings, application)
         async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
             _calm_garbage_collection()

@@ -1,6 +1,10 @@
 """What the routes of one robot need, made by its session."""
 
+import math
+import shutil
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from fastapi import Request
@@ -71,12 +75,22 @@ class Services:
         """Bring into the metrics what is counted elsewhere."""
         self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
         self.metrics.collect_audit(self.audit.lost, self.audit.failures)
+        self.metrics.recording_failed.set(self.recorder.state().state == "failed")
+        self.metrics.free_bytes.set(free_bytes(self.recorder.shelf.directory))
 
     def scene_or_error(self) -> SceneView:
         """Raises SceneUnavailable when there is no 3D scene."""
         if self.scene is None:
             raise SceneUnavailable("the 3D scene is switched off")
         return self.scene
+
+
+def free_bytes(directory: Path) -> float:
+    """Where `directory` is, or is to be made; NaN when that cannot be known."""
+    for place in (directory, *directory.parents):
+        with suppress(OSError):
+            return float(shutil.disk_usage(place).free)
+    return math.nan
 
 
 def services(connection: HTTPConnection) -> Services:

@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-__all__ = ["Certificate", "fingerprint", "own_names", "self_signed"]
+__all__ = ["Certificate", "ends_at", "fingerprint", "own_names", "self_signed"]
 
 DAYS = 397  # more is refused by some browsers
 RENEW_DAYS = 30  # before its end it is made anew
@@ -52,6 +52,11 @@ def fingerprint(certificate: Certificate) -> str:
     """SHA-256 of the certificate, as browsers show it."""
     digest = _load(certificate).fingerprint(hashes.SHA256()).hex().upper()
     return ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
+
+
+def ends_at(certificate: Certificate) -> float:
+    """When the certificate is no longer good, s since 1970."""
+    return _load(certificate).not_valid_after_utc.timestamp()
 
 
 def _load(certificate: Certificate) -> x509.Certificate:

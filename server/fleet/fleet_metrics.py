@@ -8,6 +8,7 @@ from prometheus_client.registry import Collector
 from prometheus_client.samples import Sample
 
 from server.exposition import Exposition
+from server.metrics import certificate_end, describe_process
 from server.services import Services
 
 __all__ = ["FleetMetrics"]
@@ -26,6 +27,8 @@ class FleetMetrics:
         self.registry = CollectorRegistry()
         self.exposition = Exposition(self.registry)
         ProcessCollector(registry=self.registry)
+        describe_process(self.registry)
+        self.certificate_end = certificate_end(self.registry)
         self.robots = Gauge("lockstep_fleet_robots", "Robots of this console", registry=self.registry)
         self.session_failures = Counter(
             "lockstep_fleet_session_failures",

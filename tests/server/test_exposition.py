@@ -26,13 +26,19 @@ class Rig:
         return await self.exposition.text(self.count)
 
 
+def at_once(registry: CollectorRegistry) -> bytes:
+    """As the library writes it, but for when counters were made."""
+    lines = generate_latest(registry).decode().splitlines(keepends=True)
+    return "".join(line for line in lines if "_created" not in line).encode()
+
+
 @pytest.fixture
 async def rig() -> Rig:
     return Rig()
 
 
-async def test_it_is_what_the_library_would_have_written_at_once(rig: Rig) -> None:
-    assert await rig.ask() == generate_latest(rig.registry)
+async def test_it_is_what_the_library_would_have_written_at_once_but_for_when_counters_were_made(rig: Rig) -> None:
+    assert await rig.ask() == at_once(rig.registry)
 
 
 async def test_others_have_their_turn_between_two_families(rig: Rig) -> None:
@@ -62,6 +68,6 @@ async def test_who_goes_away_while_it_is_made_leaves_no_half_of_it_to_others(rig
     await early
     await asyncio.sleep(0)
     middle.cancel()
-    assert await late == generate_latest(rig.registry)
+    assert await late == at_once(rig.registry)
     with pytest.raises(asyncio.CancelledError):
         await middle

@@ -1,4 +1,6 @@
+import platform
 from collections import Counter
+from importlib.metadata import version
 
 from server.metrics import Metrics
 
@@ -17,3 +19,11 @@ async def test_two_consoles_in_one_process_count_apart() -> None:
     first.resets.inc()
     assert b"lockstep_resets_total 1.0" in await first.exposition.text()
     assert b"lockstep_resets_total 0.0" in await second.exposition.text()
+
+
+async def test_what_runs_is_said_once_and_no_series_says_when_it_was_made() -> None:
+    metrics = Metrics()
+    metrics.resets.inc()
+    text = (await metrics.exposition.text()).decode()
+    assert f'lockstep_build_info{{python="{platform.python_version()}",version="{version("lockstep")}"}} 1.0' in text
+    assert "_created" not in text
