@@ -1,5 +1,7 @@
 """What every app of a console begins and ends with, for one robot or several: house, errors, front door."""
 
+import asyncio
+
 import structlog
 from fastapi import Depends, FastAPI
 from starlette.middleware.cors import CORSMiddleware
@@ -47,6 +49,7 @@ def open_house(
     reserved: int = 0,
 ) -> House:
     """To be called when the lifespan of `app` begins; `state` stands in for what the settings name."""
+    asyncio.get_running_loop().set_exception_handler(metrics.faults.uncaught)
     opened = state or open_state(settings)
     _restrict_ice(settings)
     house = House(opened, Guard(settings), metrics, max_peers, reserved)

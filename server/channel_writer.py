@@ -1,5 +1,7 @@
 """Writes to one data channel without ever filling it: what the channel does not take at once waits in an outbox."""
 
+from collections.abc import Callable
+
 from aiortc import RTCDataChannel
 
 from server.outbox import ChannelOutbox
@@ -14,11 +16,13 @@ class ChannelWriter:
         too_large: messages that the remote's max-message-size (RFC 8841 6) forbids
     """
 
-    def __init__(self, channel: RTCDataChannel) -> None:
+    def __init__(self, channel: RTCDataChannel, on_failed: Callable[[Exception], None] | None = None) -> None:
+        """`on_failed` hears what the channel raised while nobody here called it; without, aiortc hears it."""
         self._channel = channel
+        self._on_failed = on_failed
         self.outbox = ChannelOutbox()
         self.too_large = 0
-        channel.on("bufferedamountlow", self._flush)
+        channel.on("bufferedamountlow", self._try_flush)
 
     @property
     def lost(self) -> int:
@@ -32,6 +36,14 @@ class ChannelWriter:
     def send_newest(self, text: str) -> None:
         self.outbox.put_newest(text)
         self._flush()
+
+    def _try_flush(self) -> None:
+        try:
+            self._flush()
+        except Exception as error:
+            if self._on_failed is None:
+                raise
+            self._on_failed(error)
 
     def _flush(self) -> None:
         while self._channel.readyState == "open" and self._channel.bufferedAmount == 0:

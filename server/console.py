@@ -247,6 +247,9 @@ class Console:
         self.seat.gone(peer)
         self.people.left(peer)
 
+    def peer_failed(self, peer: Peer, stage: str, error: Exception) -> None:
+        self._metrics.faults.caught(f"peer {stage}", error, peer=peer.id)
+
     # SeatHost
 
     def rest_robot(self, why: str) -> None:
@@ -395,7 +398,6 @@ class Console:
         while True:
             try:
                 await task()
-            except Exception:
-                self._metrics.internal_errors.labels(name).inc()
-                log.exception("background task failed", task=name)
+            except Exception as error:
+                self._metrics.faults.caught(name, error, what="a background task, which runs again")
             await asyncio.sleep(RESTART_AFTER)

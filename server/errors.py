@@ -14,6 +14,7 @@ ConsoleError
 │   ├── BadJson
 │   ├── BadParameter
 │   ├── BadSdp
+│   │   └── TooManySections
 │   ├── BadSdpFragment
 │   ├── BodyTooLarge
 │   ├── BodyTooSlow
@@ -35,6 +36,7 @@ ConsoleError
 │   ├── TransportRefused    below the channels; each has its own name
 │   ├── UnknownChannel
 │   └── WrongChannel
+├── InternalFault           the console failed, not the one who asks
 └── Unavailable             right now it cannot be done
     ├── LinkDown
     ├── RecordingFailed     the disk, or what is on it
@@ -65,6 +67,7 @@ __all__ = [
     "Flood",
     "HostRefused",
     "HttpError",
+    "InternalFault",
     "LinkDown",
     "LinkExpired",
     "LinkOtherRobot",
@@ -90,6 +93,7 @@ __all__ = [
     "TooManyInvitations",
     "TooManyPeers",
     "TooManyRequests",
+    "TooManySections",
     "TransportRefused",
     "Unavailable",
     "UnknownChannel",
@@ -160,6 +164,10 @@ class BadParameter(RequestError):
 
 
 class BadSdp(RequestError):
+    pass
+
+
+class TooManySections(BadSdp):
     pass
 
 
@@ -253,6 +261,10 @@ class WrongChannel(ChannelError):
     name = "wrong_channel"
 
 
+class InternalFault(ConsoleError):
+    pass
+
+
 class Unavailable(ConsoleError):
     pass
 
@@ -309,6 +321,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     BadJson: HttpError(400, "bad_json"),
     BadParameter: HttpError(422, "bad_parameter"),
     BadSdp: HttpError(400, "bad_sdp"),
+    TooManySections: HttpError(400, "too_many_sections"),
     BadSdpFragment: HttpError(400, "bad_sdp_fragment"),
     NotFound: HttpError(404, "not_found"),
     RecordingUnreadable: HttpError(422, "recording_damaged"),
@@ -321,6 +334,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     HostRefused: HttpError(421, "host_refused"),
     PreconditionRequired: HttpError(428, "precondition_required"),
     TooManyRequests: HttpError(429, "too_many_requests", {"Retry-After": "2"}),
+    InternalFault: HttpError(500, "internal_error"),
     LinkDown: HttpError(503, "link_down", {"Retry-After": "1"}),
     RecordingFailed: HttpError(503, "recording_failed", {"Retry-After": "5"}),
     RobotFailed: HttpError(503, "robot_failed", {"Retry-After": "2"}),

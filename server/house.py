@@ -4,20 +4,18 @@ import asyncio
 import time
 from typing import Protocol
 
-import structlog
 from prometheus_client import Counter
 
 from server.access import Identity
 from server.audit import Actor
 from server.errors import TooManyPeers
+from server.faults import Faults
 from server.guard import Guard
 from server.invitations import Invitation
 from server.link_warden import LinkWarden
 from server.state import ConsoleState
 
 __all__ = ["House", "HouseMetrics"]
-
-log = structlog.get_logger(__name__)
 
 COMMAND_LINE = Actor("command line")
 CHECK_SECONDS = 1.0  # how long a link that was revoked by another process still works
@@ -29,7 +27,7 @@ class HouseMetrics(Protocol):
     @property
     def bad_input(self) -> Counter: ...
     @property
-    def internal_errors(self) -> Counter: ...
+    def faults(self) -> Faults: ...
 
 
 class House:
@@ -61,9 +59,8 @@ class House:
             await asyncio.sleep(CHECK_SECONDS)
             try:
                 self.enforce(self.state.invitations.refresh(), COMMAND_LINE)
-            except Exception:
-                self.metrics.internal_errors.labels("links").inc()
-                log.exception("checking the links failed")
+            except Exception as error:
+                self.metrics.faults.caught("links", error)
 
     def enforce(self, changed: list[Invitation], by: Actor) -> None:
         """Act, at every robot, on what `by` has invited or revoked, and on what has expired."""

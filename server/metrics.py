@@ -7,6 +7,7 @@ from importlib.metadata import version
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
 
 from server.exposition import Exposition
+from server.faults import Faults
 
 __all__ = ["Metrics", "certificate_end", "describe_process"]
 
@@ -76,6 +77,7 @@ class Metrics:
         self.audit_lost = Counter("lockstep_audit_lost", "Audit records that were never written", registry=registry)
         self.audit_failures = Counter("lockstep_audit_failures", "Failed writes of the audit log", registry=registry)
         self.internal_errors = Counter("lockstep_internal_errors", "Our own faults", ["where"], registry=registry)
+        self.faults = Faults(self.internal_errors)
         self.robot_turnaround = Histogram(
             "lockstep_robot_turnaround_seconds",
             "Command forwarded to its feedback received",

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from aiortc import sdp
 
-from server.errors import BadSdp, BadSdpFragment
+from server.errors import BadSdp, BadSdpFragment, TooManySections
+from server.extension_ids import with_usable_ids
 
 __all__ = [
     "MAX_CANDIDATES",
@@ -18,15 +19,18 @@ __all__ = [
     "prepare_offer",
 ]
 
-MAX_SECTIONS = 40  # media sections
+MAX_SECTIONS = 16  # media sections, of a robot with fewer streams; each costs the event loop a millisecond
+MAX_PAYLOAD_TYPE = 127  # RFC 3550 5.1: seven bits
 MAX_CANDIDATES = 100  # of a section
 DEFAULT_MESSAGE_SIZE = "a=max-message-size:65536"
 ICE_USERNAME = re.compile(r"[A-Za-z0-9+/]{4,256}")
 ICE_PASSWORD = re.compile(r"[A-Za-z0-9+/]{22,256}")
 
 
-def prepare_offer(text: str) -> str:
+def prepare_offer(text: str, max_sections: int = MAX_SECTIONS) -> str:
     """`text` without mDNS candidates, and with the default for what aiortc needs and RFC 8841 6.1 leaves out.
+
+    Header extensions whose ids fit no packet have another id in it, or are left out (`with_usable_ids`).
 
     The browser connects to us, so we learn its address from its checks (RFC 8445 7.3.1.3); to resolve its `.local`
     names would cost a second of multicast. When all that is left says "that was all", that is taken out too, or
@@ -36,10 +40,12 @@ def prepare_offer(text: str) -> str:
         BadSdp: not an offer that can be answered.
     """
     lines = text.splitlines()
-    _count(lines)
+    _count(lines, max_sections)
+    _check_payload_types(lines)
     kept = [line for line in lines if not (line.startswith("a=candidate:") and ".local " in line)]
     if len(kept) != len(lines):
         kept = [line for line in kept if line != "a=end-of-candidates"]
+    kept = with_usable_ids(kept)
     if not any(line.startswith("a=max-message-size:") for line in kept):
         kept = [
             each
@@ -51,13 +57,22 @@ def prepare_offer(text: str) -> str:
     return prepared
 
 
-def _count(lines: Sequence[str]) -> None:
+def _count(lines: Sequence[str], max_sections: int) -> None:
     """Before aiortc's parser, which takes longer over thousands of them than an operator's message may wait."""
     sections = sum(line.startswith("m=") for line in lines)
-    if sections > MAX_SECTIONS:
-        raise BadSdp(f"more than {MAX_SECTIONS} media sections")
+    if sections > max_sections:
+        raise TooManySections(f"more than {max_sections} media sections")
     if sum(line.startswith("a=candidate:") for line in lines) > max(1, sections) * MAX_CANDIDATES:
         raise BadSdp(f"more than {MAX_CANDIDATES} candidates")
+
+
+def _check_payload_types(lines: Sequence[str]) -> None:
+    """aiortc keeps the lower seven bits of a larger one, and would answer with a number that was not offered."""
+    for line in lines:
+        if line.startswith(("m=audio ", "m=video ")):
+            for each in line.split()[3:]:
+                if each.isascii() and each.isdecimal() and int(each[:9]) > MAX_PAYLOAD_TYPE:
+                    raise BadSdp(f"payload type {each[:9]}: 0 to {MAX_PAYLOAD_TYPE} fit a packet (RFC 3550 5.1)")
 
 
 def _check(text: str) -> None:

@@ -3,7 +3,8 @@
 import asyncio
 import secrets
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Protocol
 
 import structlog
@@ -71,6 +72,7 @@ class PeerStreams(Protocol):
     def report(self, report: Report, now: float) -> None: ...
     def drives(self, holds_seat: bool) -> None: ...
     def on_quality(self, tell: Callable[[Quality], None]) -> None: ...
+    def on_failed(self, tell: Callable[[str, Exception], None]) -> None: ...
 
     async def close(self) -> None: ...
 
@@ -82,6 +84,7 @@ class PeerHost(Protocol):
     def message_received(self, peer: "Peer", channel: ChannelName, message: ClientMessage) -> None: ...
     def input_refused(self, peer: "Peer", channel: str, error: ChannelError) -> None: ...
     def peer_ended(self, peer: "Peer") -> None: ...
+    def peer_failed(self, peer: "Peer", stage: str, error: Exception) -> None: ...
 
 
 class MessageWriter(Protocol):
@@ -99,7 +102,8 @@ class MessageWriter(Protocol):
 class Peer(ABC):
     """A session: await `run`; it returns when the peer has ended and everything of it is closed.
 
-    `end` asks for the end from outside, with the reason that logs and metrics show.
+    `end` asks for the end from outside, with the reason that logs and metrics show. Whatever serving it raises ends it
+    alone: `failed` is told of the stage, and nothing comes out of what others call.
     """
 
     def __init__(
@@ -120,6 +124,7 @@ class Peer(ABC):
         self.report = Report()  # newest
         self._quality: Quality | None = None  # newest
         self.ended = ""  # why; "" while it lives
+        self._has_failed = False
         self.thumbnail = False  # a small picture on somebody's overview, not somebody who takes part
         self.relay = ""  # the relay that it watches through; "": media and feedback come from here
         self._media = media
@@ -137,6 +142,7 @@ class Peer(ABC):
         self._connected = asyncio.Event()
         self._end = asyncio.Event()
         media.on_quality(self._quality_decided)
+        media.on_failed(self.failed)
 
     @property
     def connected(self) -> bool:
@@ -171,7 +177,23 @@ class Peer(ABC):
             self.ended = why
             self._end.set()
             self._connected.set()
-            self._host.peer_ended(self)
+            with self.contained("end"):
+                self._host.peer_ended(self)
+
+    def failed(self, stage: str, error: Exception) -> None:
+        """Something of ours raised `error` while this peer was served: it ends. Only the first is told."""
+        if not self._has_failed:
+            self._has_failed = True
+            self._host.peer_failed(self, stage, error)
+            self.end("internal error")
+
+    @contextmanager
+    def contained(self, stage: str) -> Iterator[None]:
+        """What is raised in it ends this peer, and nothing else."""
+        try:
+            yield
+        except Exception as error:
+            self.failed(stage, error)
 
     @property
     def actor(self) -> Actor:
@@ -187,11 +209,13 @@ class Peer(ABC):
     def send_text(self, channel: ChannelName, text: str) -> None:
         """Ignored while the channel is not open: a newcomer is told everything when it opens."""
         if channel in self._writers:
-            self._writers[channel].send(text)
+            with self.contained("message out"):
+                self._writers[channel].send(text)
 
     def send_feedback(self, text: str) -> None:
         if "control" in self._writers:
-            self._writers["control"].send_newest(text)
+            with self.contained("message out"):
+                self._writers["control"].send_newest(text)
 
     def may_be_answered_again(self) -> bool:
         """Whether a repeat of its command is answered now; if so, it counts."""
@@ -213,7 +237,8 @@ class Peer(ABC):
 
     def drives(self, holds_seat: bool) -> None:
         """Whether it holds the control seat: its media come first then."""
-        self._media.drives(holds_seat)
+        with self.contained("media"):
+            self._media.drives(holds_seat)
 
     def _quality_decided(self, quality: Quality) -> None:
         self._quality = quality
@@ -248,8 +273,9 @@ class Peer(ABC):
     async def _close(self) -> None:
         try:
             async with asyncio.timeout(CLOSE_TIMEOUT):
-                await self._media.close()
-                await self._close_transport()
+                for close in (self._media.close, self._close_transport):
+                    with self.contained("close"):
+                        await close()
         except TimeoutError:
             log.warning("peer did not close in time", peer=self.id)
 
@@ -265,14 +291,18 @@ class Peer(ABC):
     def _open(self, channel: ChannelName, writer: MessageWriter) -> None:
         """From now on the remote can be told things."""
         self._writers[channel] = writer
-        self._host.channel_opened(self, channel)
-        if channel == "session" and self._quality is not None:
-            self.send("session", self._quality)
+        with self.contained("channel"):
+            self._host.channel_opened(self, channel)
+            if channel == "session" and self._quality is not None:
+                self.send("session", self._quality)
 
     def _received(self, channel: ChannelName | None, data: object) -> None:
         """`channel`: None where one way carries all. Only a valid message counts as life."""
-        if self.ended:
-            return
+        if not self.ended:
+            with self.contained("message in"):
+                self._take(channel, data)
+
+    def _take(self, channel: ChannelName | None, data: object) -> None:
         now = self._loop.time()
         try:
             message = self._parse(channel, data, now)

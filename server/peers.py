@@ -139,9 +139,10 @@ class Peers:
     def admit(self, peer: Peer) -> None:
         task = asyncio.get_running_loop().create_task(self._run(peer), name=f"peer {peer.id}")
         self._sessions[peer] = task
-        self.settle_names()
         self._metrics.peers.labels(peer.role).inc()
-        self._joined(peer)
+        with peer.contained("join"):
+            self.settle_names()
+            self._joined(peer)
         log.info("peer joined", peer=peer.id, role=peer.role, name=peer.name)
 
     def by_id(self, peer_id: str) -> Peer | None:
@@ -203,10 +204,9 @@ class Peers:
     async def _run(self, peer: Peer) -> None:
         try:
             await peer.run()
-        except Exception:
+        except Exception as error:
             # A fault with one peer must not end the others.
-            self._metrics.internal_errors.labels("peer").inc()
-            log.exception("peer failed", peer=peer.id)
+            self._metrics.faults.caught("peer", error, peer=peer.id)
         finally:
             del self._sessions[peer]
             self.ended += 1

@@ -53,7 +53,7 @@ async def _session(
     settings: Settings, house: House, metrics: Metrics, directory: StateDir, robot: str, audit: AuditLog
 ) -> AsyncIterator[Services]:
     access = house.state.access.at(robot)
-    media = MediaPlane(settings.media, metrics.registry, settings.sources)
+    media = MediaPlane(settings.media, metrics.registry, settings.sources, on_fault=metrics.faults.caught)
     scene = await _start_scene(settings, metrics)
     clock = EventClock()
     shelf = Shelf(recordings_directory(settings.recording, directory.path), settings.recording)

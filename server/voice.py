@@ -28,7 +28,8 @@ class VoiceLine:
 
     def take(self, packet: VoicePacket) -> None:
         if self.peer is not None and not self.peer.ended:
-            self._service.heard(self.peer, packet)
+            with self.peer.contained("voice"):
+                self._service.heard(self.peer, packet)
 
 
 class VoiceService:

@@ -3,7 +3,6 @@
 from typing import Annotated
 
 import msgspec
-import structlog
 from fastapi import APIRouter, Depends, Query, Request, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
@@ -18,7 +17,6 @@ __all__ = ["WatchTicket", "router"]
 
 TRY_AGAIN_LATER = 1013  # the IANA registry
 
-log = structlog.get_logger(__name__)
 router = APIRouter()
 
 
@@ -77,10 +75,8 @@ async def line(websocket: WebSocket, ticket: str) -> None:
         await watcher.serve(_WebSocketLine(websocket))
     except OSError:
         watcher.end("line closed")  # gone before it was accepted
-    except Exception:
-        # A fault with one line must not be uvicorn's.
-        here.metrics.internal_errors.labels("watch").inc()
-        log.exception("line failed", peer=watcher.id)
+    except Exception as error:
+        watcher.failed("line", error)  # a fault with one line must not be uvicorn's
 
 
 class _WebSocketLine:

@@ -6,8 +6,8 @@ says which channel it is for.
 
 import asyncio
 import secrets
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Coroutine
+from typing import Any, Protocol
 
 from robot_bridge.protocol.console import Quality, Report, StreamInfo, Tier
 from server.access import Identity
@@ -25,11 +25,13 @@ READ_SECONDS = 10.0  # that one message may wait for a remote that does not read
 GOODBYE_SECONDS = 1.0
 
 # RFC 6455 7.4.1 and the IANA registry
-NORMAL, GOING_AWAY, NOT_UTF8, POLICY_VIOLATION, TOO_BIG, SERVICE_RESTART = 1000, 1001, 1007, 1008, 1009, 1012
+NORMAL, GOING_AWAY, NOT_UTF8, POLICY_VIOLATION, TOO_BIG = 1000, 1001, 1007, 1008, 1009
+INTERNAL_ERROR, SERVICE_RESTART = 1011, 1012
 TRANSPORT_ERRORS = {NOT_UTF8: "not_utf8", POLICY_VIOLATION: "too_many_frames", TOO_BIG: "too_large"}
 CLOSE_CODES = {
     "shutdown": GOING_AWAY,
     "new epoch": SERVICE_RESTART,
+    "internal error": INTERNAL_ERROR,
     **dict.fromkeys(("link revoked", "link expired", "bad messages", "too much", "does not read"), POLICY_VIOLATION),
 }
 
@@ -85,13 +87,17 @@ class Watcher(Peer):
             self._open(channel, self._writer)
         try:
             async with asyncio.TaskGroup() as tasks:
-                speaking = [tasks.create_task(self._hear(line)), tasks.create_task(self._tell(line))]
+                speaking = [tasks.create_task(self._try(each)) for each in (self._hear(line), self._tell(line))]
                 await self._end.wait()
                 for task in speaking:
                     task.cancel()
         finally:
             self.end("failed")
             await self._hang_up(line)
+
+    async def _try(self, speaking: Coroutine[Any, Any, None]) -> None:
+        with self.contained("line"):
+            await speaking
 
     async def _hear(self, line: Line) -> None:
         try:
@@ -176,6 +182,9 @@ class _NoMedia:
         pass
 
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
+        pass
+
+    def on_failed(self, tell: Callable[[str, Exception], None]) -> None:
         pass
 
     async def close(self) -> None:

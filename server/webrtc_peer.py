@@ -9,6 +9,7 @@ from server.channel_writer import ChannelWriter
 from server.channels import MessageBudget, channel_name
 from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
 from server.ice_restart_private import IceSession
+from server.media.aiortc_private import close_or_force
 from server.peer import Peer, PeerHost, PeerLimits, PeerStreams
 
 __all__ = ["WebRtcPeer"]
@@ -43,8 +44,9 @@ class WebRtcPeer(Peer):
             raise TooManyRequests(f"more than {MAX_REQUESTS:g} requests a second for one session") from error
 
     async def _close_transport(self) -> None:
-        await self.ice.close()
-        await self.pc.close()
+        with self.contained("close"):
+            await self.ice.close()
+        await close_or_force(self.pc)
 
     # aiortc's events
 
@@ -56,6 +58,10 @@ class WebRtcPeer(Peer):
             self.end(f"connection {state}")
 
     def _channel_offered(self, channel: RTCDataChannel) -> None:
+        with self.contained("channel"):
+            self._open_channel(channel)
+
+    def _open_channel(self, channel: RTCDataChannel) -> None:
         try:
             name = channel_name(channel.label)
             if name in self._writers:
@@ -64,7 +70,7 @@ class WebRtcPeer(Peer):
             self._refused("other", error)
             channel.close()
             return
-        writer = ChannelWriter(channel)
+        writer = ChannelWriter(channel, lambda error: self.failed("message out", error))
         channel.on("message", lambda data: self._received(name, data))
         channel.on("close", lambda: self.end("channel closed"))
         self._open(name, writer)

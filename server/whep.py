@@ -2,10 +2,11 @@
 
 import asyncio
 import ipaddress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated, Literal
 
-import structlog
-from aiortc import RTCIceCandidate, RTCIceGatherer, RTCPeerConnection, RTCSessionDescription
+from aiortc import RTCIceCandidate, RTCIceGatherer, RTCIceServer, RTCPeerConnection, RTCSessionDescription
 from aiortc.sdp import SessionDescription, candidate_from_sdp, candidate_to_sdp
 from fastapi import APIRouter, Depends, Query, Request, Response
 
@@ -17,6 +18,7 @@ from server.errors import (
     BadSdp,
     BadSdpFragment,
     ConsoleError,
+    InternalFault,
     NotConnected,
     NotFound,
     PreconditionFailed,
@@ -25,8 +27,15 @@ from server.errors import (
 )
 from server.ice_restart_private import IceSession
 from server.ice_servers import IceServers, for_aiortc, link_headers
-from server.media.aiortc_private import create_peer_connection
-from server.offer import Fragment, FragmentCandidate, format_fragment, parse_fragment, prepare_offer
+from server.media.aiortc_private import close_or_force, create_peer_connection
+from server.offer import (
+    MAX_SECTIONS,
+    Fragment,
+    FragmentCandidate,
+    format_fragment,
+    parse_fragment,
+    prepare_offer,
+)
 from server.peer_guards_private import guard_data
 from server.services import Services, authorized, services
 from server.webrtc_peer import WebRtcPeer
@@ -35,9 +44,9 @@ __all__ = ["candidates_of", "router"]
 
 SDP = "application/sdp"
 FRAGMENT = "application/trickle-ice-sdpfrag"
+FURTHER_SECTIONS = 2  # besides one for each stream: the data channels, and the operator's voice
 NEGOTIATION_TIMEOUT = 10.0  # s for all that aiortc does between offer and answer
 
-log = structlog.get_logger(__name__)
 router = APIRouter()
 
 
@@ -56,10 +65,11 @@ async def create(
     role of who asks.
     """
     here = services(request)
-    offer = prepare_offer(await read_text(request, SDP, here.settings.max_sdp_bytes))
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
-    here.guard.offer(identity.token_id)
+    here.guard.offer(identity.token_id)  # before it costs anything
+    text = await read_text(request, SDP, here.settings.max_sdp_bytes)
+    offer = prepare_offer(text, max(MAX_SECTIONS, len(here.media.offers) + FURTHER_SECTIONS))
     ice = servers_for(here.settings, identity.token_id)
     thumbnail = view == "thumbnail"
     if thumbnail:
@@ -159,47 +169,71 @@ async def _negotiate(
     pc = create_peer_connection(own_servers)
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-            tune_data_transport(pc, observes=identity.role == "observer")
-            line = here.voice.line(identity.role)
-            media = here.media.attach(
-                pc,
-                offer,
-                priority=identity.role == "operator",
-                trailer=trailer,
-                thumbnail=thumbnail,
-                voice=None if line is None else line.take,
-            )
-            try:
-                # Before the answer: the first events can come while it is still on its way.
-                refused = here.metrics.bad_input.labels
-                session = IceSession(
-                    pc,
-                    _username(offer),
-                    lambda: RTCIceGatherer(own_servers),
-                    here.settings.peer_connect_timeout,
-                    lambda name: refused("transport", name).inc(),
-                )
-                peer = WebRtcPeer(pc, media, session, identity, here.console, here.settings)
-                peer.thumbnail = thumbnail
-                if line is not None:
-                    line.peer = peer
-                guard_data(pc, peer.transport_refused)
-                await pc.setLocalDescription(await pc.createAnswer())
-            except BaseException:
-                await media.close()
-                raise
-    except ConsoleError:
-        await _discard(pc)
-        raise
-    except Exception as error:
-        # Whatever aiortc trips over here was in the offer: it has no error of its own for that.
-        await _discard(pc)
-        raise BadSdp("the offer cannot be answered") from error
-    except BaseException:
-        await _discard(pc)
+            with _offers_fault():
+                await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
+            peer = await _answering_peer(here, identity, offer, pc, own_servers, trailer=trailer, thumbnail=thumbnail)
+    except BaseException as error:
+        await _discard(here, pc)
+        if isinstance(error, TimeoutError):
+            raise BadSdp("the offer cannot be answered in time") from error
+        if isinstance(error, Exception) and not isinstance(error, ConsoleError):
+            here.metrics.faults.caught("peer offer", error)
+            raise InternalFault("the console could not answer; it has written down why") from error
         raise
     return peer, pc.localDescription.sdp
+
+
+async def _answering_peer(
+    here: Services,
+    identity: Identity,
+    offer: str,
+    pc: RTCPeerConnection,
+    own_servers: list[RTCIceServer],
+    *,
+    trailer: bool,
+    thumbnail: bool,
+) -> WebRtcPeer:
+    """The peer behind `pc`, which has the answer when this returns."""
+    tune_data_transport(pc, observes=identity.role == "observer")
+    line = here.voice.line(identity.role)
+    media = here.media.attach(
+        pc,
+        offer,
+        priority=identity.role == "operator",
+        trailer=trailer,
+        thumbnail=thumbnail,
+        voice=None if line is None else line.take,
+    )
+    try:
+        # Before the answer: the first events can come while it is still on its way.
+        refused = here.metrics.bad_input.labels
+        session = IceSession(
+            pc,
+            _username(offer),
+            lambda: RTCIceGatherer(own_servers),
+            here.settings.peer_connect_timeout,
+            lambda name: refused("transport", name).inc(),
+        )
+        peer = WebRtcPeer(pc, media, session, identity, here.console, here.settings)
+        peer.thumbnail = thumbnail
+        if line is not None:
+            line.peer = peer
+        guard_data(pc, peer.transport_refused)
+        with _offers_fault():
+            await pc.setLocalDescription(await pc.createAnswer())
+    except BaseException:
+        await media.close()
+        raise
+    return peer
+
+
+@contextmanager
+def _offers_fault() -> Iterator[None]:
+    """Whatever aiortc trips over here was in the offer: it has no error of its own for that."""
+    try:
+        yield
+    except Exception as error:
+        raise BadSdp("the offer cannot be answered") from error
 
 
 def _username(offer: str) -> str:
@@ -208,9 +242,9 @@ def _username(offer: str) -> str:
     return "" if first is None else first.usernameFragment or ""
 
 
-async def _discard(pc: RTCPeerConnection) -> None:
+async def _discard(here: Services, pc: RTCPeerConnection) -> None:
     """Closes what negotiation may have left half made."""
     try:
-        await pc.close()
-    except Exception:
-        log.exception("a failed negotiation could not be cleaned up")
+        await close_or_force(pc)
+    except Exception as error:
+        here.metrics.faults.caught("offer", error, what="a failed negotiation could not be cleaned up")

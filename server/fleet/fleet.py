@@ -113,9 +113,8 @@ class Fleet:
             return absent_tile(session.name)
         try:
             return tile_of(here, session.pulse, now)
-        except Exception:
-            here.metrics.internal_errors.labels("tile").inc()
-            log.exception("a robot cannot be shown", robot=session.name)
+        except Exception as error:
+            here.metrics.faults.caught("tile", error, robot=session.name)
             return absent_tile(session.name, UNREADABLE)
 
     # STOP
@@ -140,9 +139,8 @@ class Fleet:
         """A fault with one robot must not keep the stop from the others."""
         try:
             delivered, event = session.stop(by, where, reason)
-        except Exception:
-            self.metrics.internal_errors.labels("stop").inc()
-            log.exception("a robot could not be stopped", robot=session.name)
+        except Exception as error:
+            self.metrics.faults.caught("stop", error, robot=session.name)
             return Stopped(session.name, False, 0, UNREADABLE)
         return Stopped(session.name, delivered, event, "" if delivered else KEPT)
 
@@ -169,9 +167,8 @@ class Fleet:
     def _recorded(self, robot: str, record: AuditRecord) -> None:
         try:
             self.board.record(robot, record)
-        except Exception:
-            self.metrics.internal_errors.labels("board").inc()
-            log.exception("a record could not be shared")
+        except Exception as error:
+            self.metrics.faults.caught("board", error, robot=robot)
 
     async def _look(self) -> None:
         while True:
@@ -192,9 +189,8 @@ class Fleet:
         while True:
             try:
                 await task()
-            except Exception:
-                self.metrics.internal_errors.labels(name).inc()
-                log.exception("background task failed", task=name)
+            except Exception as error:
+                self.metrics.faults.caught(name, error, what="a background task, which runs again")
             await asyncio.sleep(RESTART_AFTER)
 
 

@@ -8,6 +8,7 @@ from prometheus_client.registry import Collector
 from prometheus_client.samples import Sample
 
 from server.exposition import Exposition
+from server.faults import Faults
 from server.metrics import certificate_end, describe_process
 from server.services import Services
 
@@ -24,6 +25,7 @@ class FleetMetrics:
             "lockstep_bad_input", "Input refused, by where and why", ["where", "reason"], registry=self._own
         )
         self.internal_errors = Counter("lockstep_internal_errors", "Our own faults", ["where"], registry=self._own)
+        self.faults = Faults(self.internal_errors)
         self.registry = CollectorRegistry()
         self.exposition = Exposition(self.registry)
         ProcessCollector(registry=self.registry)

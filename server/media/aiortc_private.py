@@ -17,7 +17,8 @@ What is used and why:
 import asyncio
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
 import aioice.ice
@@ -47,13 +48,14 @@ from aiortc.rtp import (
 from aiortc.sdp import SessionDescription
 
 from server.media.frame import EncodedFrame
-from server.media.header_extensions import ExtensionWriter
+from server.media.header_extensions import LARGEST_ID, ExtensionWriter
 from server.media.pacer import Pacer
 from server.media.packet_stream import PacketStream, SenderStats, StreamParameters
 
 __all__ = [
     "MediaSender",
     "ReceptionListener",
+    "close_or_force",
     "create_peer_connection",
     "install_sender",
     "keep_extensions",
@@ -94,10 +96,32 @@ def create_peer_connection(ice_servers: Sequence[RTCIceServer] = ()) -> RTCPeerC
     return RTCPeerConnection(RTCConfiguration(iceServers=list(ice_servers), bundlePolicy=RTCBundlePolicy.MAX_COMPAT))
 
 
+async def close_or_force(pc: RTCPeerConnection) -> None:
+    """Close `pc`. Where that raises, its sockets are closed all the same, and then it is raised."""
+    try:
+        await pc.close()
+    except Exception:
+        await _close_transports(pc)
+        raise
+
+
+async def _close_transports(pc: RTCPeerConnection) -> None:
+    """Not `pc.close` again, which after an error waits for ever."""
+    dtls = {transceiver.receiver.transport for transceiver in pc.getTransceivers()}
+    if pc.sctp is not None:
+        dtls.add(pc.sctp.transport)
+    for stop in (*(each.stop for each in dtls), *(each.transport.stop for each in dtls)):
+        with suppress(Exception):  # what remains is closed all the same
+            await stop()
+
+
 def offered_extensions(offer_sdp: str) -> dict[str, dict[str, int]]:
-    """Header extensions of each media section of an offer: URI to id, by mid."""
+    """Header extensions of each media section of an offer, as far as a packet can carry them: URI to id, by mid."""
     sections = SessionDescription.parse(offer_sdp).media
-    return {m.rtp.muxId: {extension.uri: extension.id for extension in m.rtp.headerExtensions} for m in sections}
+    return {
+        m.rtp.muxId: {each.uri: each.id for each in m.rtp.headerExtensions if 1 <= each.id <= LARGEST_ID}
+        for m in sections
+    }
 
 
 def offered_direction(transceiver: RTCRtpTransceiver) -> str | None:
@@ -145,7 +169,9 @@ class MediaSender(RTCRtpSender):
         listener: ReceptionListener | None = None,
         pacer: Pacer | None = None,
         on_paced: Callable[[], None] = lambda: None,
+        on_failed: Callable[[str, Exception], None] | None = None,
     ) -> None:
+        """`on_failed` gets the stage and what was raised where aiortc would only lose it; without, it is raised."""
         super().__init__(transceiver.kind, transceiver.receiver.transport)
         self._stream_id = stream_id
         self._trailer = trailer
@@ -155,6 +181,7 @@ class MediaSender(RTCRtpSender):
         self._listener = listener
         self._pacer = pacer  # None: nothing is held back
         self._on_paced = on_paced
+        self._on_failed = on_failed
         self.paced = False  # whether packets wait for the pacer
         self._repeats: deque[bytes] = deque()  # retransmissions that the pacer holds back; they go first
         self._rest: deque[bytes] = deque()  # packets of the last frame that it holds back
@@ -170,6 +197,19 @@ class MediaSender(RTCRtpSender):
 
     async def send(self, parameters: RTCRtpSendParameters) -> None:
         """Called by the peer connection when the transport is connected; again on every renegotiation."""
+        with self._contained("answer"):
+            self._begin(parameters)
+
+    @contextmanager
+    def _contained(self, stage: str) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            if self._on_failed is None:
+                raise
+            self._on_failed(stage, error)
+
+    def _begin(self, parameters: RTCRtpSendParameters) -> None:
         if self._packets is not None or self._stopped:
             return
         codec = parameters.codecs[0]
@@ -282,6 +322,10 @@ class MediaSender(RTCRtpSender):
             self.stats.failed += 1
 
     async def _handle_rtcp_packet(self, packet: AnyRtcpPacket) -> None:
+        with self._contained("rtcp"):
+            self._take_rtcp(packet)
+
+    def _take_rtcp(self, packet: AnyRtcpPacket) -> None:
         if self._packets is None:
             return
         if isinstance(packet, RtcpRrPacket | RtcpSrPacket):
@@ -309,7 +353,8 @@ class MediaSender(RTCRtpSender):
 
         def serve() -> None:
             self._patience = None
-            self._on_keyframe_request()
+            with self._contained("rtcp"):
+                self._on_keyframe_request()
 
         self._patience = asyncio.get_running_loop().call_later(wait, serve)
 

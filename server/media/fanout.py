@@ -1,4 +1,7 @@
-"""Who is served when: the operator at once, observers in their turns of the event loop."""
+"""Who is served when: the operator at once, observers in their turns of the event loop.
+
+What serving a target raises is that target's: it is told so, gets nothing more, and all others are served.
+"""
 
 import asyncio
 from collections import deque
@@ -31,6 +34,9 @@ class Target(Protocol):
     def send_next(self) -> bool:
         """Send one queued frame if there is one and the socket takes it; whether another can follow."""
 
+    def failed(self, error: Exception) -> None:
+        """Serving it raised `error`. It is not served again. Raises nothing."""
+
 
 class FanOut:
     """Sends frames to targets. A slow target only fills its own outbox; an observer never delays the operator."""
@@ -46,15 +52,27 @@ class FanOut:
     def publish(self, frame: EncodedFrame, targets: Iterable[Target]) -> None:
         """Hand a frame to its targets. Returns when the operator's is sent and the others are queued."""
         observers = []
-        for target in targets:
+        for target in list(targets):  # one that fails leaves them
             if target.priority:
-                target.put(frame)
-                self._send_all(target)
+                if self._put(target, frame):
+                    self._send_all(target)
             else:
                 observers.append(target)
         for target in observers:
+            if self._put(target, frame):
+                self._enqueue(target)
+
+    def _put(self, target: Target, frame: EncodedFrame) -> bool:
+        try:
             target.put(frame)
-            self._enqueue(target)
+        except Exception as error:
+            self._failed(target, error)
+            return False
+        return True
+
+    def _failed(self, target: Target, error: Exception) -> None:
+        self.forget(target)
+        target.failed(error)
 
     def pace(self, target: Target) -> None:
         """Serve a target again when its pacer may let something through."""
@@ -62,10 +80,13 @@ class FanOut:
         self._pace.set()
 
     def _send_all(self, target: Target) -> None:
-        while target.send_next():
-            pass
-        if target.paced:
-            self.pace(target)
+        try:
+            while target.send_next():
+                pass
+            if target.paced:
+                self.pace(target)
+        except Exception as error:
+            self._failed(target, error)
 
     def _enqueue(self, target: Target) -> None:
         if target not in self._waiting:
@@ -74,11 +95,11 @@ class FanOut:
         self._ask()
 
     def forget(self, target: Target) -> None:
-        """A target is gone."""
+        """A target is gone. Idempotent."""
         self._paced.pop(target, None)
         if target in self._waiting:
             del self._waiting[target]
-            self._order.remove(target)
+            self._order = deque(each for each in self._order if each is not target)
 
     def _ask(self) -> None:
         if self._order and not self._asked:
@@ -110,12 +131,17 @@ class FanOut:
     def serve(self) -> None:
         """Serve observers in turn, one frame each, until the slice is over."""
         while self._order:
-            target = self._order.popleft()
-            if target.send_next():
-                self._order.append(target)
-            else:
-                del self._waiting[target]
-                if target.paced:
-                    self.pace(target)
+            self._serve_one(self._order.popleft())
             if self._turns.is_over():
                 return
+
+    def _serve_one(self, target: Target) -> None:
+        try:
+            if target.send_next() and target in self._waiting:
+                self._order.append(target)
+                return
+            if target.paced:
+                self.pace(target)
+        except Exception as error:
+            self._failed(target, error)
+        self._waiting.pop(target, None)

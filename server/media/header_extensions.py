@@ -13,7 +13,15 @@ from robot_bridge.protocol.carriers import (
     pack_playout_delay,
 )
 
-__all__ = ["ABS_SEND_TIME_URI", "MID_URI", "ExtensionWriter", "choose_carrier", "pack_send_time", "wanted_uris"]
+__all__ = [
+    "ABS_SEND_TIME_URI",
+    "LARGEST_ID",
+    "MID_URI",
+    "ExtensionWriter",
+    "choose_carrier",
+    "pack_send_time",
+    "wanted_uris",
+]
 
 MID_URI = "urn:ietf:params:rtp-hdrext:sdes:mid"
 ABS_SEND_TIME_URI = "http://www.webrtc.org/experiments/rtp-hdrext/abs-send-time"
@@ -21,6 +29,7 @@ ABS_SEND_TIME_URI = "http://www.webrtc.org/experiments/rtp-hdrext/abs-send-time"
 ONE_BYTE_PROFILE = 0xBEDE
 TWO_BYTE_PROFILE = 0x1000
 ONE_BYTE_MAX_ID = 14
+LARGEST_ID = 255  # in the two-byte form; 0 is padding in both
 
 
 def choose_carrier(offered: Mapping[str, int], trailer: bool) -> Carrier:
@@ -58,6 +67,9 @@ class ExtensionWriter:
     """
 
     def __init__(self, ids: Mapping[str, int], mid: str) -> None:
+        """`ids`: 1 to 255, by URI. Raises ValueError."""
+        if not all(1 <= x <= LARGEST_ID for x in ids.values()):
+            raise ValueError(f"header extension ids are 1 to {LARGEST_ID}, not {sorted(ids.values())}")
         self._two_byte = any(x > ONE_BYTE_MAX_ID for x in ids.values())
         self._native = ids.get(EVENT_REFERENCE_URI)
         self._capture_time = ids.get(CAPTURE_TIME_URI)

@@ -1,5 +1,6 @@
 """What one peer gets, and how it does."""
 
+import logging
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
@@ -10,6 +11,8 @@ from server.media.quality.peer_quality import PeerQuality
 from server.media.stream import Stream
 
 __all__ = ["Delivery", "DeliverySender", "PeerMedia"]
+
+logger = logging.getLogger(__name__)
 
 
 class DeliverySender(Protocol):
@@ -40,6 +43,8 @@ class PeerMedia:
         self.voice = ""  # mid of the section in which the peer's own sound is taken; "" when it is not
         self._deliveries = deliveries
         self._on_close = on_close
+        self._has_failed = False
+        self._tell_failed: Callable[[str, Exception], None] = _log_failure
 
     @property
     def streams(self) -> list[StreamInfo]:
@@ -101,20 +106,55 @@ class PeerMedia:
             if delivery.info.mid == mid:
                 delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
 
+    def on_failed(self, tell: Callable[[str, Exception], None]) -> None:
+        """Call `tell` with the stage and what was raised once this peer cannot be served; it raises nothing."""
+        self._tell_failed = tell
+
+    def failed(self, stage: str, error: Exception) -> None:
+        """Serving this peer raised `error`: it gets nothing more. Only the first is told. Raises nothing."""
+        if not self._has_failed:
+            self._has_failed = True
+            self._leave_all()
+            self._tell_failed(stage, error)
+
     def send_reports(self) -> None:
-        """Send a sender report for each stream."""
+        """Send a sender report for each stream. Raises nothing."""
         for delivery in self._deliveries:
-            delivery.sender.report()
+            try:
+                delivery.sender.report()
+            except Exception as error:
+                self.failed("rtcp", error)
 
     def detach(self) -> None:
-        """Take no more frames. Idempotent."""
+        """Take no more frames. Idempotent; raises nothing."""
+        error = self._leave_all()
+        if error is not None:
+            self.failed("forget", error)
+
+    def _leave_all(self) -> Exception | None:
+        """Every stream is left, and the plane knows it, whatever one of them raises."""
+        first: Exception | None = None
         for delivery in self._deliveries:
-            delivery.stream.leave(delivery.target)
             delivery.target.sender = None
-        self._on_close(self)
+            try:
+                delivery.stream.leave(delivery.target)
+            except Exception as error:
+                first = first or error
+        try:
+            self._on_close(self)
+        except Exception as error:
+            first = first or error
+        return first
 
     async def close(self) -> None:
         """Stop sending to this peer. Idempotent; safe before and after the peer connection closes."""
         self.detach()
         for delivery in self._deliveries:
-            await delivery.sender.stop()
+            try:
+                await delivery.sender.stop()
+            except Exception as error:
+                self.failed("close", error)
+
+
+def _log_failure(stage: str, error: Exception) -> None:
+    logger.error("media failed in stage %s", stage, exc_info=error)

@@ -41,13 +41,16 @@ class PeerStream:
         carrier: Carrier,
         metrics: MediaMetrics,
         on_dropped: Callable[[], None],
+        on_failed: Callable[[Exception], None],
     ) -> None:
+        """`on_failed` hears what serving this stream raised, and raises nothing itself."""
         self.priority = priority
         self.trailer = carrier == "trailer"
         self.h264: Profile | None = None  # that was negotiated; None for another codec
         self.sender: FrameSender | None = None  # None before the transport is connected
         self._outbox = outbox
         self._on_dropped = on_dropped
+        self._on_failed = on_failed
         self._dropped = metrics.dropped.labels(stream, "peer_busy")
         self._packets = metrics.packets.labels(stream, carrier)
         self._octets = metrics.octets.labels(stream, carrier)
@@ -87,6 +90,10 @@ class PeerStream:
         self._outbox.pop()
         self._count(*sent)
         return self._outbox.peek() is not None and not sender.paced
+
+    def failed(self, error: Exception) -> None:
+        self.sender = None
+        self._on_failed(error)
 
     def _count(self, packets: int, octets: int) -> None:
         self._packets.inc(packets)

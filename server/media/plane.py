@@ -66,8 +66,12 @@ class MediaPlane:
         attached: Sequence[SourceSpec] = (),
         *,
         wall_clock: Callable[[], float] = time.time,
+        on_fault: Callable[[str, Exception], None] | None = None,
     ) -> None:
-        """`attached`: cameras and microphones of the console's own; their streams come after the robot's."""
+        """`attached`: cameras and microphones of the console's own; their streams come after the robot's.
+
+        `on_fault` hears where something that serves all peers failed, and what was raised; it goes on.
+        """
         self._settings = settings
         self._attached = {spec.name: spec for spec in attached}
         self._stream_names: dict[str, str] = {}  # of those, by the source's name
@@ -78,7 +82,10 @@ class MediaPlane:
         self._fan_out = FanOut(self._loop_turns)
         self._turns = ReceiveTurns(self._loop_turns)
         self._quality = QualityDesk(
-            settings, QualityMetrics(metrics_registry), busy_seconds=lambda: self._loop_turns.busy_seconds
+            settings,
+            QualityMetrics(metrics_registry),
+            busy_seconds=lambda: self._loop_turns.busy_seconds,
+            on_fault=None if on_fault is None else lambda error: on_fault("quality", error),
         )
         self._streams: dict[str, AnyStream] = {}
         self._peers: dict[PeerMedia, None] = {}  # an ordered set
@@ -258,7 +265,7 @@ class MediaPlane:
             size, rate = (stream.size, stream.frame_rate) if isinstance(stream, VideoStream) else ((0, 0), 0.0)
             bitrate = self._settings.video_bitrate_bps if video else 0
             sink = sink_of(HandedOverStream(stream.name, stream.kind, codec, size, rate, bitrate))
-            target = self._target(stream, codec, "trailer", priority=False)
+            target = self._target(peer, stream, codec, "trailer", priority=False)
             target.h264 = profile_of_fmtp(H264_PROFILE) if codec == "H264" else None
             sender = HandoverSender(sink)
             deliveries.append(Delivery(_info(stream, str(index), codec, "trailer"), stream, target, sender))
@@ -326,7 +333,7 @@ class MediaPlane:
     ) -> Delivery:
         video = stream.kind == "video"
         quality = peer.quality
-        target = self._target(stream, codec, carrier, priority)
+        target = self._target(peer, stream, codec, carrier, priority)
         target.h264 = negotiated_h264(transceiver)
 
         def ready() -> None:
@@ -342,6 +349,7 @@ class MediaPlane:
             on_ready=ready,
             on_keyframe_request=lambda: stream.request_keyframe(codec, target, "pli"),
             on_stopped=peer.detach,
+            on_failed=peer.failed,
             listener=quality,
             pacer=quality.pacer if video and self._settings.quality else None,
             on_paced=lambda: self._fan_out.pace(target),
@@ -349,7 +357,7 @@ class MediaPlane:
         install_sender(transceiver, sender)
         return Delivery(_info(stream, transceiver.mid or "", codec, carrier), stream, target, sender)
 
-    def _target(self, stream: AnyStream, codec: str, carrier: Carrier, priority: bool) -> PeerStream:
+    def _target(self, peer: PeerMedia, stream: AnyStream, codec: str, carrier: Carrier, priority: bool) -> PeerStream:
         video = stream.kind == "video"
         target = PeerStream(
             Outbox(self._settings.video_queue_frames if video else self._settings.audio_queue_frames, video=video),
@@ -358,6 +366,7 @@ class MediaPlane:
             carrier=carrier,
             metrics=self._metrics,
             on_dropped=lambda: stream.request_keyframe(codec, target, "drop"),
+            on_failed=lambda error: peer.failed("media", error),
         )
         return target
 

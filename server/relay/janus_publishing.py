@@ -65,6 +65,7 @@ async def publish(
         names = {stream.mid: stream.stream for stream in streams}
         answer = complete_description(await room.publish(handle, feed, pc.localDescription.sdp, names))
         publication = Publication(feed, streams, writer.send_newest)
+        given.on_failed(publication.failed)
         found.append(publication)
         await _connect(pc, answer, publication)
         yield publication

@@ -62,6 +62,7 @@ class LiveKitEngine:
             listening: asyncio.Task[None] | None = None
             try:
                 publication = Publication(feed, given.streams, process.put_newest)
+                given.on_failed(publication.failed)
                 room = _room(station, feed)
                 token = self._keys.publisher_token(room, PUBLISHER, self._wall_clock())
                 await process.join(Join(station.url.address, token, outlet.tracks))

@@ -5,11 +5,15 @@ from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 from typing import Protocol
 
+import structlog
+
 from robot_bridge.protocol.console import StreamInfo
 from server.relay.station import Station
 from server.relay.tickets import JanusTicket, LiveKitTicket
 
 __all__ = ["Engine", "Publication", "Watched"]
+
+log = structlog.get_logger(__name__)
 
 
 class Watched(Protocol):
@@ -33,7 +37,16 @@ class Publication:
         self._send = send
 
     def send_feedback(self, text: str) -> None:
-        self._send(text)
+        """Raises nothing: relays are served among the observers."""
+        try:
+            self._send(text)
+        except Exception as error:
+            self.failed("feedback", error)
+
+    def failed(self, stage: str, error: Exception) -> None:
+        """Serving this relay raised `error`: the publication ends, and may begin anew. Raises nothing."""
+        log.error("a relay could not be served", stage=stage, exc_info=error)
+        self.end(f"internal error: {stage}")
 
     def end(self, why: str) -> None:
         """The first reason counts."""

@@ -22,6 +22,7 @@ class _Host:
         self.heard: list[tuple[ChannelName, ClientMessage]] = []
         self.opened: list[ChannelName] = []
         self.ended: list[Peer] = []
+        self.faults: list[tuple[str, Exception]] = []
 
     def channel_opened(self, peer: Peer, channel: ChannelName) -> None:
         self.opened.append(channel)
@@ -34,6 +35,9 @@ class _Host:
 
     def peer_ended(self, peer: Peer) -> None:
         self.ended.append(peer)
+
+    def peer_failed(self, peer: Peer, stage: str, error: Exception) -> None:
+        self.faults.append((stage, error))
 
 
 class _Line:
@@ -82,13 +86,14 @@ async def test_every_channel_opens_and_messages_go_where_their_kind_belongs() ->
     assert (watcher.ended, host.ended, line.closed) == ("line closed", [watcher], (1000, "line closed"))
 
 
-async def test_a_fault_ends_the_watcher_and_comes_out() -> None:
-    watcher = _watcher(_Host())
-    line = _Line(fault=ZeroDivisionError())
-    with pytest.raises(ExceptionGroup):
-        await watcher.serve(line)
-    assert watcher.ended == "failed"
-    assert line.closed == (1000, "failed")
+async def test_a_fault_ends_the_watcher_by_name_and_nothing_comes_out() -> None:
+    host, fault = _Host(), ZeroDivisionError()
+    watcher = _watcher(host)
+    line = _Line(fault=fault)
+    await watcher.serve(line)
+    assert watcher.ended == "internal error"
+    assert line.closed == (1011, "internal error")
+    assert host.faults == [("line", fault)]
 
 
 async def test_a_goodbye_that_does_not_end_is_left(monkeypatch: pytest.MonkeyPatch) -> None:

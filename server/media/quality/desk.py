@@ -50,8 +50,9 @@ class QualityDesk:
         metrics: QualityMetrics,
         clock: Callable[[], float] = time.monotonic,
         busy_seconds: Callable[[], float] = lambda: 0.0,
+        on_fault: Callable[[Exception], None] | None = None,
     ) -> None:
-        """`busy_seconds`: as of `LoopTurns`."""
+        """`busy_seconds`: as of `LoopTurns`. `on_fault` hears what a tick raised; the next is tried all the same."""
         self._settings = settings
         self._metrics = metrics
         self._clock = clock
@@ -61,6 +62,7 @@ class QualityDesk:
         self._crowd = Crowd(settings.crowd_observers)
         self._low_divisor = 1  # the low tier gets one of so many pictures
         self._busy_seconds = busy_seconds
+        self._on_fault = on_fault
         self._load_at = clock(), busy_seconds()  # the last look at it
         self._ticks = 0
         self._common: object = None  # what decides for all observers, at the last tick
@@ -83,10 +85,18 @@ class QualityDesk:
             due = self._clock() + TICK
             await asyncio.sleep(TICK)
             if (now := self._clock()) > due + LATE:
-                for peer in self._peers:
+                for peer in list(self._peers):
                     peer.path.late(now)
             if self._peers:
-                self.tick()
+                self._try_tick()
+
+    def _try_tick(self) -> None:
+        try:
+            self.tick()
+        except Exception as error:
+            if self._on_fault is None:
+                raise
+            self._on_fault(error)
 
     def tick(self) -> None:
         """Look at the paths, plan the tiers, move who has to move, tell whom it concerns."""

@@ -15,6 +15,8 @@ class FakeTarget:
         self.blocked = False
         self.paced = False
         self.frames: list[EncodedFrame] = []
+        self.fault: Exception | None = None  # raised when it is served
+        self.failures: list[Exception] = []
         self._log = log
         self._clock = clock
         self._cost = cost
@@ -22,7 +24,12 @@ class FakeTarget:
     def put(self, frame: EncodedFrame) -> None:
         self.frames = [*self.frames, frame][-3:]
 
+    def failed(self, error: Exception) -> None:
+        self.failures.append(error)
+
     def send_next(self) -> bool:
+        if self.fault is not None:
+            raise self.fault
         if self.blocked or not self.frames:
             return False
         sent = self.frames.pop(0)
@@ -104,3 +111,38 @@ async def test_the_loop_gets_a_turn_between_slices() -> None:
         await asyncio.sleep(0)  # one turn of the loop
         turns.append(len(log) - before)
     assert max(turns) <= 2
+
+
+async def test_what_one_target_raises_is_told_to_it_once_and_takes_nothing_from_the_others() -> None:
+    log: list[str] = []
+    clock = FakeClock()
+    fan_out = FanOut(LoopTurns(clock, 0.001))
+    broken, broken_operator = (
+        FakeTarget(log, "broken:", clock),
+        FakeTarget(log, "broken operator:", clock, priority=True),
+    )
+    observers = [FakeTarget(log, "first:", clock), broken, FakeTarget(log, "last:", clock)]
+    operator = FakeTarget(log, "operator:", clock, priority=True)
+    broken.fault = broken_operator.fault = ValueError("planted")
+    fan_out.publish(frame(1), [broken_operator, operator, *observers])
+    await asyncio.sleep(0)
+    assert log == ["operator:1", "first:1", "last:1"]
+    assert len(broken.failures) == len(broken_operator.failures) == 1
+    fan_out.forget(broken)
+    fan_out.forget(broken_operator)
+    fan_out.publish(frame(2), [operator, observers[0], observers[2]])
+    await asyncio.sleep(0)
+    assert log[3:] == ["operator:2", "first:2", "last:2"]
+
+
+async def test_a_target_that_leaves_while_a_frame_is_handed_out_is_no_trouble_to_the_rest() -> None:
+    """What `failed` does in earnest: the peer leaves every stream, and with it the targets that are gone through."""
+    log: list[str] = []
+    clock = FakeClock()
+    fan_out = FanOut(LoopTurns(clock, 0.001))
+    leaving, last = FakeTarget(log, "leaving:", clock, priority=True), FakeTarget(log, "last:", clock, priority=True)
+    targets = {leaving: None, last: None}
+    leaving.fault = ValueError("planted")
+    leaving.failed = lambda error: targets.pop(leaving)  # type: ignore[method-assign,assignment]
+    fan_out.publish(frame(1), targets)
+    assert log == ["last:1"]

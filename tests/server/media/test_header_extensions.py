@@ -60,3 +60,9 @@ def test_nothing_negotiated_is_no_block_at_all() -> None:
 @pytest.mark.parametrize("mid", ["", "x" * 17])
 def test_a_mid_that_does_not_fit_is_left_out(mid: str) -> None:
     assert ExtensionWriter({MID_URI: 1}, mid).block(1, 0.0, 0.0) == b""
+
+
+@pytest.mark.parametrize("number", [0, -1, 256, 4096])
+def test_an_id_that_fits_no_packet_is_refused_before_the_first_one(number: int) -> None:
+    with pytest.raises(ValueError, match="1 to 255"):
+        ExtensionWriter({EVENT_REFERENCE_URI: number}, "0")
