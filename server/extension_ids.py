@@ -20,14 +20,14 @@ EXTMAP = re.compile(r"a=extmap:([0-9]{1,9})(/[a-z]+)? +(\S+)(.*)")
 def with_usable_ids(lines: Sequence[str]) -> list[str]:
     """The lines of an offer, each extension with an id that fits a packet, or without it.
 
+    What a mapping says besides id, direction and URI is left out: no extension of ours has any, and aiortc reads none.
+
     An extension has the same chosen id in every media section, as in one bundle it has to (RFC 9143 9.2).
 
     Raises:
         BadSdp: a mapping that is none.
     """
     mappings = {line: _mapping(line) for line in lines if line.startswith("a=extmap:")}
-    if all(1 <= number <= LARGEST_ID for number, _ in mappings.values()):
-        return list(lines)
     free = _free({number for number, _ in mappings.values()})
     chosen: dict[str, int] = {}  # by URI
     kept = []
@@ -60,4 +60,4 @@ def _with_id(line: str, number: int) -> str:
     """The line with another id; "" when it is none that can be carried."""
     if not 1 <= number <= LARGEST_ID:
         return ""
-    return re.sub(r"^a=extmap:[0-9]+", f"a=extmap:{number}", line)
+    return EXTMAP.sub(lambda found: f"a=extmap:{number}{found[2] or ''} {found[3]}", line.rstrip())

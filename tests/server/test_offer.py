@@ -151,7 +151,7 @@ def test_an_extension_with_an_id_that_no_answer_can_have_is_left_out(number: int
 def test_an_id_that_is_left_to_the_answer_becomes_one_that_the_offer_has_nowhere(number: int) -> None:
     assert _ids(_with_ids("1 urn:a", f"{number}/sendonly {URI} more", "2 urn:b")) == [
         "1 urn:a",
-        f"3/sendonly {URI} more",
+        f"3/sendonly {URI}",
         "2 urn:b",
     ]
 

@@ -143,6 +143,6 @@ async def test_a_target_that_leaves_while_a_frame_is_handed_out_is_no_trouble_to
     leaving, last = FakeTarget(log, "leaving:", clock, priority=True), FakeTarget(log, "last:", clock, priority=True)
     targets = {leaving: None, last: None}
     leaving.fault = ValueError("planted")
-    leaving.failed = lambda error: targets.pop(leaving)  # type: ignore[method-assign,assignment]
+    leaving.failed = lambda error: targets.pop(leaving)  # type: ignore[method-assign]
     fan_out.publish(frame(1), targets)
     assert log == ["last:1"]
