@@ -90,7 +90,8 @@ async def link_trips(link: RobotLink, description: RobotDescription, count: int,
     while len(trips) < count:
         sent = time.monotonic()
         event = event_after(newest.event)
-        link.send(Command(event=event, issue=newest.issue, values=values(sent)))
+        moves = values(sent) if trips else [axis.rest for axis in description.axes]  # a neutral command comes first
+        link.send(Command(event=event, issue=newest.issue, values=moves, nonce=newest.nonce))
         newest = await _feedback_of(link, event)
         trips.append(Trip(event, sent, time.monotonic()))
         await pause.after(sent)

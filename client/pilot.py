@@ -230,7 +230,7 @@ class Pilot:
     def _next(self, now: float) -> Command:
         event, issue = self.gate.next()
         want = _Want.NEUTRAL if self._only_neutral(event) else self._want
-        command = Command(event=event, issue=issue, values=self._values_for(want))
+        command = Command(event=event, issue=issue, values=self._values_for(want), nonce=self._nonce)
         flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now)
         flight.repeat_at = now + self._wait(1)
         if now < self._lossy_until:
@@ -271,8 +271,14 @@ class Pilot:
             return []
         flight.issue = self.gate.next().issue
         want = _Want.NEUTRAL if self._only_neutral(flight.command.event) else _Want.VALUES
-        again = Command(event=flight.command.event, issue=flight.issue, values=self._values_for(want))
+        values = self._values_for(want)
+        again = Command(event=flight.command.event, issue=flight.issue, values=values, nonce=self._nonce)
         return [again] * copies
+
+    @property
+    def _nonce(self) -> int:
+        """Of the issue that the gate answers."""
+        return 0 if self.newest is None else self.newest.nonce
 
     def _wait(self, sends: int) -> float:
         return max(self._least(), self.timer.wait(sends))

@@ -23,6 +23,7 @@ from robot_bridge.protocol.messages import Refusal, Reset, StopState
 
 __all__ = ["Session"]
 
+RESET_AGAIN = 0.25  # s between two tries while the stop is too new
 ANSWER_SECONDS = 5.0  # for the console to answer a request
 KEPT_NOTES = 100
 
@@ -116,11 +117,17 @@ class Session:
         return note
 
     async def reset(self, by: str) -> StopState:
-        """Raises CommandRefused."""
-        refusal = await self._ask(lambda: not self.stop_state.stopped, "stop", Reset(by=by), ANSWER_SECONDS)
-        if refusal is not None:
-            raise CommandRefused(refusal.reason, refusal.detail)
-        return self.stop_state
+        """The stop that was the newest when this was called, and no later one. Raises CommandRefused."""
+        reset = Reset(by=by, number=self.stop_state.number)
+        loop = asyncio.get_running_loop()
+        until = loop.time() + ANSWER_SECONDS
+        while True:
+            refusal = await self._ask(lambda: not self.stop_state.stopped, "stop", reset, ANSWER_SECONDS)
+            if refusal is None:
+                return self.stop_state
+            if refusal.reason != "too_soon" or loop.time() > until:
+                raise CommandRefused(refusal.reason, refusal.detail)
+            await asyncio.sleep(RESET_AGAIN)
 
     async def _seat(self, message: SeatRequest | SeatTake, seconds: float) -> None:
         refusal = await self._ask(lambda: self.holds_seat, "session", message, seconds)

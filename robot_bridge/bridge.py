@@ -26,10 +26,12 @@ from robot_bridge.link_server import LinkPeer, LinkServer
 from robot_bridge.link_session import BadInput
 from robot_bridge.metronome import Metronome
 from robot_bridge.motion_limits import MotionLimits
-from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop
+from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop, StopTaken
 from robot_bridge.robots.base import Measurement, MediaSource, Robot, Stamp
 from robot_bridge.robots.event_strip import with_event_strip
 from robot_bridge.settings import BridgeSettings
+from robot_bridge.start_signal import StartSignal
+from robot_bridge.stop_latch import ResetRefused, ResetTaken, StopGiven, StopLatch
 
 __all__ = ["Bridge"]
 
@@ -57,8 +59,13 @@ class Bridge:
         self._robot = robot
         self._settings = settings
         self._core = EventCore(
-            self.description.axes, max_event_age=self.description.max_event_age, first_event=settings.first_event
+            self.description.axes,
+            max_event_age=self.description.max_event_age,
+            first_event=settings.first_event,
+            latch=StopLatch(numbers_after=int(time.time() * 1e6)),
+            start_warning=self.description.start_warning,
         )
+        self._signal = StartSignal(self.description)
         self._limits = MotionLimits(self.description, robot, robot.tick_seconds)
         self._shaper = AxisShaper(self.description.axes, hold=self.description.hold, limiter=self._limits)
         self._links = LinkServer(
@@ -185,6 +192,8 @@ class Bridge:
     # LinkHandler
 
     def link_opened(self, peer: LinkPeer) -> None:
+        if peer is self._links.operator:
+            self._need_neutral()
         self._core.want_issue()
 
     def link_message(self, peer: LinkPeer, message: Command | Rest | Stop | Reset) -> None:
@@ -197,9 +206,9 @@ class Bridge:
                     self._shaper.rest()
                 self._record("rest", message.event, applied=applied)
             case Stop():
-                self._stop(message)
+                self._stop(peer, message)
             case Reset():
-                self._reset(message)
+                self._reset(peer, message)
 
     def link_bad_input(self, peer: LinkPeer, bad: BadInput) -> None:
         if bad.name == "malformed" or bad.name == "not_allowed":
@@ -225,18 +234,36 @@ class Bridge:
         self._record("refused", refusal.event, reason=refusal.reason, current=refusal.current)
         peer.send(refusal)
 
-    def _stop(self, stop: Stop) -> None:
-        if self._core.stop(stop.by, stop.reason):
-            self._shaper.rest()
-            self._stop_due = True
-            self._record("stop", self._core.current, by=stop.by, reason=stop.reason)
+    def _stop(self, peer: LinkPeer, stop: Stop) -> None:
+        given = self._core.stop(stop.press, stop.by, stop.reason, time.monotonic())
+        self._note_stop(given, stop.by, stop.reason)
+        peer.send(StopTaken(press=stop.press, number=given.number, kept=False))
 
-    def _reset(self, reset: Reset) -> None:
-        if self._core.reset():
-            if not self._stop_due:  # else the robot has not been told yet
-                self._call_robot(self._robot.reset)
-            self._stop_due = False
-            self._record("reset", self._core.current, by=reset.by)
+    def _note_stop(self, given: StopGiven, by: str, reason: str) -> None:
+        """The robot rests first, whatever else a stop brings with it."""
+        if not given.is_new:
+            return
+        self._shaper.rest()
+        self._stop_due |= given.latched
+        self._record("stop", self._core.current, by=by, reason=reason, number=given.number)
+
+    def _reset(self, peer: LinkPeer, reset: Reset) -> None:
+        outcome = self._core.reset(reset.number, time.monotonic())
+        if isinstance(outcome, ResetTaken):
+            self._released(outcome, reset.by)
+        elif isinstance(outcome, ResetRefused):
+            self._refuse(peer, self._core.refusal(0, outcome.reason, outcome.detail, stop=outcome.number))
+
+    def _released(self, reset: ResetTaken, by: str) -> None:
+        if not self._stop_due:  # else the robot has not been told yet
+            self._call_robot(self._robot.reset)
+        self._stop_due = False
+        self._record("reset", self._core.current, by=by, number=reset.number)
+
+    def _need_neutral(self) -> None:
+        """Whatever moved comes to rest, and moves on only after a neutral command."""
+        self._shaper.rest()
+        self._core.need_neutral()
 
     def _call_robot(self, call: Callable[[], None]) -> None:
         """An adapter that raises ends the bridge at the next tick, not the link that happened to ask."""
@@ -302,8 +329,7 @@ class Bridge:
             return
         self._failure = f"robot failed: {named(error)}"[:500]
         _logger.error("%s", self._failure, exc_info=error)
-        if self._core.stop("", self._failure):
-            self._record("stop", self._core.current, by="", reason=self._failure)
+        self._note_stop(self._core.stop("", "", self._failure, time.monotonic()), "", self._failure)
 
     def _tell_failure(self) -> None:
         """Feed back what has happened, with what was measured last where nothing can be measured any more."""
@@ -330,7 +356,8 @@ class Bridge:
     def _tick(self, now: float) -> None:
         if self._robot_error is not None:
             raise self._robot_error
-        self._robot.apply(self._shaper.step(now, self._robot.tick_seconds))
+        values = self._shaper.step(now, self._robot.tick_seconds)
+        self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
         self._robot.tick()
         if self._limits.acting != self._acting:
             self._note_limits(self._limits.acting)

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from robot_bridge.check_limits import check_limits
 from robot_bridge.errors import DescriptionError
-from robot_bridge.protocol.description import Axis, Camera, ForceFeeling, RobotDescription
+from robot_bridge.protocol.description import Axis, Camera, ForceFeeling, RobotDescription, StartWarning
 
 __all__ = ["check_description"]
 
@@ -35,6 +35,8 @@ def check_description(description: RobotDescription) -> None:
     _check_references(description)
     if description.force_feeling is not None:
         _check_feeling(description.force_feeling)
+    if description.start_warning is not None:
+        _check_warning(description, description.start_warning)
     check_limits(description)
 
 
@@ -65,6 +67,26 @@ def _check_feeling(feeling: ForceFeeling) -> None:
         raise DescriptionError("force_feeling needs 0 <= threshold_newtons < full_newtons, and both finite")
     if not 0.1 <= feeling.curve <= 10:
         raise DescriptionError(f"force_feeling: curve must be in [0.1, 10], not {feeling.curve}")
+
+
+def _check_warning(description: RobotDescription, warning: StartWarning) -> None:
+    if not 0 < warning.seconds <= 30:
+        raise DescriptionError(f"start_warning: seconds must be in (0, 30], not {warning.seconds}")
+    signal = next((axis for axis in description.axes if axis.name == warning.axis), None)
+    if signal is None:
+        raise DescriptionError(f"start_warning names the axis {warning.axis!r}, which is not described")
+    if not signal.minimum <= warning.value <= signal.maximum or warning.value == signal.rest:
+        raise DescriptionError(f"start_warning: the value must be one of axis {signal.name}, and not its rest value")
+    moving = {gain.axis for limit in description.position_limits for gain in limit.axes}
+    if description.planar_base is not None:
+        base = description.planar_base
+        moving |= {base.forward, base.left, base.turn}
+    for twist in description.body_twists:
+        moving |= {*twist.linear, *twist.angular}
+    if signal.name in moving:
+        raise DescriptionError(f"start_warning: axis {signal.name} moves the robot and cannot be its light or horn")
+    if len(description.axes) == 1:
+        raise DescriptionError("start_warning: a robot whose only axis is a light or horn has no motion to warn of")
 
 
 def _check_references(description: RobotDescription) -> None:

@@ -1,23 +1,40 @@
 """The event reference and exactly-once execution. No I/O, no clock: the caller hands in `now`.
 
-Call order: `issue` once (the first feedback), then `command`, `rest`, `stop`, `reset` in any order; after every tick,
-when `issue_due`, measure the robot and call `issue`, which answers the pending command or measures the current event
-again. Rules and reasons: docs/robot-link.md, "Exactly once".
+Call order: `issue` once (the first feedback), then `command`, `rest`, `stop`, `reset` and the others in any order;
+after every tick, when `issue_due`, measure the robot and call `issue`, which answers the pending command or measures
+the current event again. Rules and reasons: docs/robot-link.md, "Exactly once" and "Coming to rest".
 """
 
 import math
-from collections.abc import Sequence
+import secrets
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from robot_bridge.protocol.description import Axis
+from robot_bridge.protocol.description import Axis, StartWarning
 from robot_bridge.protocol.messages import Command, Feedback, Refusal, RefusalReason, StopState
 from robot_bridge.protocol.serial import FIRST_EVENT, event_after, event_gap, is_event, is_newer
+from robot_bridge.restart_interlock import RestartInterlock
 from robot_bridge.robots.base import Measurement
+from robot_bridge.stop_latch import ResetOutcome, ResetTaken, StopGiven, StopLatch, WriteOutcome
 
-__all__ = ["Absorbed", "Answered", "CommandOutcome", "EventCore", "Executed", "Refused"]
+__all__ = ["Absorbed", "Answered", "CommandOutcome", "EventCore", "Executed", "Refused", "draw_nonce"]
 
 REFRESH_INTERVAL = 0.5  # s between issues of the same event while nothing is commanded
 MAX_REMEMBERED_ISSUES = 1024  # of the current event; a forgotten issue counts as late
+MAX_NONCE = 2**53 - 1  # what a JavaScript number holds exactly
+
+
+def draw_nonce() -> int:
+    """Nobody can guess it; never 0, which is what a command without a nonce names."""
+    return 1 + secrets.randbelow(MAX_NONCE)
+
+
+class _Issued(NamedTuple):
+    """What a command has to know of the issue that it answers."""
+
+    time: float  # s
+    nonce: int
+    spell: int  # of the restart interlock
 
 
 class Executed(NamedTuple):
@@ -47,7 +64,8 @@ CommandOutcome = Executed | Answered | Absorbed | Refused
 
 
 class EventCore:
-    """Owns `s`. Executes each event at most once and never on the strength of an old feedback."""
+    """Owns `s`. Executes each event at most once, never on the strength of an old feedback or of one not seen, and
+    moves nothing before a neutral command where the interlock asks for one."""
 
     def __init__(
         self,
@@ -56,20 +74,28 @@ class EventCore:
         max_event_age: float,
         first_event: int = FIRST_EVENT,
         refresh_interval: float = REFRESH_INTERVAL,
+        latch: StopLatch | None = None,
+        start_warning: StartWarning | None = None,
+        nonces: Callable[[], int] = draw_nonce,
     ) -> None:
+        """`latch`: None for one that keeps nothing. `nonces`: draws that of each issue."""
         if not is_event(first_event):
             raise ValueError(f"the first event must be a valid reference, not {first_event}")
         self._rest_values = [axis.rest for axis in axes]
+        self._signal = "" if start_warning is None else start_warning.axis
+        self._drives = [axis.name != self._signal for axis in axes]  # all axes but a light or horn
         self._max_event_age = max_event_age
         self._refresh_interval = refresh_interval
         self._current = first_event  # s: latest executed and answered event, 1
         self._pending: int | None = None  # executed, waiting for its feedback, 2
         self._feedback: Feedback | None = None  # latest issue of the current event; None before the first
         self._issue = 0  # number of the current event's latest issue, 2
-        self._issued: dict[int, float] = {}  # issue of the current event -> when, {2: 1042.5}
+        self._issued: dict[int, _Issued] = {}  # issues of the current event, oldest first
+        self._nonces = nonces
         self._issue_wanted = True  # issue again at the end of this tick
         self._rested: int | None = None  # moving commands up to this event are void, 2
-        self._stop = StopState()
+        self._latch = latch or StopLatch()
+        self._interlock = RestartInterlock(start_warning)
 
     @property
     def current(self) -> int:
@@ -88,7 +114,28 @@ class EventCore:
 
     @property
     def stop_state(self) -> StopState:
-        return self._stop
+        return self._latch.state
+
+    @property
+    def latch(self) -> StopLatch:
+        """For whoever writes it to the disk; its verbs are called through the core."""
+        return self._latch
+
+    @property
+    def neutral_needed(self) -> bool:
+        """No moving command executes before a neutral one."""
+        return self._interlock.needed
+
+    def warns(self, now: float) -> float:
+        """s that the robot still warns before it may move; 0 when it does not."""
+        return self._interlock.warns(now)
+
+    def moves(self, values: Sequence[float]) -> bool:
+        """Whether these values are an intention to move; a light or horn alone is none."""
+        return any(
+            value != rest and drives
+            for value, rest, drives in zip(values, self._rest_values, self._drives, strict=True)
+        )
 
     def command(self, command: Command, now: float) -> CommandOutcome:
         """Decide about a command that arrived now."""
@@ -98,8 +145,8 @@ class EventCore:
             )
         if not all(map(math.isfinite, command.values)):
             return self._refuse(command, "not_a_number")
-        if self._stop.stopped:
-            return self._refuse(command, "stopped", self._stop.reason)
+        if self._latch.state.stopped:
+            return self._refuse(command, "stopped", self._latch.state.reason)
         if command.event == self._current and self._feedback is not None:
             return Answered(self._feedback)
         if command.event == self._pending:
@@ -110,19 +157,25 @@ class EventCore:
 
     def _next_command(self, command: Command, now: float) -> CommandOutcome:
         issued = self._issued.get(command.issue)
-        if issued is None or now - issued > self._max_event_age:
+        if issued is None or now - issued.time > self._max_event_age:
             self._issue_wanted = True
             return self._refuse(command, "late")
-        moving = command.values != self._rest_values
+        if command.nonce != issued.nonce:
+            return self._refuse(command, "unseen")
+        moving = self.moves(command.values)
         if moving and self._rested is not None and not is_newer(command.event, self._rested):
             return self._refuse(command, "rested")
+        self._look(now)
+        if moving and (reason := self._interlock.refuses(now)) is not None:
+            return self._refuse(command, reason)
+        self._interlock.executed(moving=moving, spell=issued.spell, now=now)
         self._pending = command.event
         self._rested = None  # every event it could void is now behind; a stale mark must not survive the wrap
         return Executed(command.event, command.values)
 
-    def refusal(self, event: int, reason: RefusalReason, detail: str = "") -> Refusal:
-        """A refusal that names the current event."""
-        return Refusal(event=event, reason=reason, current=self._current, detail=detail[:500])
+    def refusal(self, event: int, reason: RefusalReason, detail: str = "", *, stop: int = 0) -> Refusal:
+        """A refusal that names the current event. `stop`: that a refused reset named."""
+        return Refusal(event=event, reason=reason, current=self._current, detail=detail[:500], stop=stop)
 
     def rest(self, event: int) -> bool:
         """Void moving commands up to `event`. True: bring the axes to rest; False: superseded by a newer event.
@@ -140,21 +193,51 @@ class EventCore:
             self._rested = voided
         return True
 
-    def stop(self, by: str, reason: str) -> bool:
-        """Latch the stop. False when it was latched before: the first reason stands."""
-        if self._stop.stopped:
-            return False
-        self._stop = StopState(stopped=True, by=by, reason=reason)
+    def stop(self, press: str, by: str, reason: str, now: float) -> StopGiven:
+        """Latch the stop, or count a further one. The axes come to rest if `is_new`."""
+        given = self._latch.stop(press, by, reason, now)
+        if given.is_new:
+            self.need_neutral()
+        return given
+
+    def reset(self, number: int, now: float) -> ResetOutcome:
+        """Release the stop, now or when the reset is on the disk; moves nothing."""
+        outcome = self._latch.reset(number, now)
+        if isinstance(outcome, ResetTaken):
+            self.need_neutral()
+        return outcome
+
+    def written(self, version: int, error: str = "") -> WriteOutcome:
+        """The latch's record of `version` is on the disk, or could not be written: what became of a reset."""
+        outcome = self._latch.written(version, error)
+        self._issue_wanted = True  # whether the state is kept is fed back too
+        if isinstance(outcome, ResetTaken):
+            self.need_neutral()
+        return outcome
+
+    def lock_out(self, reason: str, now: float) -> StopGiven | None:
+        """Somebody at the robot keeps it from being driven: a stop that no reset releases before `let_in`."""
+        given = self._latch.lock_out(reason, now)
         self._issue_wanted = True
+        if given is not None:
+            self.need_neutral()
+        return given
+
+    def let_in(self) -> bool:
+        """The lock-out is over; the stop stays. False when there was none."""
+        if not self._latch.let_in():
+            return False
+        self.need_neutral()
         return True
 
-    def reset(self) -> bool:
-        """Release the stop; moves nothing. False when it was not latched."""
-        if not self._stop.stopped:
-            return False
-        self._stop = StopState()
+    def need_neutral(self) -> None:
+        """From now on no moving command executes before a neutral one. The caller brings the axes to rest."""
+        self._interlock.require()
         self._issue_wanted = True
-        return True
+
+    def _look(self, now: float) -> None:
+        if self._interlock.look(now):
+            self._issue_wanted = True
 
     def want_issue(self) -> None:
         """Issue again at the end of this tick (somebody joined)."""
@@ -162,6 +245,7 @@ class EventCore:
 
     def issue_due(self, now: float) -> bool:
         """Whether to measure and `issue` now."""
+        self._look(now)
         if self._pending is not None or self._issue_wanted or self._feedback is None:
             return True
         return now - self._feedback.time >= self._refresh_interval
@@ -176,7 +260,9 @@ class EventCore:
             self._issue = 0
         self._issue += 1
         self._issue_wanted = False
-        self._remember_issue(now)
+        nonce, stop = self._nonces(), self._latch.state
+        self._remember_issue(_Issued(now, nonce, self._interlock.spell))
+        self._latch.shown(stop)
         self._feedback = Feedback(
             event=self._current,
             issue=self._issue,
@@ -186,21 +272,27 @@ class EventCore:
             wrench=measured.wrench,
             ranges=measured.ranges,
             at_rest=measured.at_rest,
-            stop=self._stop,
+            stop=stop,
             faults=measured.faults,
             limits=list(limits),
             unknown=list(unknown),
+            nonce=nonce,
+            neutral_needed=self._interlock.needed,
+            warning=self._interlock.warns(now),
         )
         return self._feedback
 
-    def _remember_issue(self, now: float) -> None:
+    def _remember_issue(self, issued: _Issued) -> None:
         """Issues come in order of time, so the forgotten ones are always the oldest."""
         while self._issued:
             oldest = next(iter(self._issued))
-            if len(self._issued) < MAX_REMEMBERED_ISSUES and now - self._issued[oldest] <= self._max_event_age:
+            if (
+                len(self._issued) < MAX_REMEMBERED_ISSUES
+                and issued.time - self._issued[oldest].time <= self._max_event_age
+            ):
                 break
             del self._issued[oldest]
-        self._issued[self._issue] = now
+        self._issued[self._issue] = issued
 
     def _refuse(self, command: Command, reason: RefusalReason, detail: str = "") -> Refused:
         return Refused(self.refusal(command.event, reason, detail))

@@ -30,6 +30,7 @@ from robot_bridge.protocol.messages import (
     Reset,
     Rest,
     Stop,
+    StopTaken,
     decode_message,
 )
 
@@ -46,9 +47,9 @@ FROM_CLIENT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
     "media": (Stop,),
 }
 FROM_ROBOT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
-    "operator": (Feedback, Refusal),
-    "events": (EventNotice, Refusal),
-    "media": (Media, Refusal),
+    "operator": (Feedback, Refusal, StopTaken),
+    "events": (EventNotice, Refusal, StopTaken),
+    "media": (Media, Refusal, StopTaken),
 }
 
 

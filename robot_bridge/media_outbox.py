@@ -20,7 +20,7 @@ ORDERED_DEPTH = 10  # segments or dependent pictures a stream may have waiting: 
 
 
 class NewestOutbox(Generic[Key, Item]):
-    """At most one waiting item per key; a newer one takes its place in the order."""
+    """At most one waiting item per key. A newer one waits behind all others, so that no order of keys is reversed."""
 
     def __init__(self) -> None:
         self._items: dict[Key, Item] = {}
@@ -32,6 +32,7 @@ class NewestOutbox(Generic[Key, Item]):
     def put(self, key: Key, item: Item) -> None:
         if key in self._items:
             self.drops[key] += 1
+            del self._items[key]
         self._items[key] = item
 
     def pop(self) -> Item | None:

@@ -108,7 +108,7 @@ async def stop(request: Request) -> Response:
 async def reset(request: Request, caller: Caller) -> Response:
     require_role(caller, "operator", "supervisor")
     console = services(request).console
-    console.reset(caller.actor, "http")
+    console.reset(caller.actor, "http", console.clock.stop.number)
     return json_answer(Delivered(True, console.clock.event))
 
 

@@ -89,7 +89,9 @@ class CommandDesk:
     def latched(self) -> Stop | None:
         """The stop that holds or is still to arrive; None when there is none."""
         held = self._clock.stop
-        return self._unconfirmed_stop or (Stop(by=held.by, reason=held.reason) if held.stopped else None)
+        return self._unconfirmed_stop or (
+            Stop(by=held.by, reason=held.reason, press=held.press) if held.stopped else None
+        )
 
     def link_up(self, description: RobotDescription) -> Stop | None:
         """Returns a stop that nobody knows to have arrived: send it first of all."""
@@ -162,13 +164,13 @@ class CommandDesk:
         self._last_stop_at = now
         return Forward(stop)
 
-    def reset(self, by: str) -> Outcome:
-        """The caller has checked the role."""
+    def reset(self, by: str, number: int) -> Outcome:
+        """The caller has checked the role. `number`: of the newest stop that the sender has seen."""
         if not self._link_is_up:
             return self._refuse(None, "link_down")
         self._last_stop_at = -math.inf
         self._unconfirmed_stop = None  # the link keeps order: the bridge stops, then resets
-        return Forward(Reset(by=by))
+        return Forward(Reset(by=by, number=number))
 
     def feedback(self, feedback: Feedback) -> None:
         """A feedback that the event clock accepted."""
@@ -180,7 +182,7 @@ class CommandDesk:
 
     def refused(self, refusal: Refusal) -> str:
         """The bridge refused something; returns the peer to tell, or "" for none."""
-        if self._in_flight is not None and refusal.event in (0, self._in_flight.event):
+        if self._in_flight is not None and refusal.event in (0, self._in_flight.event) and not refusal.stop:
             self._in_flight = None
             return self._sender
         return self._seat.holder

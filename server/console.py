@@ -157,13 +157,13 @@ class Console:
         log.warning("stop", by=by.name, where=where, reason=reason, delivered=delivered)
         return delivered
 
-    def reset(self, by: Actor, where: str) -> None:
-        """Release the latched stop; the caller has checked the role.
+    def reset(self, by: Actor, where: str, number: int) -> None:
+        """Release the latched stop; the caller has checked the role. `number`: of the newest stop that they have seen.
 
         Raises:
             LinkDown: the robot cannot be told.
         """
-        outcome = self._desk.reset(by.name)
+        outcome = self._desk.reset(by.name, number)
         if not isinstance(outcome, Forward) or not self._forward(outcome):
             raise LinkDown(self.robot.detail)
         self._metrics.resets.inc()
@@ -224,7 +224,7 @@ class Console:
             ):
                 self._refuse_request(peer, "too_often")
             case Reset():
-                self._reset_by(peer)
+                self._reset_by(peer, message.number)
             case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake():
                 self.seat.handle(peer, message)
             case Rename():
@@ -381,11 +381,11 @@ class Console:
             self._metrics.speed_share.set(news.share)
             self.peers.tell("session", news)
 
-    def _reset_by(self, peer: Peer) -> None:
+    def _reset_by(self, peer: Peer, number: int) -> None:
         refusal = Refusal(event=0, reason="not_allowed", current=self.clock.event, detail="observers do not reset")
         if peer.role != "observer":
             try:
-                self.reset(peer.actor, "stop")
+                self.reset(peer.actor, "stop", number)
                 return
             except LinkDown as error:
                 refusal = Refusal(event=0, reason="link_down", current=self.clock.event, detail=error.detail[:500])

@@ -43,6 +43,7 @@ class Peer:
         self.closed = asyncio.Event()
         self.event = 1  # the newest feedback's, for forging
         self.issue = 1
+        self.nonce = 0
         self.location = ""
 
     async def join(self, target: Target, *, video: bool = False) -> bool:
@@ -74,7 +75,7 @@ class Peer:
     def _heard(self, data: str) -> None:
         message = decode_server_message(data)
         if isinstance(message, Feedback):
-            self.event, self.issue = message.event, message.issue
+            self.event, self.issue, self.nonce = message.event, message.issue, message.nonce
 
 
 async def offer_of(pc: RTCPeerConnection) -> str:
@@ -140,7 +141,8 @@ async def forged_commands(target: Target, random: Random) -> None:
             return
         for _ in range(300):
             values = [random.uniform(-1, 1) for _ in range(3)]
-            peer.send("control", encode_console_message(Command(event=peer.event + 1, issue=peer.issue, values=values)))
+            forged = Command(event=peer.event + 1, issue=peer.issue, values=values, nonce=peer.nonce)
+            peer.send("control", encode_console_message(forged))
             peer.send("control", encode_console_message(Rest(event=peer.event + 1)))
             await asyncio.sleep(0.01)
             if peer.closed.is_set():

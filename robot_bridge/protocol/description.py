@@ -26,6 +26,7 @@ __all__ = [
     "PositionLimit",
     "RangeRing",
     "RobotDescription",
+    "StartWarning",
     "TouchPad",
     "WrenchSensor",
 ]
@@ -225,6 +226,14 @@ class ControlLayer(msgspec.Struct, frozen=True, kw_only=True):
     bindings: tuple[Binding, ...]
 
 
+class StartWarning(msgspec.Struct, frozen=True, kw_only=True):
+    """A light or horn that warns people at the robot before its first motion. The bridge drives it."""
+
+    seconds: float  # that it warns before a moving command may execute
+    axis: str  # of the light or horn; a command that drives nothing else counts as neutral
+    value: float  # that the axis is driven to while it warns
+
+
 class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     name: str  # "mobile-manipulator"
     label: str  # "Mobile manipulator"
@@ -241,6 +250,7 @@ class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     geofences: tuple[Geofence, ...] = ()
     force_feeling: ForceFeeling | None = None
     body_twists: tuple[BodyTwist, ...] = ()
+    start_warning: StartWarning | None = None
     hold: float = 0.3  # s a command is held before the robot comes to rest by itself
     max_event_age: float = 2.0  # s after which a feedback may no longer be answered
     max_event_rate: float = 25.0  # Hz, the most events per second that the robot wants

@@ -37,7 +37,7 @@ __all__ = [
     "encode_message",
 ]
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 MAX_AXES = 256
 
 EventReference = Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]
@@ -67,6 +67,7 @@ RefusalReason = Literal[
     "unseen",  # its nonce is not that of the issue that it answers: the sender has not seen it
     "stale_reset",  # a reset that does not name the newest stop
     "too_soon",  # a reset within a second after the newest stop, or before a feedback showed that stop
+    "not_kept",  # a reset that could not be written to the robot's disk
     "locked_out",  # somebody at the robot keeps it from being driven
     "warning",  # the robot warns before it moves, and has not warned long enough
     "silenced",  # a supervisor silenced the stops of this link

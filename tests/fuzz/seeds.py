@@ -62,7 +62,7 @@ def seeds() -> dict[str, bytes]:
         "hello-robot": wire(Hello(role="robot", epoch="e", description=DESCRIPTION)),
         "hello-with-nonce": wire(Hello(role="operator", nonce=NONCE), Hello(role="operator", nonce=NONCE, proof=PROOF)),
         "hello-twice": hello + hello,
-        "hello-other-version": raw({"type": "hello", "version": 2, "role": "operator"}),
+        "hello-other-version": raw({"type": "hello", "version": 1, "role": "operator"}),
         "challenge": wire(Challenge(nonce=NONCE), Hello(role="robot", epoch="e", proof=PROOF)),
         "drive-and-let-go": commands(moving, moving) + wire(Rest(event=3)) + commands([0.0] * 3, first=4),
         "every-event-at-once": commands(*[moving] * 12),

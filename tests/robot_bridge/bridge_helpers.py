@@ -19,6 +19,7 @@ from robot_bridge.protocol.messages import (
     LinkMessage,
     LinkRole,
     Refusal,
+    Reset,
     decode_message,
     encode_message,
 )
@@ -43,6 +44,7 @@ __all__ = [
 Kind = TypeVar("Kind", bound=LinkMessage)
 
 PATIENCE = 5.0  # s
+RESET_AGAIN = 0.1  # s between two tries to reset a stop that is too new
 
 
 class Addressed(Protocol):
@@ -132,7 +134,18 @@ class Operator:
         raise AssertionError("the link was closed")
 
     def command(self, values: list[float] = DRIVE) -> Command:
-        return Command(event=event_after(self.feedback.event), issue=self.feedback.issue, values=values)
+        newest = self.feedback
+        return Command(event=event_after(newest.event), issue=newest.issue, values=values, nonce=newest.nonce)
+
+    async def arm(self) -> None:
+        """What has to come before the first moving command."""
+        while self.feedback.neutral_needed and not self.feedback.stop.stopped:
+            await self.drive(list(self._neutral))
+
+    @property
+    def _neutral(self) -> Sequence[float]:
+        description = self.link.hello.description
+        return [axis.rest for axis in description.axes] if description is not None else []
 
     async def drive(self, values: list[float] = DRIVE) -> Feedback:
         """Send the next command and wait for its feedback."""
@@ -147,16 +160,29 @@ class Operator:
         while not condition(self.feedback):
             await self.next(Feedback)
 
+    async def reset(self, *, by: str = "") -> int:
+        """Release the newest stop as soon as the bridge lets it; its number."""
+        number = self.feedback.stop.number
+        while self.feedback.stop.stopped:
+            self.link.send(Reset(by=by, number=number))
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(RESET_AGAIN):
+                    await self.heard(lambda feedback: not feedback.stop.stopped)
+        return number
+
     async def refused(self, message: LinkMessage) -> Refusal:
         self.link.send(message)
         return await self.next(Refusal)
 
 
 @asynccontextmanager
-async def operator(bridge: Addressed) -> AsyncIterator[Operator]:
+async def operator(bridge: Addressed, *, armed: bool = True) -> AsyncIterator[Operator]:
+    """`armed`: one neutral command was executed."""
     async with RobotLink(*bridge.address, "operator", name="test") as link:
         driver = Operator(link)
         await driver.next(Feedback)
+        if armed:
+            await driver.arm()
         yield driver
 
 

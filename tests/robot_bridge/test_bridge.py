@@ -21,7 +21,6 @@ from robot_bridge.protocol.messages import (
     Feedback,
     Goodbye,
     Media,
-    Reset,
     Rest,
     Stop,
 )
@@ -47,17 +46,17 @@ def speed(robot: RecordingRobot) -> float:
 async def test_commands_move_the_robot_and_each_feedback_belongs_to_its_command() -> None:
     robot = RecordingRobot()
     async with running_bridge(robot) as bridge, operator(bridge) as driver:
-        assert driver.feedback.event == 1
+        assert driver.feedback.event == 2, "that of the neutral command"
         events = [(await driver.drive()).event for _ in range(30)]
-        assert events == list(range(2, 32))
+        assert events == list(range(3, 33))
         assert driver.feedback.joints[0] > 0.0
         assert driver.feedback.axes[0] > 0.1
-        assert bridge.counters.executed == 30
+        assert bridge.counters.executed == 31
     assert robot.calls == ["stop", "close"]
 
 
 async def test_events_go_on_over_the_wrap() -> None:
-    async with running_bridge(first_event=MAX_EVENT - 1) as bridge, operator(bridge) as driver:
+    async with running_bridge(first_event=MAX_EVENT - 2) as bridge, operator(bridge) as driver:
         assert [(await driver.drive()).event for _ in range(4)] == [MAX_EVENT, 1, 2, 3]
 
 
@@ -103,7 +102,8 @@ async def main():
     async with RobotLink("127.0.0.1", int(sys.argv[1]), "operator") as link:
         async for message in link:
             if isinstance(message, Feedback):
-                link.send(Command(event=message.event + 1, issue=message.issue, values=[0.4, 0.0, 0.0]))
+                values = [0.0 if message.neutral_needed else 0.4, 0.0, 0.0]
+                link.send(Command(event=message.event + 1, issue=message.issue, values=values, nonce=message.nonce))
 
 asyncio.run(main())
 """
@@ -164,10 +164,12 @@ async def test_stop_latches_and_reset_moves_nothing() -> None:
         assert (driver.feedback.stop.by, driver.feedback.stop.reason) == ("Ada", "smoke")
         assert (await driver.refused(driver.command())).reason == "stopped"
         await robot.until(lambda: robot.applied[-1][1] == NEUTRAL, "at rest")
-        driver.link.send(Reset(by="Ada"))
-        await driver.heard(lambda feedback: not feedback.stop.stopped)
+        assert await driver.reset(by="Ada") == driver.feedback.stop.number
         assert robot.applied[-1][1] == NEUTRAL
+        assert (await driver.refused(driver.command())).reason == "not_neutral"
+        await driver.arm()
         await driver.drive()
+        assert speed(robot) > 0
     assert robot.calls == ["stop", "reset", "stop", "close"]
 
 
@@ -177,7 +179,7 @@ async def test_a_repeat_of_the_current_event_gets_its_feedback_again_and_execute
         first = await driver.drive()
         driver.link.send(command)
         assert await driver.next(Feedback) == first
-        assert bridge.counters.executed == 1
+        assert bridge.counters.executed == 2
 
 
 async def test_an_idle_bridge_issues_the_same_event_again_and_tells_event_links() -> None:
@@ -188,10 +190,10 @@ async def test_an_idle_bridge_issues_the_same_event_again_and_tells_event_links(
     ):
         before = driver.feedback
         await driver.heard(lambda feedback: feedback.issue >= before.issue + 3)
-        assert driver.feedback.event == 1
+        assert driver.feedback.event == 2
         notice = await anext(watcher)
         assert isinstance(notice, EventNotice)
-        assert notice.event == 1
+        assert notice.event == 2
         with pytest.raises(LinkLost, match="description"):
             watcher_description(watcher)
 
@@ -349,17 +351,19 @@ async def test_the_log_tells_what_happened(tmp_path: Path) -> None:
         await driver.drive(DRIVE)
         await driver.refused(driver.command([0.0]))
         driver.link.send(Stop(by="Ada", reason="smoke"))
-        driver.link.send(Reset(by="Bob"))
+        await driver.heard(lambda feedback: feedback.stop.stopped)
+        await driver.reset(by="Bob")
         driver.link.send(Rest(event=2))
-        await driver.heard(lambda feedback: feedback.issue >= 2 and not feedback.stop.stopped)
     (start,) = log_lines(log, "start")
     assert start["epoch"] == bridge.epoch
-    (executed,) = log_lines(log, "executed")
-    assert (executed["event"], executed["values"]) == (2, DRIVE)
-    (refused,) = log_lines(log, "refused")
-    assert (refused["event"], refused["reason"], refused["current"]) == (3, "wrong_size", 2)
-    assert log_lines(log, "stop")[0]["by"] == "Ada"
-    assert log_lines(log, "reset")[0]["by"] == "Bob"
+    neutral, executed = log_lines(log, "executed")
+    assert (neutral["event"], neutral["values"]) == (2, NEUTRAL)
+    assert (executed["event"], executed["values"]) == (3, DRIVE)
+    refused = log_lines(log, "refused")[0]
+    assert (refused["event"], refused["reason"], refused["current"]) == (4, "wrong_size", 3)
+    (stop,), (reset,) = log_lines(log, "stop"), log_lines(log, "reset")
+    assert (stop["by"], reset["by"]) == ("Ada", "Bob")
+    assert stop["number"] == reset["number"]
     assert [line["event"] for line in log_lines(log, "feedback")][0] == 1
 
 

@@ -136,10 +136,11 @@ async def test_whatever_bytes_strangers_send_the_operator_drives_on() -> None:
                 garbage[random.randrange(len(hello) if attempt % 4 == 1 else len(garbage))] = random.randrange(256)
             async with raw_link(bridge) as stranger:
                 stranger.writer.write(bytes(garbage))
-                driver.link.send(Reset())
-                await driver.heard(lambda feedback: not feedback.stop.stopped)
                 driver.link.send(driver.command())
                 await driver.next(Feedback)
+        await driver.reset()
+        await driver.arm()
+        await driver.drive()
         assert sum(bridge.counters.bad_input.values()) > 10
 
 

@@ -2,10 +2,21 @@ import math
 
 import pytest
 
-from robot_bridge.event_core import MAX_REMEMBERED_ISSUES, Absorbed, Answered, EventCore, Executed, Refused
+from robot_bridge.event_core import MAX_REMEMBERED_ISSUES, Absorbed, Answered, EventCore, Executed, Refused, draw_nonce
 from robot_bridge.protocol.messages import StopState
 from robot_bridge.protocol.serial import MAX_EVENT, event_after
-from tests.robot_bridge.core_helpers import AXES, MAX_AGE, MEASURED, NEUTRAL, command, core_at, reason
+from robot_bridge.stop_latch import ResetNeedless, ResetRefused, ResetTaken, StopGiven
+from tests.robot_bridge.core_helpers import (
+    AXES,
+    MAX_AGE,
+    MEASURED,
+    NEUTRAL,
+    NONCE,
+    command,
+    core_at,
+    fresh_core,
+    reason,
+)
 
 ANY_START = pytest.mark.parametrize("start", [1, 2, 1000, MAX_EVENT - 1, MAX_EVENT])
 
@@ -146,14 +157,14 @@ def test_anything_but_one_value_per_axis_is_refused(values: list[float]) -> None
 
 def test_bad_values_are_refused_before_anything_else_is_said() -> None:
     core = core_at()
-    core.stop("Ada", "")
+    core.stop("", "Ada", "", 90.0)
     assert reason(core.command(command(2, values=[math.nan, 0.0]), 100.0)) == "not_a_number"
     assert reason(core.command(command(2, values=[]), 100.0)) == "wrong_size"
 
 
 def test_while_stopped_every_command_is_refused_neutral_and_repeated_ones_too() -> None:
     core = core_at()
-    assert core.stop("Ada", "smoke")
+    core.stop("", "Ada", "smoke", 90.0)
     for event, values in ((1, None), (2, None), (2, NEUTRAL), (7, None)):
         outcome = core.command(command(event, values=values), 100.0)
         assert isinstance(outcome, Refused)
@@ -162,41 +173,134 @@ def test_while_stopped_every_command_is_refused_neutral_and_repeated_ones_too() 
 
 def test_the_stop_is_in_every_feedback_and_causes_one_at_once() -> None:
     core = core_at()
-    core.stop("Ada", "smoke")
+    core.stop("ab12", "Ada", "smoke", 100.0)
     assert core.issue_due(100.0)
-    assert core.issue(MEASURED, 100.0).stop == StopState(stopped=True, by="Ada", reason="smoke")
-    assert core.stop_state.stopped
+    told = core.issue(MEASURED, 100.0).stop
+    assert told == StopState(stopped=True, by="Ada", reason="smoke", number=1, press="ab12", kept=False)
+    assert core.stop_state == told
 
 
-def test_a_second_stop_changes_nothing() -> None:
+def test_a_second_stop_has_a_number_of_its_own_and_leaves_the_first_reason() -> None:
     core = core_at()
-    core.stop("Ada", "smoke")
-    assert not core.stop("Bob", "fire")
-    assert core.stop_state.by == "Ada"
+    assert core.stop("", "Ada", "smoke", 100.0) == StopGiven(1, is_new=True, latched=True)
+    core.issue(MEASURED, 100.0)
+    assert core.stop("", "Bob", "fire", 100.1) == StopGiven(2, is_new=True, latched=False)
+    assert core.issue_due(100.1)
+    assert (core.stop_state.by, core.stop_state.reason, core.stop_state.number) == ("Ada", "smoke", 2)
+
+
+def test_a_repeat_of_a_press_changes_nothing() -> None:
+    core = core_at()
+    core.stop("ab12", "Ada", "smoke", 100.0)
+    core.issue(MEASURED, 100.0)
+    assert core.stop("ab12", "Ada", "smoke", 100.1) == StopGiven(1, is_new=False, latched=False)
+    assert not core.issue_due(100.1)
 
 
 def test_an_event_that_was_pending_at_the_stop_still_gets_its_feedback() -> None:
     core = core_at()
     core.command(command(2), 100.0)
-    core.stop("Ada", "")
+    core.stop("", "Ada", "", 100.0)
     feedback = core.issue(MEASURED, 100.0)
     assert (feedback.event, feedback.stop.stopped) == (2, True)
 
 
-def test_reset_releases_the_stop_and_causes_an_issue() -> None:
+def test_reset_releases_the_stop_causes_an_issue_and_moves_nothing_before_a_neutral_command() -> None:
     core = core_at()
-    core.stop("Ada", "")
+    core.stop("", "Ada", "", 100.0)
     core.issue(MEASURED, 100.0)
-    assert core.reset()
-    assert core.issue_due(100.0)
-    assert core.issue(MEASURED, 100.0).stop == StopState()
-    assert reason(core.command(command(2, issue=3), 100.0)) == "executed"
+    assert core.reset(1, 101.0) == ResetTaken(1)
+    assert core.issue_due(101.0)
+    feedback = core.issue(MEASURED, 101.0)
+    assert (feedback.stop.stopped, feedback.stop.number, feedback.neutral_needed) == (False, 1, True)
+    assert reason(core.command(command(2, issue=3), 101.0)) == "not_neutral"
+    assert reason(core.command(command(2, issue=3, values=NEUTRAL), 101.0)) == "executed"
+    assert not core.issue(MEASURED, 101.0).neutral_needed
+    assert reason(core.command(command(3), 101.0)) == "executed"
+
+
+def test_a_stop_that_no_feedback_has_shown_cannot_be_reset() -> None:
+    core = core_at()
+    core.stop("", "Ada", "", 100.0)
+    outcome = core.reset(1, 200.0)
+    assert isinstance(outcome, ResetRefused)
+    assert outcome.reason == "too_soon"
+    core.issue(MEASURED, 200.0)
+    assert core.reset(1, 200.0) == ResetTaken(1)
 
 
 def test_reset_without_a_stop_changes_nothing() -> None:
     core = core_at()
-    assert not core.reset()
+    assert core.reset(0, 100.0) == ResetNeedless(0)
     assert not core.issue_due(100.0)
+
+
+def test_a_robot_that_was_never_told_a_neutral_command_does_not_move() -> None:
+    core = fresh_core()
+    assert core.feedback is not None
+    assert core.feedback.neutral_needed
+    assert reason(core.command(command(2), 100.0)) == "not_neutral"
+    assert core.pending is None
+
+
+@pytest.mark.parametrize("cause", ["need_neutral", "lock_out", "let_in", "stop"])
+def test_whatever_asks_for_a_neutral_command_is_fed_back_at_once(cause: str) -> None:
+    core = core_at()
+    if cause == "let_in":
+        core.lock_out("key switch", 100.0)
+        core.issue(MEASURED, 100.0)
+    match cause:
+        case "need_neutral":
+            core.need_neutral()
+        case "lock_out":
+            core.lock_out("key switch", 100.0)
+        case "let_in":
+            core.let_in()
+        case _:
+            core.stop("", "Ada", "", 100.0)
+    assert core.neutral_needed
+    assert core.issue_due(100.0)
+    assert core.issue(MEASURED, 100.0).neutral_needed
+
+
+def test_a_neutral_command_decided_before_the_cause_executes_and_clears_nothing() -> None:
+    core = core_at()
+    core.need_neutral()
+    assert reason(core.command(command(2, values=NEUTRAL), 100.0)) == "executed"
+    assert core.issue(MEASURED, 100.0).neutral_needed
+    assert reason(core.command(command(3, values=NEUTRAL), 100.0)) == "executed"
+    assert not core.issue(MEASURED, 100.0).neutral_needed
+
+
+def test_a_neutral_command_that_is_refused_clears_nothing() -> None:
+    core = fresh_core()
+    assert reason(core.command(command(3, values=NEUTRAL), 100.0)) == "out_of_order"
+    assert reason(core.command(command(2, values=NEUTRAL), 110.0)) == "late"
+    assert core.neutral_needed
+
+
+@pytest.mark.parametrize("nonce", [0, NONCE + 1, 2**53 - 1])
+def test_a_command_that_does_not_name_its_issues_nonce_is_refused_neutral_ones_too(nonce: int) -> None:
+    core = core_at()
+    assert reason(core.command(command(2, nonce=nonce), 100.0)) == "unseen"
+    assert reason(core.command(command(2, nonce=nonce, values=NEUTRAL), 100.0)) == "unseen"
+
+
+def test_the_nonce_belongs_to_the_issue_that_the_command_names() -> None:
+    drawn = iter(range(1, 100))
+    core = EventCore(AXES, max_event_age=MAX_AGE, nonces=lambda: next(drawn))
+    first, second = core.issue(MEASURED, 100.0), core.issue(MEASURED, 100.1)
+    assert (first.nonce, second.nonce) == (1, 2)
+    assert reason(core.command(command(2, issue=1, nonce=2, values=NEUTRAL), 100.2)) == "unseen"
+    assert reason(core.command(command(2, issue=1, nonce=1, values=NEUTRAL), 100.2)) == "executed"
+
+
+def test_a_drawn_nonce_is_never_that_of_a_command_without_one() -> None:
+    assert all(0 < draw_nonce() < 2**53 for _ in range(1000))
+
+
+def test_a_late_command_is_called_late_whatever_nonce_it_names() -> None:
+    assert reason(core_at().command(command(2, nonce=0), 110.0)) == "late"
 
 
 @ANY_START

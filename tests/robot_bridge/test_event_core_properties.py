@@ -32,7 +32,8 @@ class BridgeLife(RuleBasedStateMachine):
     @rule(back=st.integers(0, 5), moves=values)
     def a_client_answers_a_feedback(self, back: int, moves: list[float]) -> None:
         answered = self.seen[-1 - min(back, len(self.seen) - 1)]
-        self.sent.append(Command(event=event_after(answered.event), issue=answered.issue, values=moves))
+        event, issue = event_after(answered.event), answered.issue
+        self.sent.append(Command(event=event, issue=issue, values=moves, nonce=answered.nonce))
 
     @rule(event=st.integers(1, MAX_EVENT), issue=st.integers(1, 20), moves=values)
     def a_client_makes_something_up(self, event: int, issue: int, moves: list[float]) -> None:
@@ -78,15 +79,16 @@ class BridgeLife(RuleBasedStateMachine):
 
     @rule()
     def somebody_stops(self) -> None:
-        self.core.stop("someone", "")
+        self.core.stop("", "someone", "", self.now)
 
     @rule()
     def somebody_resets(self) -> None:
-        self.core.reset()
+        self.core.reset(self.core.stop_state.number, self.now)
 
     @rule(copies=st.integers(2, 4), moves=values)
     def the_network_freezes_a_command_and_its_copies(self, copies: int, moves: list[float]) -> None:
-        frozen = Command(event=event_after(self.seen[-1].event), issue=self.seen[-1].issue, values=moves)
+        newest = self.seen[-1]
+        frozen = Command(event=event_after(newest.event), issue=newest.issue, values=moves, nonce=newest.nonce)
         self.now += 10.0
         for _ in range(copies):
             assert reason(self.core.command(frozen, self.now)) not in ("executed",), "a frozen copy executed"

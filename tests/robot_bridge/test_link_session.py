@@ -102,7 +102,7 @@ def test_a_bridge_that_does_not_admit_says_why_and_ends() -> None:
         (Ping(id=1), "handshake"),
         (Stop(), "handshake"),
         (Command(event=2, issue=1, values=[]), "handshake"),
-        (Hello(role="operator", version=2), "version"),
+        (Hello(role="operator", version=1), "version"),
         (Hello(role="robot"), "role"),
     ],
 )

@@ -29,7 +29,7 @@ async def drive(peer: TestPeer, values: list[float], count: int = 1) -> Feedback
     for _ in range(count):
         known = peer.newest_feedback()
         following = event_after(known.event)
-        peer.send("control", Command(event=following, issue=known.issue, values=values))
+        peer.send("control", Command(event=following, issue=known.issue, nonce=known.nonce, values=values))
         await peer.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
     return peer.newest_feedback()
 

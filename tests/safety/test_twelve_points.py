@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 import httpx
+import msgspec
 import pytest
 
 import robot_bridge
@@ -33,6 +34,7 @@ from robot_bridge.protocol.messages import (
 )
 from robot_bridge.protocol.serial import event_after
 from robot_bridge.robots.planar.description import DESCRIPTION
+from robot_bridge.stop_latch import LEAST_STOP
 from tests.robot_bridge.bridge_helpers import (
     DRIVE,
     NEUTRAL,
@@ -119,7 +121,11 @@ async def test_point_04_malformed_input_does_not_keep_the_robot_moving() -> None
     robot = RecordingRobot()
     async with running_bridge(robot) as bridge, raw_link(bridge, "operator") as link:
         feedback = await link.find(Feedback)
-        link.send(Command(event=event_after(feedback.event), issue=feedback.issue, values=DRIVE))
+        for values in (NEUTRAL, DRIVE):
+            following = event_after(feedback.event)
+            link.send(Command(event=following, issue=feedback.issue, nonce=feedback.nonce, values=values))
+            while feedback.event != following:
+                feedback = await link.find(Feedback)
         while (message := await link.next()) is not None and not isinstance(message, Goodbye):
             link.writer.write(frame(b"\xc1nonsense"))
         assert robot.applied[-1][1] == NEUTRAL
@@ -147,8 +153,7 @@ async def test_point_06_trips_latch_and_reset_moves_nothing() -> None:
         driver.link.send(Stop(by="test", reason="trip"))
         await driver.heard(lambda feedback: feedback.stop.stopped and feedback.at_rest)
         assert (await driver.refused(driver.command())).reason == "stopped"
-        driver.link.send(Reset(by="test"))
-        await driver.heard(lambda feedback: not feedback.stop.stopped)
+        await driver.reset()
         since = len(robot.applied)
         await robot.until(lambda: len(robot.applied) > since + 20, "the robot ticks on")
         assert all(values == NEUTRAL for _, values in robot.applied[since:])
@@ -197,6 +202,10 @@ BRIDGE_REASONS: list[RefusalReason] = [
     "wrong_size",
     "malformed",
     "not_allowed",
+    "unseen",
+    "not_neutral",
+    "stale_reset",
+    "too_soon",
 ]
 
 
@@ -211,7 +220,8 @@ async def test_point_10_every_refusal_is_told_counted_and_recorded(tmp_path: Pat
         told.append((await driver.refused(Command(event=following, issue=1, values=[1.0]))).reason)
         told.append((await driver.refused(Command(event=following, issue=1, values=[float("nan")] * 3))).reason)
         driver.link.send(Rest(event=following))
-        told.append((await driver.refused(Command(event=following, issue=driver.feedback.issue, values=DRIVE))).reason)
+        told.append((await driver.refused(driver.command())).reason)
+        told.append((await driver.refused(msgspec.structs.replace(driver.command(), nonce=0))).reason)
         async with raw_link(bridge, "media") as other:
             other.send(Command(event=following, issue=1, values=DRIVE))
             told.append((await other.find(Refusal)).reason)
@@ -219,6 +229,13 @@ async def test_point_10_every_refusal_is_told_counted_and_recorded(tmp_path: Pat
             told.append((await other.find(Refusal)).reason)
         driver.link.send(Stop(reason="test"))
         await driver.heard(lambda feedback: feedback.stop.stopped)
+        stopped_at = driver.feedback.time
+        told.append((await driver.refused(driver.command())).reason)
+        told.append((await driver.refused(Reset(number=driver.feedback.stop.number - 1))).reason)
+        told.append((await driver.refused(Reset(number=driver.feedback.stop.number))).reason)
+        await driver.heard(lambda feedback: feedback.time - stopped_at > LEAST_STOP)
+        driver.link.send(Reset(number=driver.feedback.stop.number))
+        await driver.heard(lambda feedback: not feedback.stop.stopped)
         told.append((await driver.refused(driver.command())).reason)
         assert sorted(told) == sorted(BRIDGE_REASONS)
         assert dict(bridge.counters.refusals) == dict.fromkeys(BRIDGE_REASONS, 1)

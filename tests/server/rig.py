@@ -15,7 +15,7 @@ from fastapi import FastAPI
 from robot_bridge.bridge import Bridge
 from robot_bridge.protocol.console import ClientMessage, Role, ServerMessage, decode_server_message
 from robot_bridge.protocol.console import encode_console_message as encode
-from robot_bridge.protocol.messages import Feedback
+from robot_bridge.protocol.messages import Feedback, StopState
 from robot_bridge.robots.registry import create_robot
 from robot_bridge.settings import BridgeSettings
 from server.access import Access
@@ -28,7 +28,17 @@ from server.state import open_state
 from server.tls import Certificate
 from server.webrtc_peer import WebRtcPeer
 
-__all__ = ["PATIENCE", "Rig", "TestPeer", "eventually", "running_bridge", "running_console", "running_rig"]
+__all__ = [
+    "PATIENCE",
+    "Rig",
+    "TestPeer",
+    "eventually",
+    "reset_by_http",
+    "running_bridge",
+    "running_console",
+    "running_rig",
+    "stop_words",
+]
 
 PATIENCE = 10.0  # s; a busy machine, never waited for in full
 
@@ -160,6 +170,21 @@ async def eventually(state: Callable[[], bool]) -> None:
     async with asyncio.timeout(PATIENCE):
         while not state():  # noqa: ASYNC110
             await asyncio.sleep(0.01)
+
+
+def stop_words(stop: StopState) -> tuple[str, str] | None:
+    """Who stopped and why; None while nothing is stopped."""
+    return (stop.by, stop.reason) if stop.stopped else None
+
+
+async def reset_by_http(
+    http: httpx.AsyncClient, path: str, headers: dict[str, str], stop: Callable[[], StopState]
+) -> None:
+    """Reset until the stop is released: the bridge takes none within a second of it."""
+    async with asyncio.timeout(PATIENCE):
+        while stop().stopped:
+            await http.post(path, headers=headers)
+            await asyncio.sleep(0.1)
 
 
 @asynccontextmanager

@@ -30,7 +30,7 @@ async def test_a_console_that_ends_with_peers_connected_ends_them_and_rests_the_
                 for speed in (0.0, 0.2):
                     now, values = driver.newest_feedback(), [speed] + [0.0] * (len(now.axes) - 1)
                     following = event_after(now.event)
-                    driver.send("control", Command(event=following, issue=now.issue, values=values))
+                    driver.send("control", Command(event=following, issue=now.issue, nonce=now.nonce, values=values))
                     await driver.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
             async with asyncio.timeout(PATIENCE):
                 for peer in peers:

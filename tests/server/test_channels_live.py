@@ -29,6 +29,13 @@ async def _id(peer: TestPeer) -> str:
     return welcome.peer
 
 
+async def _reset_again(peer: TestPeer, number: int) -> None:
+    """A bridge takes no reset within a second of a stop."""
+    while True:
+        peer.send("stop", Reset(number=number))
+        await asyncio.sleep(0.3)
+
+
 async def _take_seat(peer: TestPeer) -> None:
     """And send the neutral command that has to come first."""
     mine = await _id(peer)
@@ -43,7 +50,10 @@ async def _drive(peer: TestPeer, value: float, count: int = 1) -> Feedback:
     for _ in range(count):
         now = peer.newest_feedback()
         following = event_after(now.event)
-        peer.send("control", Command(event=following, issue=now.issue, values=[value] + [0.0] * (len(now.axes) - 1)))
+        peer.send(
+            "control",
+            Command(event=following, issue=now.issue, nonce=now.nonce, values=[value] + [0.0] * (len(now.axes) - 1)),
+        )
         await peer.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
     return peer.newest_feedback()
 
@@ -95,7 +105,9 @@ async def test_a_repeat_of_the_current_event_is_answered_again_and_executes_noth
         await _take_seat(peer)
         last = await _drive(peer, 0.0)
         peer.heard.clear()
-        peer.send("control", Command(event=last.event, issue=last.issue, values=[1.0] * len(last.axes)))
+        peer.send(
+            "control", Command(event=last.event, issue=last.issue, nonce=last.nonce, values=[1.0] * len(last.axes))
+        )
         await peer.feedback(lambda each: each.event == last.event)
         assert rig.count("lockstep_commands_total", outcome="answer") == 1
         assert (await rig.session())["event"] == last.event
@@ -124,7 +136,10 @@ async def test_a_second_operator_gets_the_seat_only_when_it_is_given_back() -> N
 async def test_an_observer_cannot_command_nor_rest_nor_take_the_seat_nor_reset() -> None:
     async with running_rig() as rig, rig.peer("observer") as peer:
         now = await peer.feedback()
-        peer.send("control", Command(event=event_after(now.event), issue=now.issue, values=[0.0] * len(now.axes)))
+        peer.send(
+            "control",
+            Command(event=event_after(now.event), issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes)),
+        )
         refusal = await _refused(peer, "no_seat")
         assert (refusal.event, refusal.current) == (event_after(now.event), now.event)
         peer.send("control", Rest(event=now.event))
@@ -148,10 +163,14 @@ async def test_an_observer_can_stop_from_any_channel_and_everyone_hears_it(chann
             await each.until(lambda heard: isinstance(heard, StopStateNotice) and heard.stop.stopped)
         now = await driver.feedback(lambda each: each.stop.stopped)
         assert (now.stop.by, now.stop.reason) == ("observer", "dog")
-        driver.send("control", Command(event=event_after(now.event), issue=now.issue, values=[0.0] * len(now.axes)))
+        driver.send(
+            "control",
+            Command(event=event_after(now.event), issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes)),
+        )
         await _refused(driver, "stopped")
-        driver.send("stop", Reset())
+        asked = asyncio.get_running_loop().create_task(_reset_again(driver, now.stop.number))
         await peer.until(lambda heard: isinstance(heard, StopStateNotice) and not heard.stop.stopped)
+        asked.cancel()
         assert rig.count("lockstep_stops_total", where=channel) == 1
 
 

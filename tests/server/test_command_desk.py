@@ -231,7 +231,7 @@ def test_a_flood_of_stops_is_absorbed_but_never_across_a_reset() -> None:
     desk = Bench().desk
     desk.stop("any", "", 0.0)
     assert desk.stop("any", "", STOP_REPEAT / 2) == Absorbed()
-    assert desk.reset("me") == Forward(Reset(by="me"))
+    assert desk.reset("me", 1) == Forward(Reset(by="me", number=1))
     assert desk.stop("any", "", STOP_REPEAT / 2) == Forward(Stop(by="any"))
     assert desk.stop("any", "", STOP_REPEAT * 2) == Forward(Stop(by="any"))
 
@@ -263,7 +263,7 @@ def test_a_bridge_that_starts_anew_is_stopped_again_if_the_last_one_was() -> Non
     assert isinstance(bench.desk.link_up(ROBOT), Stop)
     bench.hear(_feedback(1, 1))
     assert _reason(bench.desk.command("me", _command(2))) == "stopped"
-    bench.desk.reset("me")
+    bench.desk.reset("me", 1)
     assert bench.desk.command("me", _command(2)) == Forward(_command(2))
 
 
@@ -274,7 +274,7 @@ def test_what_is_latched_is_the_stop_that_holds_or_is_still_to_arrive() -> None:
     latched.append(bench.desk.latched)
     bench.hear(_feedback(7, 2, stopped=True))
     latched.append(bench.desk.latched)
-    bench.desk.reset("me")
+    bench.desk.reset("me", 1)
     bench.hear(_feedback(7, 3))
     latched.append(bench.desk.latched)
     as_the_robot_says = Stop(by="", reason="")
@@ -284,13 +284,13 @@ def test_what_is_latched_is_the_stop_that_holds_or_is_still_to_arrive() -> None:
 def test_a_stop_that_was_reset_before_any_feedback_showed_it_is_over() -> None:
     bench = Bench()
     bench.desk.stop("any", "", 0.0)
-    bench.desk.reset("me")
+    bench.desk.reset("me", 1)
     bench.hear(_feedback(7, 2))
     assert bench.desk.command("me", _command(8)) == Forward(_command(8))
 
 
 def test_a_reset_needs_the_link() -> None:
-    assert _reason(Bench(up=False).desk.reset("me")) == "link_down"
+    assert _reason(Bench(up=False).desk.reset("me", 1)) == "link_down"
 
 
 class DeskMachine(RuleBasedStateMachine):

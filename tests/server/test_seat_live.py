@@ -88,7 +88,7 @@ async def test_who_drives_is_not_idle() -> None:
         while loop.time() - begun < 1.6:
             now = driver.newest_feedback()
             following, values = event_after(now.event), [moving] + [0.0] * (len(now.axes) - 1)
-            driver.send("control", Command(event=following, issue=now.issue, values=values))
+            driver.send("control", Command(event=following, issue=now.issue, nonce=now.nonce, values=values))
             await driver.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
             moving = 0.1
         assert rig.services.console.seat.rules.holder == await _id(driver)
@@ -100,9 +100,12 @@ async def test_a_moving_command_of_a_new_driver_is_refused_until_a_neutral_one_c
         await _seat(driver, why="taken")
         now = await driver.feedback()
         following = event_after(now.event)
-        driver.send("control", Command(event=following, issue=now.issue, values=[0.2] + [0.0] * (len(now.axes) - 1)))
+        driver.send(
+            "control",
+            Command(event=following, issue=now.issue, nonce=now.nonce, values=[0.2] + [0.0] * (len(now.axes) - 1)),
+        )
         assert (await _refused(driver, "not_neutral")).event == following
-        driver.send("control", Command(event=following, issue=now.issue, values=[0.0] * len(now.axes)))
+        driver.send("control", Command(event=following, issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes)))
         await driver.feedback(lambda each: each.event == following)
         assert rig.count("lockstep_refusals_total", reason="not_neutral") == 1
 
@@ -186,7 +189,9 @@ async def test_those_who_may_drive_get_every_feedback(role: str) -> None:
         for _ in range(20):
             now = driver.newest_feedback()
             following = event_after(now.event)
-            driver.send("control", Command(event=following, issue=now.issue, values=[0.0] * len(now.axes)))
+            driver.send(
+                "control", Command(event=following, issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes))
+            )
             await driver.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
         last = driver.newest_feedback().event
         await other.feedback(lambda each: each.event == last)

@@ -69,7 +69,11 @@ async def test_a_line_drives_nothing_resets_nothing_and_gets_no_seat() -> None:
     async with running_rig(**RELAYED) as rig, open_line(rig) as line:
         feedback = await line.until(lambda each: isinstance(each, Feedback))
         assert isinstance(feedback, Feedback)
-        await line.send(Command(event=feedback.event + 1, issue=feedback.issue, values=[0.1] * len(feedback.axes)))
+        await line.send(
+            Command(
+                event=feedback.event + 1, issue=feedback.issue, nonce=feedback.nonce, values=[0.1] * len(feedback.axes)
+            )
+        )
         await line.until(lambda each: isinstance(each, Refusal) and each.reason == "no_seat")
         await line.send(SeatRequest())
         await line.until(lambda each: isinstance(each, Refusal) and each.reason == "not_allowed")

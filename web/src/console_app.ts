@@ -179,7 +179,7 @@ export class ConsoleApp {
   }
 
   reset(): void {
-    this.connection.send("stop", JSON.stringify({ type: "reset", by: "" }));
+    this.connection.send("stop", JSON.stringify({ type: "reset", by: "", number: this.state.stop.number }));
   }
 
   nextLayer(): void {

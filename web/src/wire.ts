@@ -246,7 +246,7 @@ export interface RecordingState {
 export interface Refusal {
   readonly type: "refusal";
   readonly event: number;
-  readonly reason: "declined" | "late" | "link_down" | "locked_out" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "not_neutral" | "out_of_order" | "rested" | "seat_taken" | "silenced" | "stale_reset" | "stopped" | "too_often" | "too_soon" | "unseen" | "warning" | "wrong_size";
+  readonly reason: "declined" | "late" | "link_down" | "locked_out" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "not_kept" | "not_neutral" | "out_of_order" | "rested" | "seat_taken" | "silenced" | "stale_reset" | "stopped" | "too_often" | "too_soon" | "unseen" | "warning" | "wrong_size";
   readonly current: number;
   readonly detail: string;
   readonly stop: number;
@@ -299,6 +299,7 @@ export interface RobotDescription {
   readonly geofences: readonly (Geofence)[];
   readonly force_feeling: ForceFeeling | null;
   readonly body_twists: readonly (BodyTwist)[];
+  readonly start_warning: StartWarning | null;
   readonly hold: number;
   readonly max_event_age: number;
   readonly max_event_rate: number;
@@ -402,6 +403,13 @@ export interface SpeedCapState {
   readonly share: number;
   readonly delay_ms: number | null;
   readonly why: "" | "delay" | "unknown";
+}
+
+/** A light or horn that warns people at the robot before its first motion. The bridge drives it. */
+export interface StartWarning {
+  readonly seconds: number;
+  readonly axis: string;
+  readonly value: number;
 }
 
 /** Latch the stop. Repeats of one press carry its id and are one stop. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 static const uint32_t LAST_EVENT = 0x7fffffff;
+static const double LEAST_STOP = 1.0; /* s between the newest stop and a reset */
 static const double REFRESH = 0.5; /* s between feedbacks while nothing is commanded */
 
 static uint32_t event_after(uint32_t event) { return event == LAST_EVENT ? 1 : event + 1; }
@@ -15,20 +16,21 @@ static int64_t event_gap(uint32_t a, uint32_t b) {
     return ((shifted % whole) + whole) % whole - half;
 }
 
-void events_begin(events *of) {
+void events_begin(events *of, uint64_t numbers_after) {
     memset(of, 0, sizeof *of);
     of->current = 1;
-    of->wanted = true;
+    of->wanted = of->neutral_needed = true;
+    of->last_number = numbers_after;
     of->deadline = -INFINITY;
 }
 
 static bool known_and_fresh(const events *of, uint64_t issue, double now) {
     if (issue < 1 || issue > of->issue || of->issue - issue >= ISSUES) return false;
-    return now - of->issued[issue % ISSUES] <= MAX_EVENT_AGE;
+    return now - of->issues[issue % ISSUES].time <= MAX_EVENT_AGE;
 }
 
-verdict events_command(events *of, uint32_t event, uint64_t issue, const double *values, size_t count, double now,
-                       const char **reason) {
+verdict events_command(events *of, uint32_t event, uint64_t issue, uint64_t nonce, const double *values, size_t count,
+                       double now, const char **reason) {
     bool moving = false;
     *reason = "wrong_size";
     if (count != AXES) return REFUSED;
@@ -48,8 +50,14 @@ verdict events_command(events *of, uint32_t event, uint64_t issue, const double 
         of->wanted = true;
         return REFUSED;
     }
+    *reason = "unseen";
+    const issued *answered = &of->issues[issue % ISSUES];
+    if (nonce != answered->nonce) return REFUSED;
     *reason = "rested";
     if (moving && of->rested != 0 && event_gap(event, of->rested) <= 0) return REFUSED;
+    *reason = "not_neutral";
+    if (moving && of->neutral_needed) return REFUSED;
+    if (answered->spell == of->spell) of->neutral_needed = false;
     of->pending = event;
     of->rested = 0;
     for (size_t i = 0; i < AXES; i++) of->targets[i] = fmin(fmax(values[i], -FASTEST[i]), FASTEST[i]);
@@ -68,21 +76,49 @@ bool events_rest(events *of, uint32_t event) {
     return true;
 }
 
-bool events_stop(events *of, const char *by, const char *reason) {
-    if (of->stopped) return false;
-    of->stopped = of->wanted = true;
-    strcpy(of->stopped_by, by);
-    strcpy(of->stop_reason, reason);
-    events_come_to_rest(of);
-    return true;
+static uint64_t number_of(const events *of, const char *press) {
+    uint32_t known = of->pressed < PRESSES ? of->pressed : PRESSES;
+    for (uint32_t i = 0; i < known; i++)
+        if (strcmp(of->presses[i].id, press) == 0) return of->presses[i].number;
+    return 0;
 }
 
-bool events_reset(events *of) {
-    if (!of->stopped) return false;
+uint64_t events_stop(events *of, const char *press, const char *by, const char *reason, double now, bool *is_new) {
+    uint64_t known = press[0] == '\0' ? 0 : number_of(of, press);
+    *is_new = known == 0;
+    if (known != 0) return known;
+    of->number = ++of->last_number;
+    if (press[0] != '\0') {
+        strcpy(of->presses[of->pressed % PRESSES].id, press);
+        of->presses[of->pressed++ % PRESSES].number = of->number;
+    }
+    if (!of->stopped) {
+        strcpy(of->stopped_by, by);
+        strcpy(of->stop_reason, reason);
+    }
+    strcpy(of->press, press);
+    of->stopped = true;
+    of->stopped_at = now;
+    events_need_neutral(of);
+    return of->number;
+}
+
+const char *events_reset(events *of, uint64_t number, double now, bool *released) {
+    *released = false;
+    if (number != of->number) return "stale_reset";
+    if (!of->stopped) return NULL;
+    if (now - of->stopped_at < LEAST_STOP || of->shown < of->number) return "too_soon";
     of->stopped = false;
-    of->wanted = true;
     of->stopped_by[0] = of->stop_reason[0] = '\0';
-    return true;
+    events_need_neutral(of);
+    *released = true;
+    return NULL;
+}
+
+void events_need_neutral(events *of) {
+    of->neutral_needed = of->wanted = true;
+    of->spell++;
+    events_come_to_rest(of);
 }
 
 void events_come_to_rest(events *of) { of->driven = false; }
@@ -109,16 +145,17 @@ bool events_at_rest(const events *of) {
 }
 
 bool events_issue_due(const events *of, double now) {
-    return of->pending != 0 || of->wanted || now - of->issued[of->issue % ISSUES] >= REFRESH;
+    return of->pending != 0 || of->wanted || now - of->issues[of->issue % ISSUES].time >= REFRESH;
 }
 
-void events_issue(events *of, double now) {
+void events_issue(events *of, double now, uint64_t nonce) {
     if (of->pending != 0) {
         of->current = of->pending;
         of->pending = 0;
         of->issue = 0;
     }
     of->issue++;
-    of->issued[of->issue % ISSUES] = now;
+    of->issues[of->issue % ISSUES] = (issued){now, nonce, of->spell};
+    if (of->stopped) of->shown = of->number;
     of->wanted = false;
 }

@@ -16,7 +16,7 @@ static const double PING_INTERVAL = 0.2, SILENCE = 1.0, HELLO_TIMEOUT = 2.0, STA
 static const size_t MAX_HELLO = 8 << 10, MAX_CONTROL = 1 << 20;
 
 /* What may wait for a client, in the order in which it goes out: the newest of each. */
-enum { W_HELLO, W_PONG, W_PING, W_REFUSAL, W_NEWS, WAITING };
+enum { W_HELLO, W_PONG, W_PING, W_TAKEN, W_REFUSAL, W_NEWS, WAITING };
 
 struct peer {
     int fd;                  /* -1: free */
@@ -93,7 +93,7 @@ static void send_hello(peer *of) {
     pack_str(&frame, "type");
     pack_str(&frame, "hello");
     pack_str(&frame, "version");
-    pack_int(&frame, 1);
+    pack_int(&frame, 2);
     pack_str(&frame, "role");
     pack_str(&frame, "robot");
     pack_str(&frame, "name");
@@ -108,10 +108,10 @@ static void send_hello(peer *of) {
     release(&frame);
 }
 
-void send_refusal(peer *to, uint32_t event, const char *reason, uint32_t current) {
+void send_refusal(peer *to, uint32_t event, const char *reason, uint32_t current, uint64_t stop) {
     buffer frame = {0};
     size_t begun = begin_frame(&frame);
-    pack_map(&frame, 4);
+    pack_map(&frame, 5);
     pack_str(&frame, "type");
     pack_str(&frame, "refusal");
     pack_str(&frame, "event");
@@ -120,8 +120,27 @@ void send_refusal(peer *to, uint32_t event, const char *reason, uint32_t current
     pack_str(&frame, reason);
     pack_str(&frame, "current");
     pack_int(&frame, current);
+    pack_str(&frame, "stop");
+    pack_int(&frame, (int64_t)stop);
     end_frame(&frame, begun);
     wait_with(to, W_REFUSAL, &frame);
+    release(&frame);
+}
+
+void send_stop_taken(peer *to, const char *press, uint64_t number, bool kept) {
+    buffer frame = {0};
+    size_t begun = begin_frame(&frame);
+    pack_map(&frame, 4);
+    pack_str(&frame, "type");
+    pack_str(&frame, "stop_taken");
+    pack_str(&frame, "press");
+    pack_str(&frame, press);
+    pack_str(&frame, "number");
+    pack_int(&frame, (int64_t)number);
+    pack_str(&frame, "kept");
+    pack_bool(&frame, kept);
+    end_frame(&frame, begun);
+    wait_with(to, W_TAKEN, &frame);
     release(&frame);
 }
 

@@ -22,7 +22,9 @@ bool links_listen(int *port, const handler *to, const char *epoch);
 void links_serve(double timeout, double (*now)(void));
 void links_close(double (*now)(void));
 
-void send_refusal(peer *to, uint32_t event, const char *reason, uint32_t current);
+/* `stop`: that a refused reset named; 0 for anything else. */
+void send_refusal(peer *to, uint32_t event, const char *reason, uint32_t current, uint64_t stop);
+void send_stop_taken(peer *to, const char *press, uint64_t number, bool kept);
 /* A frame for one peer, or for all of a role; it takes the place of an older one that still waits. */
 void send_feedback(peer *to, const buffer *frame);
 void publish(role to, const buffer *frame);

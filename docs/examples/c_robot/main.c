@@ -38,17 +38,33 @@ static double now(void) {
     return (double)time.tv_sec + (double)time.tv_nsec / 1e9;
 }
 
+/* 64 random bits. Without them a nonce proves nothing: the robot comes to rest and the program ends. */
+static uint64_t draw(void) {
+    static FILE *random;
+    uint64_t drawn = 0;
+    if (random == NULL) random = fopen("/dev/urandom", "rb");
+    if (random == NULL || fread(&drawn, sizeof drawn, 1, random) != 1) ending = 1;
+    return drawn;
+}
+
+/* A stop of the run before has a smaller number, as long as the clock does not go back: this robot keeps none. */
+static uint64_t numbers_after(void) {
+    struct timespec time;
+    clock_gettime(CLOCK_REALTIME, &time);
+    return (uint64_t)time.tv_sec * 1000000 + (uint64_t)time.tv_nsec / 1000;
+}
+
 static void numbers_field(const char *key, const double *numbers, uint32_t count) {
     pack_str(&feedback, key);
     pack_array(&feedback, count);
     for (uint32_t i = 0; i < count; i++) pack_float(&feedback, numbers[i]);
 }
 
-static void pack_feedback(double time, bool at_rest) {
+static void pack_feedback(double time, uint64_t nonce, bool at_rest) {
     double wrench[6] = {carriage.force[0], carriage.force[1]};
     feedback.size = 0;
     size_t begun = begin_frame(&feedback);
-    pack_map(&feedback, 9);
+    pack_map(&feedback, 11);
     pack_str(&feedback, "type");
     pack_str(&feedback, "feedback");
     pack_str(&feedback, "event");
@@ -63,13 +79,23 @@ static void pack_feedback(double time, bool at_rest) {
     pack_str(&feedback, "at_rest");
     pack_bool(&feedback, at_rest);
     pack_str(&feedback, "stop");
-    pack_map(&feedback, 3);
+    pack_map(&feedback, 6);
     pack_str(&feedback, "stopped");
     pack_bool(&feedback, event_core.stopped);
     pack_str(&feedback, "by");
     pack_str(&feedback, event_core.stopped_by);
     pack_str(&feedback, "reason");
     pack_str(&feedback, event_core.stop_reason);
+    pack_str(&feedback, "number");
+    pack_int(&feedback, (int64_t)event_core.number);
+    pack_str(&feedback, "press");
+    pack_str(&feedback, event_core.press);
+    pack_str(&feedback, "kept");
+    pack_bool(&feedback, false); /* this robot has no disk: a stop lasts as long as the program */
+    pack_str(&feedback, "nonce");
+    pack_int(&feedback, (int64_t)nonce);
+    pack_str(&feedback, "neutral_needed");
+    pack_bool(&feedback, event_core.neutral_needed);
     end_frame(&feedback, begun);
 }
 
@@ -91,9 +117,10 @@ static void publish_notice(double time) {
 /* Measures the robot: the answer to the pending command, or the current event again. */
 static void issue(void) {
     double time = now();
+    uint64_t nonce = 1 + draw() % ((UINT64_C(1) << 53) - 1); /* never that of a command without one */
     bool at_rest = events_at_rest(&event_core) && robot_at_rest(&carriage);
-    events_issue(&event_core, time);
-    pack_feedback(time, at_rest);
+    events_issue(&event_core, time, nonce);
+    pack_feedback(time, nonce, at_rest);
     log_feedback(time, event_core.current, event_core.issue, at_rest);
     publish(OPERATOR, &feedback);
     publish_notice(time);
@@ -141,13 +168,30 @@ static void tick(void) {
 
 static void refuse(peer *to, uint32_t event, const char *reason) {
     log_refused(now(), event, reason, event_core.current);
-    send_refusal(to, event, reason, event_core.current);
+    send_refusal(to, event, reason, event_core.current, 0);
+}
+
+static void stop(peer *from, const message *given) {
+    bool is_new;
+    uint64_t number = events_stop(&event_core, given->press, given->by, given->reason, now(), &is_new);
+    if (is_new) log_plain(now(), event_core.current, "stop");
+    send_stop_taken(from, given->press, number, false);
+}
+
+static void reset(peer *from, const message *given) {
+    bool released;
+    const char *reason = events_reset(&event_core, given->number, now(), &released);
+    if (released) log_plain(now(), event_core.current, "reset");
+    if (reason == NULL) return;
+    log_refused(now(), 0, reason, event_core.current);
+    send_refusal(from, 0, reason, event_core.current, given->number);
 }
 
 static void command(peer *from, const message *given) {
     const char *reason;
     double time = now();
-    switch (events_command(&event_core, given->event, given->issue, given->values, given->count, time, &reason)) {
+    switch (events_command(&event_core, given->event, given->issue, given->nonce, given->values, given->count, time,
+                           &reason)) {
     case EXECUTED: log_executed(time, given->event, given->issue, given->values, given->count); break;
     case REPEATED: send_feedback(from, &feedback); break;
     case ABSORBED: break;
@@ -156,6 +200,7 @@ static void command(peer *from, const message *given) {
 }
 
 static void on_opened(role who) {
+    if (who == OPERATOR) events_need_neutral(&event_core);
     if (who != MEDIA) event_core.wanted = true;
 }
 
@@ -163,12 +208,8 @@ static void on_said(peer *from, const message *given) {
     switch (given->type) {
     case COMMAND: command(from, given); break;
     case REST: log_rest(now(), given->event, events_rest(&event_core, given->event)); break;
-    case STOP:
-        if (events_stop(&event_core, given->by, given->reason)) log_plain(now(), event_core.current, "stop");
-        break;
-    case RESET:
-        if (events_reset(&event_core)) log_plain(now(), event_core.current, "reset");
-        break;
+    case STOP: stop(from, given); break;
+    case RESET: reset(from, given); break;
     default: break;
     }
 }
@@ -190,16 +231,6 @@ static void run(void) {
     }
 }
 
-static void draw_epoch(char epoch[17]) {
-    uint64_t drawn = (uint64_t)(now() * 1e9);
-    FILE *random = fopen("/dev/urandom", "rb");
-    if (random != NULL) {
-        if (fread(&drawn, sizeof drawn, 1, random) != 1) drawn ^= (uint64_t)time(NULL);
-        fclose(random);
-    }
-    snprintf(epoch, 17, "%016llx", (unsigned long long)drawn);
-}
-
 int main(int count, char **words) {
     static const handler ROBOT = {on_opened, on_said, refuse, on_operator_lost};
     struct sigaction action = {.sa_handler = end_soon};
@@ -217,8 +248,8 @@ int main(int count, char **words) {
     }
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
-    draw_epoch(epoch);
-    events_begin(&event_core);
+    snprintf(epoch, sizeof epoch, "%016llx", (unsigned long long)draw());
+    events_begin(&event_core, numbers_after());
     if (!links_listen(&port, &ROBOT, epoch)) return perror("cannot listen"), 1;
     log_start(now(), event_core.current, epoch);
     issue();

@@ -12,7 +12,7 @@ static const struct {
 } TYPES[] = {
     {"hello", HELLO, F_ROLE}, {"command", COMMAND, F_EVENT | F_ISSUE | F_VALUES}, {"rest", REST, F_EVENT},
     {"stop", STOP, 0}, {"reset", RESET, 0}, {"ping", PING, F_ID}, {"pong", PONG, F_ID}, {"goodbye", GOODBYE, F_ERROR},
-    {"challenge", OTHERS, 0}, {"feedback", OTHERS, 0}, {"refusal", OTHERS, 0}, {"event", OTHERS, 0}, {"media", OTHERS, 0},
+    {"challenge", OTHERS, 0}, {"stop_taken", OTHERS, 0}, {"feedback", OTHERS, 0}, {"refusal", OTHERS, 0}, {"event", OTHERS, 0}, {"media", OTHERS, 0},
 };
 
 static int find_type(const value *text) {
@@ -51,6 +51,20 @@ static bool read_values(reader *from, const value *array, message *found) {
     return true;
 }
 
+/* From 0 to 2^53 - 1: nonces and numbers of stops. */
+static bool read_number(const value *field, uint64_t *number) {
+    if (field->kind != INT || field->integer < 0 || field->integer >= INT64_C(1) << 53) return false;
+    *number = (uint64_t)field->integer;
+    return true;
+}
+
+/* Of a string that is UTF-8. */
+static size_t characters_of(const char *text) {
+    size_t count = 0;
+    for (; *text != '\0'; text++) count += (*text & 0xc0) != 0x80;
+    return count;
+}
+
 /* One field of a message of this type; `has` gets its bit. Fields that this type does not have are passed over. */
 static bool read_field(reader *from, const value *key, message *found, int *has) {
     message_type type = found->type;
@@ -58,7 +72,7 @@ static bool read_field(reader *from, const value *key, message *found, int *has)
     value field;
     if (!read_value(from, &field)) return false;
     if (is_text(key, "version") && type == HELLO) {
-        found->versioned = field.integer == 1;
+        found->versioned = field.integer == 2;
         return field.kind == INT;
     }
     if (is_text(key, "role") && type == HELLO) {
@@ -78,6 +92,13 @@ static bool read_field(reader *from, const value *key, message *found, int *has)
         found->issue = (uint64_t)field.integer;
         *has |= F_ISSUE;
         return field.kind == INT && field.integer >= 1;
+    }
+    if (is_text(key, "nonce") && type == COMMAND) return read_number(&field, &found->nonce);
+    if (is_text(key, "number") && type == RESET) return read_number(&field, &found->number);
+    if (is_text(key, "press") && type == STOP) {
+        bool good = copy_text(&field, text) && characters_of(text) <= 64;
+        if (good) strcpy(found->press, text);
+        return good;
     }
     if (is_text(key, "values") && type == COMMAND) {
         *has |= F_VALUES;

@@ -11,13 +11,16 @@ typedef enum { NO_ROLE, OPERATOR, EVENTS, MEDIA, ANOTHER_ROLE } role;
 
 typedef struct {
     message_type type;
-    bool versioned;        /* hello: speaks version 1 */
+    bool versioned;        /* hello: speaks version 2 */
     role role;             /* hello */
     uint32_t event;        /* command, rest */
     uint64_t issue;        /* command */
     double values[MAX_VALUES];
     size_t count;
+    uint64_t nonce;        /* command */
     char by[2001], reason[2001];
+    char press[257];       /* stop */
+    uint64_t number;       /* reset: of the newest stop that the sender has seen */
     int64_t id;            /* ping, pong */
 } message;
 

@@ -23,6 +23,7 @@ from robot_bridge.protocol.messages import (
     Reset,
     Rest,
     Stop,
+    StopTaken,
 )
 from robot_bridge.protocol.serial import MAX_EVENT, event_after
 from robot_bridge.robots.event_strip import read_event_strip
@@ -37,7 +38,7 @@ async def test_the_hello_describes_a_robot_that_makes_sense(robot: Robot) -> Non
         assert driver.link.hello.epoch
         assert len(driver.feedback.axes) == len(description_of(driver).axes)
         assert len(driver.feedback.joints) == len(description_of(driver).joints)
-        assert (driver.feedback.event, driver.feedback.at_rest) == (1, True)
+        assert (driver.feedback.event, driver.feedback.at_rest) == (2, True)
 
 
 async def test_the_event_subscriber_gets_notices_and_no_description(robot: Robot) -> None:
@@ -45,7 +46,7 @@ async def test_the_event_subscriber_gets_notices_and_no_description(robot: Robot
         link.send(Hello(role="events"))
         assert (await link.find(Hello)).description is None
         await driver.drive(moving(driver))
-        while (await link.find(EventNotice)).event != 2:
+        while (await link.find(EventNotice)).event != 3:
             pass
 
 
@@ -57,21 +58,21 @@ async def test_each_command_executes_once_and_a_repeat_gets_the_stored_feedback(
             driver.link.send(command)
             repeated = await driver.next(Feedback)
             assert repeated.event == fed_back.event
-        assert driver.feedback.event == 6
+        assert driver.feedback.event == 7
         assert driver.feedback.axes[0] > 0
     executed = await robot.records("executed")
-    assert [line["event"] for line in executed] == [2, 3, 4, 5, 6]
+    assert [line["event"] for line in executed] == [2, 3, 4, 5, 6, 7]
 
 
 async def test_copies_sent_at_once_execute_once(robot: Robot) -> None:
     async with operator(robot) as driver:
         for _ in range(5):
             driver.link.send(driver.command(moving(driver)))
-        while driver.feedback.event != 2:
+        while driver.feedback.event != 3:
             await driver.next(Feedback)
         await driver.drive(moving(driver))
     executed = await robot.records("executed")
-    assert [line["event"] for line in executed] == [2, 3]
+    assert [line["event"] for line in executed] == [2, 3, 4]
 
 
 def commands(feedback: Feedback, axes: int) -> Iterator[tuple[str, Command]]:
@@ -84,11 +85,12 @@ def commands(feedback: Feedback, axes: int) -> Iterator[tuple[str, Command]]:
     yield "out_of_order", Command(event=event_after(following), issue=feedback.issue, values=still)
     yield "out_of_order", Command(event=MAX_EVENT, issue=feedback.issue, values=still)
     yield "late", Command(event=following, issue=feedback.issue + 1000, values=still)
+    yield "unseen", Command(event=following, issue=feedback.issue, values=still)
+    yield "unseen", Command(event=following, issue=feedback.issue, values=still, nonce=feedback.nonce ^ 1)
 
 
 async def test_what_must_not_execute_is_refused_with_its_reason(robot: Robot) -> None:
     async with operator(robot) as driver:
-        await driver.drive([0.0] * len(driver.feedback.axes))
         for reason, command in commands(driver.feedback, len(driver.feedback.axes)):
             refusal = await driver.refused(command)
             assert (refusal.reason, refusal.event, refusal.current) == (reason, command.event, 2)
@@ -101,28 +103,28 @@ async def test_after_a_late_command_a_fresh_feedback_comes_and_only_it_may_be_an
         before = driver.feedback
         age = description_of(driver).max_event_age
         await driver.heard(lambda feedback: feedback.time - before.time > age)
-        late = Command(event=2, issue=before.issue, values=moving(driver))
+        late = Command(event=3, issue=before.issue, values=moving(driver), nonce=before.nonce)
         assert (await driver.refused(late)).reason == "late"
         assert (await driver.next(Feedback)).issue > before.issue
         assert (await driver.refused(late)).reason == "late"
-        assert (await driver.drive(moving(driver))).event == 2
+        assert (await driver.drive(moving(driver))).event == 3
 
 
 async def test_without_another_command_the_robot_comes_to_rest(robot: Robot) -> None:
     async with operator(robot) as driver:
         await driver.drive(moving(driver))
         await driver.heard(lambda feedback: feedback.at_rest and feedback.issue > 1)
-        assert driver.feedback.event == 2
+        assert driver.feedback.event == 3
 
 
 async def test_a_rest_voids_moving_commands_up_to_its_event_and_lets_neutral_ones_pass(robot: Robot) -> None:
     async with operator(robot) as driver:
         await driver.drive(moving(driver))
-        driver.link.send(Rest(event=3))
+        driver.link.send(Rest(event=4))
         refusal = await driver.refused(driver.command(moving(driver)))
-        assert (refusal.reason, refusal.event) == ("rested", 3)
+        assert (refusal.reason, refusal.event) == ("rested", 4)
         await driver.drive([0.0] * len(driver.feedback.axes))
-        assert (await driver.drive(moving(driver))).event == 4
+        assert (await driver.drive(moving(driver))).event == 5
 
 
 async def test_a_rest_for_an_event_that_is_past_does_nothing(robot: Robot) -> None:
@@ -139,7 +141,7 @@ async def test_a_rest_far_ahead_rests_but_voids_only_the_next_event(robot: Robot
         driver.link.send(Rest(event=500))
         assert (await driver.refused(driver.command(moving(driver)))).reason == "rested"
         await driver.drive([0.0] * len(driver.feedback.axes))
-        assert (await driver.drive(moving(driver))).event == 3
+        assert (await driver.drive(moving(driver))).event == 4
 
 
 async def test_any_client_may_stop_and_only_the_operator_resets(robot: Robot) -> None:
@@ -151,10 +153,63 @@ async def test_any_client_may_stop_and_only_the_operator_resets(robot: Robot) ->
         assert (await driver.refused(driver.command(moving(driver)))).reason == "stopped"
         watcher.send(Reset(by="somebody"))
         assert (await watcher.find(Refusal)).reason == "not_allowed"
-        driver.link.send(Reset(by="operator"))
-        await driver.heard(lambda feedback: not feedback.stop.stopped)
+        await driver.reset(by="operator")
         assert driver.feedback.at_rest
-        assert (await driver.drive(moving(driver))).event == 3
+
+
+async def test_after_a_reset_the_robot_moves_only_after_a_neutral_command(robot: Robot) -> None:
+    async with operator(robot) as driver:
+        driver.link.send(Stop())
+        await driver.heard(lambda feedback: feedback.stop.stopped)
+        await driver.reset()
+        assert (await driver.refused(driver.command(moving(driver)))).reason == "not_neutral"
+        assert not (await driver.drive([0.0] * len(driver.feedback.axes))).neutral_needed
+        assert (await driver.drive(moving(driver))).event == 4
+
+
+async def test_a_new_operator_link_moves_the_robot_only_after_a_neutral_command(robot: Robot) -> None:
+    for _ in range(2):
+        async with operator(robot, armed=False) as driver:
+            assert driver.feedback.neutral_needed
+            assert (await driver.refused(driver.command(moving(driver)))).reason == "not_neutral"
+            await driver.arm()
+            await driver.drive(moving(driver))
+
+
+async def test_each_press_has_a_number_and_its_repeats_have_the_same(robot: Robot) -> None:
+    async with operator(robot) as driver, raw_link(robot, "events") as watcher:
+        numbers = []
+        for press in ("0" * 32, "1" * 32, "0" * 32, "", ""):
+            watcher.send(Stop(press=press))
+            taken = await watcher.find(StopTaken)
+            assert taken.press == press
+            numbers.append(taken.number)
+        first, second, again, other, last = numbers
+        assert 0 < first < second < other < last
+        assert again == first
+        await driver.heard(lambda feedback: feedback.stop.number == last)
+        assert driver.feedback.stop.press == ""
+
+
+async def test_only_the_newest_stop_can_be_reset_and_only_after_a_second(robot: Robot) -> None:
+    async with operator(robot) as driver:
+        driver.link.send(Stop(press="a" * 32, reason="smoke"))
+        await driver.heard(lambda feedback: feedback.stop.stopped)
+        first = driver.feedback.stop.number
+        refusal = await driver.refused(Reset(number=first))
+        assert (refusal.reason, refusal.stop, refusal.event) == ("too_soon", first, 0)
+        driver.link.send(Stop(press="b" * 32, reason="fire"))
+        await driver.heard(lambda feedback: feedback.stop.number > first)
+        refusal = await driver.refused(Reset(number=first))
+        assert (refusal.reason, refusal.stop) == ("stale_reset", first)
+        assert (driver.feedback.stop.reason, driver.feedback.stop.press) == ("smoke", "b" * 32)
+        newest = await driver.reset()
+        driver.link.send(Reset(number=newest))
+        driver.link.send(Stop(press="b" * 32))
+        assert (await driver.next(StopTaken)).number == newest
+        await driver.arm()
+        assert not driver.feedback.stop.stopped, "a repeat of a press that was reset is no new stop"
+        await driver.drive(moving(driver))
 
 
 async def test_a_lost_operator_leaves_the_robot_at_rest_and_its_place_to_another(robot: Robot) -> None:
@@ -163,7 +218,7 @@ async def test_a_lost_operator_leaves_the_robot_at_rest_and_its_place_to_another
             await RobotLink(*robot.address, "operator").connect()
         await driver.drive(moving(driver))
     async with operator(robot) as successor:
-        assert successor.feedback.event == 2
+        assert successor.feedback.event == 4
         await successor.heard(lambda feedback: feedback.at_rest)
 
 

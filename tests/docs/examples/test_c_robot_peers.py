@@ -51,7 +51,7 @@ async def test_who_says_nothing_is_told_so(robot: Robot) -> None:
         (frame(b"\xc1"), "handshake"),
         (frame(encode_message(Ping(id=1))), "handshake"),
         (frame(encode_message(Hello(role="robot"))), "role"),
-        (frame(encode_message(Hello(role="operator", version=2))), "version"),
+        (frame(encode_message(Hello(role="operator", version=1))), "version"),
     ],
     ids=["empty", "longest", "too-long", "no-message", "no-hello", "role", "version"],
 )

@@ -158,7 +158,7 @@ async def test_stop_all_at_one_console_stops_the_robot_of_the_other_while_it_dri
         await _until(ann, lambda feedback: feedback.stop.stopped)
         await world.one.robot("right", lambda tile: tile["stopped"] and tile["stop_reason"] == "smoke")
     for place, robot in ((world.one, "left"), (world.two, "right")):
-        assert (await place.http.post(f"/robots/{robot}/api/reset", headers=place.token())).status_code == 200
+        await _reset(place, robot)
 
 
 async def test_supervisors_read_one_audit_of_both_and_nobody_else_does(world: World) -> None:
@@ -219,7 +219,7 @@ async def test_two_go_on_driving_while_redis_hangs_and_a_stop_is_said_to_be_not_
         assert not stopped["right"]["delivered"]
         assert stopped["right"]["detail"].startswith("not confirmed")
         await world.one.robot("right", lambda tile: tile["link"] == "up")
-    await world.one.http.post("/robots/left/api/reset", headers=world.one.token())
+    await _reset(world.one, "left")
 
 
 async def test_no_console_has_logged_the_password(world: World) -> None:
@@ -249,6 +249,14 @@ async def _driving(console: Console, robot: str) -> AsyncIterator[_Driven]:
         found.task = tasks.create_task(drive(), name=robot)
         yield found
         found.task.cancel()
+
+
+async def _reset(place: Place, robot: str) -> None:
+    """Until it is released: a bridge takes no reset within a second of a stop."""
+    async with asyncio.timeout(PATIENCE):
+        while (await place.http.get(f"/robots/{robot}/api/session", headers=place.token())).json()["stopped"]:
+            await place.http.post(f"/robots/{robot}/api/reset", headers=place.token())
+            await asyncio.sleep(0.1)
 
 
 async def _until(console: Console, true: Callable[[Feedback], bool]) -> None:

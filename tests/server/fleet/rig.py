@@ -123,6 +123,6 @@ async def drive_once(peer: TestPeer) -> int:
     await peer.until(lambda each: isinstance(each, Seat) and each.holder != "")
     now = await peer.feedback()
     following = event_after(now.event)
-    peer.send("control", Command(event=following, issue=now.issue, values=[0.0] * len(now.axes)))
+    peer.send("control", Command(event=following, issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes)))
     await peer.feedback(lambda each: each.event == following)
     return following

@@ -65,7 +65,9 @@ async def test_a_bridge_that_misbehaves_disturbs_no_other_robot(
                 event = await drive_once(peer)
                 for _ in range(5):
                     now, event = peer.newest_feedback(), event_after(event)
-                    peer.send("control", Command(event=event, issue=now.issue, values=[0.0] * len(now.axes)))
+                    peer.send(
+                        "control", Command(event=event, issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes))
+                    )
                     await peer.feedback(lambda each, wanted=event: each.event == wanted)  # type: ignore[misc]
                 assert not peer.closed.is_set()
             tiles = await rig.tiles()

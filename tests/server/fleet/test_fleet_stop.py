@@ -2,10 +2,9 @@
 
 import pytest
 
-from robot_bridge.protocol.messages import StopState
 from server.fleet.tiles import UNREADABLE
 from tests.server.fleet.rig import running_fleet, running_fleet_rig
-from tests.server.rig import eventually, running_bridge
+from tests.server.rig import eventually, running_bridge, stop_words
 
 
 async def test_stop_for_all_stops_those_that_the_link_is_good_for() -> None:
@@ -17,7 +16,7 @@ async def test_stop_for_all_stops_those_that_the_link_is_good_for() -> None:
         assert (answer.status_code, stopped) == (200, {"left": True, "right": True})
         for name in ("left", "right"):
             await eventually(lambda name=name: rig.session(name).console.clock.stop.stopped)  # type: ignore[misc]
-        assert rig.session("left").console.clock.stop == StopState(stopped=True, by="observer", reason="enough")
+        assert stop_words(rig.session("left").console.clock.stop) == ("observer", "enough")
         assert (await peer.feedback(lambda each: each.stop.stopped)).stop.reason == "enough"
         assert not rig.session("third").console.clock.stop.stopped
         tiles = await rig.tiles()

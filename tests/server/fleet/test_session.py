@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.protocol.messages import Command, StopState
+from robot_bridge.protocol.messages import Command
 from robot_bridge.protocol.serial import event_after
 from server.audit import Actor
 from server.fleet.tiles import FAILED
 from server.media.plane import MediaPlane
 from server.recording.recorder import Recorder
 from tests.server.fleet.rig import FleetRig, drive_once, running_fleet, running_fleet_rig
-from tests.server.rig import PATIENCE, eventually, running_bridge
+from tests.server.rig import PATIENCE, eventually, reset_by_http, running_bridge, stop_words
 
 
 class Faults:
@@ -77,7 +77,9 @@ async def test_a_session_that_fails_is_started_again_and_no_other_notices(faults
         assert rig.session("right") is untouched
         assert not peer.closed.is_set()
         now = peer.newest_feedback()
-        peer.send("control", Command(event=event_after(event), issue=now.issue, values=[0.0] * len(now.axes)))
+        peer.send(
+            "control", Command(event=event_after(event), issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes))
+        )
         await peer.feedback(lambda each: each.event == event_after(event))
 
 
@@ -91,10 +93,9 @@ async def test_a_stop_at_a_robot_whose_session_has_failed_is_kept_and_done_first
         assert "kept" in answer.json()["detail"]
         await faults.back(rig, "left")
         console = rig.session("left").console
-        await eventually(lambda: console.clock.stop == StopState(stopped=True, by="observer", reason="smoke"))
+        await eventually(lambda: stop_words(console.clock.stop) == ("observer", "smoke"))
         assert _stops(rig, "left")[0] == ("observer", "http, not delivered yet")
-        assert (await rig.http.post("/robots/left/api/reset", headers=rig.token("operator"))).status_code == 200
-        await eventually(lambda: not console.clock.stop.stopped)
+        await reset_by_http(rig.http, "/robots/left/api/reset", rig.token("operator"), lambda: console.clock.stop)
 
 
 async def test_who_may_not_stop_a_robot_may_not_while_its_session_has_failed(faults: Faults) -> None:
@@ -120,7 +121,7 @@ async def test_a_stop_that_the_robot_has_not_heard_of_outlives_a_session_that_fa
             async with running_bridge(port):
                 await faults.back(rig, "left")
                 clock = rig.session("left").console.clock
-                await eventually(lambda: clock.stop == StopState(stopped=True, by="Ann", reason="smoke"))
+                await eventually(lambda: stop_words(clock.stop) == ("Ann", "smoke"))
                 assert ("Ann", "restart, not delivered yet") in _stops(rig, "left")
 
 

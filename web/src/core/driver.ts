@@ -70,6 +70,7 @@ export interface Driver {
   lossyUntilMs: number; // -Infinity before the first loss
   readonly pings: number[]; // their round trips in ms, newest last; none of a command is shorter
   lastValues: readonly number[]; // sent last
+  nonce: number; // of the newest feedback's issue, which a command names; 0 before the first
   neutralOwed: boolean; // one neutral command is due after disarming
   barrier: number | null; // events up to this one were voided by a rest: only neutral goes under their numbers
   rest: { event: number; sends: number; atMs: number; sinceMs: number } | null; // until the robot is at rest
@@ -94,6 +95,7 @@ export function createDriver(
     lossyUntilMs: -Infinity,
     pings: [],
     lastValues: neutral,
+    nonce: 0,
     neutralOwed: false,
     barrier: null,
     rest: null,
@@ -110,6 +112,7 @@ export function driverFeedback(
   const { gate, rest } = driver;
   const flying = gate.inFlight;
   if (!takeFeedback(gate, feedback.event, feedback.issue)) return false;
+  driver.nonce = feedback.nonce;
   const sample = noteFeedback(driver.latency, feedback.event, now);
   if (sample !== null && flying === feedback.event) landed(driver, feedback.issue, sample, now);
   if (driver.barrier !== null && !isNewer(driver.barrier, feedback.event)) driver.barrier = null;
@@ -220,7 +223,7 @@ function commandDue(driver: Driver, intention: Intention, now: number): ClientMe
     driver.neutralOwed &&= intention.armed;
   }
   driver.lastValues = values;
-  return { type: "command", event: next.event, issue: next.issue, values };
+  return { type: "command", event: next.event, issue: next.issue, values, nonce: driver.nonce };
 }
 
 function noteSending(driver: Driver, sends: number, now: number): void {

@@ -21,6 +21,7 @@ export const REFUSAL_WORDS: Readonly<Record<RefusalReason, string>> = {
   unseen: "It did not name the feedback that it answers",
   stale_reset: "Somebody pressed STOP again: look at the newest stop before you reset",
   too_soon: "The stop is less than a second old: wait a moment",
+  not_kept: "The robot could not write the reset to its disk: it stays stopped",
   locked_out: "Somebody at the robot has locked it",
   warning: "The robot warns before it moves: wait a moment",
   silenced: "A supervisor silenced the stops of your link",

@@ -11,7 +11,7 @@ import pytest
 
 from bench.processes import running_process
 from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.messages import Command, Feedback, Media, Reset, Rest, Stop
+from robot_bridge.protocol.messages import Command, Feedback, Media, Rest, Stop
 from robot_bridge.robots.event_strip import read_event_strip
 from tests.robot_bridge.bridge_helpers import Operator
 from tests.support.ros2 import (
@@ -61,6 +61,7 @@ class Driver(Operator):
     async def ready(self) -> None:
         await self.next(Feedback)
         await self.until(lambda feedback: feedback.faults == [] and feedback.unknown == [])
+        await self.arm()
 
     async def driven(self, values: list[float], condition: Callable[[Feedback], bool]) -> None:
         """Send these values, event by event, until the feedback meets the condition."""
@@ -124,10 +125,10 @@ async def test_every_motion_ends_in_exactly_one_zero(bridge: RosBridge, node: Ro
         await driver.driven(GO, lambda feedback: feedback.axes == GO)
         driver.link.send(Stop(by="test"))
         await driver.until(lambda feedback: feedback.stop.stopped and feedback.at_rest)
-        driver.link.send(Reset(by="test"))
-        await driver.until(lambda feedback: not feedback.stop.stopped)
+        await driver.reset()
         await ended_in_one_zero(node, motions=3)
 
+        await driver.arm()
         await driver.driven(GO, lambda feedback: feedback.axes == GO)
     await ended_in_one_zero(node, motions=4)
 
@@ -147,7 +148,7 @@ async def test_late_and_repeated_commands_do_not_reach_the_topic(
     frozen = driver.feedback
     age = bridge_age(driver)
     await driver.until(lambda feedback: feedback.time - frozen.time > age)
-    late = Command(event=2, issue=frozen.issue, values=[-0.2, -1.0])
+    late = Command(event=2, issue=frozen.issue, nonce=frozen.nonce, values=[-0.2, -1.0])
     assert (await driver.refused(late)).reason == "late"
     assert (await driver.refused(late)).reason == "late"
     await driver.next(Feedback)
