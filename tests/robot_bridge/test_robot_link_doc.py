@@ -37,8 +37,8 @@ KINDS: tuple[type[msgspec.Struct], ...] = get_args(LinkMessage)
 EXAMPLE: list[LinkMessage] = [
     Hello(role="operator", name="demo"),
     Ping(id=1),
-    Command(event=2, issue=1, values=[0.5, 0.0, -0.25]),
-    Feedback(event=2, issue=1, time=12.5, axes=[0.5, 0.0, -0.25], at_rest=False),
+    Command(event=2, issue=1, values=[0.5, 0.0, -0.25], nonce=4503599627370497),
+    Feedback(event=2, issue=1, time=12.5, axes=[0.5, 0.0, -0.25], at_rest=False, nonce=42),
     Refusal(event=2, reason="late", current=1),
     Rest(event=3),
 ]
@@ -93,7 +93,7 @@ def test_every_field_of_the_description_is_described(kind: object) -> None:
 
 
 def test_the_refusal_reasons_are_all_described() -> None:
-    console_only = {"no_seat", "seat_taken", "declined", "not_neutral", "too_often", "link_down"}
+    console_only = {"no_seat", "seat_taken", "declined", "silenced", "too_often", "link_down"}
     assert first_column(section("Refusals")) == set(get_args(RefusalReason)) - console_only
     assert all(f"`{reason}`" in section("Refusals") for reason in console_only)
 

@@ -36,20 +36,27 @@ function rests(messages: ClientMessage[]): ClientMessage[] {
 describe("commands", () => {
   it("go as soon as the gate is open, one event at a time", () => {
     expect(driverStep(driver, MOVING, true, 0)).toEqual([
-      { type: "command", event: 2, issue: 1, values: [1, 0] },
+      { type: "command", event: 2, issue: 1, nonce: 0, values: [1, 0] },
     ]);
     expect(driverStep(driver, MOVING, true, 10)).toEqual([]);
     driverFeedback(driver, feedbackOf(2), true, 12);
     expect(driverStep(driver, MOVING, true, 12)).toEqual([
-      { type: "command", event: 3, issue: 1, values: [1, 0] },
+      { type: "command", event: 3, issue: 1, nonce: 0, values: [1, 0] },
     ]);
+  });
+
+  it("name the nonce of the issue that they answer, also when repeated", () => {
+    driverFeedback(driver, feedbackOf(1, { issue: 2, nonce: 12 }), true, 1);
+    expect(driverStep(driver, MOVING, true, 2)).toMatchObject([{ issue: 2, nonce: 12 }]);
+    driverFeedback(driver, feedbackOf(1, { issue: 3, nonce: 13 }), true, 50);
+    expect(driverStep(driver, MOVING, true, 150)).toMatchObject([{ issue: 3, nonce: 13 }]);
   });
 
   it("are repeated under the same event with the newest intention and issue", () => {
     driverStep(driver, MOVING, true, 0);
     driverFeedback(driver, feedbackOf(1, { issue: 2 }), true, 50);
     expect(driverStep(driver, { armed: true, values: [0.5, 0] }, true, 100)).toEqual([
-      { type: "command", event: 2, issue: 2, values: [0.5, 0] },
+      { type: "command", event: 2, issue: 2, nonce: 0, values: [0.5, 0] },
     ]);
     expect(driverStep(driver, MOVING, true, 150)).toEqual([]);
     expect(driverStep(driver, MOVING, true, 200)).toHaveLength(1);
@@ -152,7 +159,7 @@ describe("letting go", () => {
     driverStep(driver, MOVING, true, 0);
     driverRelease(driver, 3);
     const repeat = commands(driverStep(driver, MOVING, true, 100));
-    expect(repeat).toEqual([{ type: "command", event: 2, issue: 1, values: NEUTRAL }]);
+    expect(repeat).toEqual([{ type: "command", event: 2, issue: 1, nonce: 0, values: NEUTRAL }]);
     driverFeedback(driver, feedbackOf(2), true, 110);
     expect(commands(driverStep(driver, MOVING, true, 110))).toMatchObject([{ event: 3, values: [1, 0] }]);
   });
@@ -171,7 +178,7 @@ describe("disarming", () => {
     driverDisarm(driver, 6);
     expect(driverStep(driver, DISARMED, true, 6)).toEqual([
       { type: "rest", event: 2 },
-      { type: "command", event: 3, issue: 1, values: NEUTRAL },
+      { type: "command", event: 3, issue: 1, nonce: 0, values: NEUTRAL },
     ]);
     driverFeedback(driver, feedbackOf(3), true, 12);
     for (let now = 12; now < 3000; now += 10) expect(driverStep(driver, DISARMED, true, now)).toEqual([]);

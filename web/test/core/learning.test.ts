@@ -91,7 +91,7 @@ it("an echo carries the newest intention and issue", () => {
   driverStep(driver, MOVING, true, 0);
   driverFeedback(driver, feedbackOf(1, { issue: 2 }), true, 10);
   expect(driverStep(driver, { armed: true, values: [0.5] }, true, 20)).toEqual([
-    { type: "command", event: 2, issue: 2, values: [0.5] },
+    { type: "command", event: 2, issue: 2, nonce: 0, values: [0.5] },
   ]);
 });
 
