@@ -32,6 +32,7 @@ from robot_bridge.robots.event_strip import with_event_strip
 from robot_bridge.settings import BridgeSettings
 from robot_bridge.start_signal import StartSignal
 from robot_bridge.stop_latch import ResetRefused, ResetTaken, StopGiven, StopLatch
+from robot_bridge.stop_store import wall_microseconds
 
 __all__ = ["Bridge"]
 
@@ -62,7 +63,7 @@ class Bridge:
             self.description.axes,
             max_event_age=self.description.max_event_age,
             first_event=settings.first_event,
-            latch=StopLatch(numbers_after=int(time.time() * 1e6)),
+            latch=StopLatch(numbers_after=wall_microseconds()),
             start_warning=self.description.start_warning,
         )
         self._signal = StartSignal(self.description)

@@ -8,6 +8,8 @@ BridgeError
 ├── DescriptionError        the robot's description contradicts itself
 ├── ListenError             the bridge cannot listen on the address
 ├── InsecureLink            the bridge will not listen there without a secret or client certificates
+├── StateDirInUse           another bridge keeps its stop in the directory
+├── StateDirUnusable        the directory that keeps the stop cannot be made, read or written
 └── RobotFailed             the robot adapter raised while running
 """
 
@@ -20,6 +22,8 @@ __all__ = [
     "RobotFailed",
     "RobotUnavailable",
     "SettingsError",
+    "StateDirInUse",
+    "StateDirUnusable",
     "UnknownRobot",
 ]
 
@@ -68,6 +72,14 @@ class ListenError(BridgeError):
 
 class InsecureLink(BridgeError):
     name = "insecure_link"
+
+
+class StateDirInUse(BridgeError):
+    name = "state_dir_in_use"
+
+
+class StateDirUnusable(BridgeError):
+    name = "state_dir"
 
 
 class RobotFailed(BridgeError):

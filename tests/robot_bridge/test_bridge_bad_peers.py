@@ -38,7 +38,7 @@ async def test_a_second_operator_is_told_that_the_place_is_taken_until_the_first
                 await RobotLink(*bridge.address, "operator").connect()
             await driver.drive()
         async with operator(bridge) as successor:
-            assert (await successor.drive()).event == 3
+            assert (await successor.drive()).event == 5
 
 
 async def test_a_silent_operator_is_dropped_and_makes_room_for_another() -> None:

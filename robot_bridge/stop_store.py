@@ -1,0 +1,178 @@
+"""The latched stop on the robot's disk: what a state directory means, and how it is read and written.
+
+`start_of` is the rule and does no I/O. `StopStore` does it, and blocks: call it from a thread.
+Two files: `stop.json` has the latch; `numbers.json` shows that the directory was used before, has a number that no stop
+is near yet, and is locked while a bridge runs. docs/robot-link.md, "On the robot's disk", says what follows from them.
+"""
+
+import fcntl
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from robot_bridge.errors import StateDirInUse, StateDirUnusable
+from robot_bridge.stop_latch import MAX_NUMBER, StopRecord
+
+__all__ = ["Found", "Kept", "Start", "StopStore", "start_of", "wall_microseconds"]
+
+STOP_FILE = "stop.json"
+NUMBERS_FILE = "numbers.json"
+MAX_BYTES = 1 << 20  # of a file that is read
+RESERVED = 1 << 30  # numbers that are reserved at each start
+LATEST_CLOCK = 2**52  # microseconds; a clock beyond it, in the year 2112, is wrong
+
+
+class Kept(msgspec.Struct, frozen=True, kw_only=True):
+    """What `stop.json` holds."""
+
+    version: int = 1
+    latch: StopRecord
+    ended: bool  # the bridge has ended in order; false while one runs
+
+
+class Reserved(msgspec.Struct, frozen=True, kw_only=True):
+    """What `numbers.json` holds."""
+
+    up_to: int  # no number above this was given
+
+
+class Found(NamedTuple):
+    """What is in a state directory."""
+
+    used: bool  # a bridge has run here before
+    kept: Kept | None  # None: missing or unreadable
+    trouble: str = ""  # why it is unreadable, in words; "" when it is missing
+    reserved: int = 0  # 0: unknown
+
+
+class Start(NamedTuple):
+    """How a bridge begins."""
+
+    record: StopRecord
+    numbers_after: int
+    stop_reason: str  # a stop to latch before anything else; "" for none
+
+
+def wall_microseconds() -> int:
+    """Since 1970, by a clock that may be wrong or set back: good for nothing but a first number of a stop."""
+    return time.time_ns() // 1000
+
+
+def start_of(found: Found, wall_microseconds: int) -> Start:
+    """What a bridge begins with that finds this. `wall_microseconds`: since 1970, by a clock that may be wrong.
+
+    Numbers go on after the newest on the disk. The clock and the reserve only matter when that one is not known: a
+    directory that was deleted, restored from a backup, or damaged.
+    """
+    clock = max(0, min(wall_microseconds, LATEST_CLOCK))
+    if found.kept is None:
+        if not found.used:
+            return Start(StopRecord(), clock, "")
+        what = f"cannot be read ({found.trouble})" if found.trouble else "is missing"
+        return Start(StopRecord(), max(clock, found.reserved), f"The robot's stop file {what}")
+    record = found.kept.latch
+    unclean = "" if found.kept.ended else "The robot bridge did not end in order: power cut, kill or crash"
+    return Start(record, max(clock, record.number), unclean)
+
+
+class StopStore:
+    """Owns a state directory; no other bridge may use it meanwhile.
+
+    Raises, from `open`:
+        StateDirInUse: another bridge uses it.
+        StateDirUnusable: it cannot be made, read or written.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._lock = -1  # descriptor of `numbers.json`
+
+    def open(self) -> Found:
+        """Take the directory and read it."""
+        try:
+            self._directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+            used = (self._directory / NUMBERS_FILE).exists() or (self._directory / STOP_FILE).exists()
+            self._lock = os.open(self._directory / NUMBERS_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            self.close()
+            raise StateDirInUse(f"{self._directory}: another bridge keeps its stop here") from error
+        except OSError as error:
+            self.close()
+            raise StateDirUnusable(f"{self._directory}: {error.strerror or error}") from error
+        kept, trouble = self._read()
+        return Found(used, kept, trouble, self._read_reserved())
+
+    def write(self, kept: Kept) -> None:
+        """Replace the latch in one step; when this returns it has reached the disk.
+
+        Raises:
+            OSError: it has not, or nobody knows.
+        """
+        path = self._directory / STOP_FILE
+        with suppress(FileNotFoundError):
+            path.with_suffix(".new").unlink()
+        descriptor = os.open(path.with_suffix(".new"), os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        try:
+            write_all(descriptor, msgspec.json.encode(kept))
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        os.replace(path.with_suffix(".new"), path)
+        self._sync_directory()
+
+    def reserve(self, number: int) -> None:
+        """No number above this will be given before the next call; in place, since the file is the lock.
+
+        Raises:
+            OSError: as `write`.
+        """
+        data = msgspec.json.encode(Reserved(up_to=min(number + RESERVED, MAX_NUMBER)))
+        os.ftruncate(self._lock, 0)
+        os.lseek(self._lock, 0, os.SEEK_SET)
+        write_all(self._lock, data)
+        os.fsync(self._lock)
+        self._sync_directory()
+
+    def close(self) -> None:
+        """Let another bridge have it. Idempotent."""
+        descriptor, self._lock = self._lock, -1
+        if descriptor >= 0:
+            os.close(descriptor)
+
+    def _read(self) -> tuple[Kept | None, str]:
+        try:
+            with (self._directory / STOP_FILE).open("rb") as file:
+                kept = msgspec.json.decode(file.read(MAX_BYTES), type=Kept)
+        except FileNotFoundError:
+            return None, ""
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            return None, str(error)[:200]
+        if kept.version != 1 or not 0 <= kept.latch.number <= MAX_NUMBER:
+            return None, f"version {kept.version}, number {kept.latch.number}"
+        return kept, ""
+
+    def _read_reserved(self) -> int:
+        try:
+            data = os.pread(self._lock, MAX_BYTES, 0)
+            return max(0, min(msgspec.json.decode(data, type=Reserved).up_to, MAX_NUMBER))
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+            return 0
+
+    def _sync_directory(self) -> None:
+        """A new name is on the disk only when its directory is."""
+        descriptor = os.open(self._directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def write_all(descriptor: int, data: bytes) -> None:
+    """All of it: a write may take a part."""
+    while data:
+        data = data[os.write(descriptor, data) :]
