@@ -40,6 +40,10 @@ class Reserved(msgspec.Struct, frozen=True, kw_only=True):
     up_to: int  # no number above this was given
 
 
+_read_kept = msgspec.json.Decoder(Kept)
+_read_reserved = msgspec.json.Decoder(Reserved)
+
+
 class Found(NamedTuple):
     """What is in a state directory."""
 
@@ -147,7 +151,7 @@ class StopStore:
     def _read(self) -> tuple[Kept | None, str]:
         try:
             with (self._directory / STOP_FILE).open("rb") as file:
-                kept = msgspec.json.decode(file.read(MAX_BYTES), type=Kept)
+                kept = _read_kept.decode(file.read(MAX_BYTES))
         except FileNotFoundError:
             return None, ""
         except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -159,7 +163,7 @@ class StopStore:
     def _read_reserved(self) -> int:
         try:
             data = os.pread(self._lock, MAX_BYTES, 0)
-            return max(0, min(msgspec.json.decode(data, type=Reserved).up_to, MAX_NUMBER))
+            return max(0, min(_read_reserved.decode(data).up_to, MAX_NUMBER))
         except (OSError, msgspec.DecodeError, UnicodeDecodeError):
             return 0
 
