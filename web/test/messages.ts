@@ -59,6 +59,7 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     planar_base: null,
     geofences: [],
     force_feeling: null,
+    start_warning: null,
     body_twists: [],
     hold: 0.3,
     max_event_age: 2,
