@@ -12,12 +12,13 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
+from robot_bridge import clock
 from robot_bridge.axis_shaper import AxisShaper
 from robot_bridge.check_description import check_description
 from robot_bridge.check_link import check_link
 from robot_bridge.coming_to_rest import ComingToRest
 from robot_bridge.counters import BridgeCounters
-from robot_bridge.errors import RobotFailed
+from robot_bridge.errors import RobotFailed, RobotUnavailable
 from robot_bridge.event_core import Answered, EventCore, Executed, Refused
 from robot_bridge.event_log import EventKind, EventLog
 from robot_bridge.event_times import EventTimes
@@ -30,9 +31,11 @@ from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest,
 from robot_bridge.robots.base import Measurement, MediaSource, Robot, Stamp
 from robot_bridge.robots.event_strip import with_event_strip
 from robot_bridge.settings import BridgeSettings
+from robot_bridge.stall import watchdog_seconds
 from robot_bridge.start_signal import StartSignal
 from robot_bridge.stop_latch import ResetRefused, ResetTaken, StopGiven, StopLatch
 from robot_bridge.stop_store import wall_microseconds
+from robot_bridge.watchdogs import Held, Watchdogs
 
 __all__ = ["Bridge"]
 
@@ -45,11 +48,13 @@ _logger = logging.getLogger(__name__)
 class Bridge:
     """One run of a robot: one epoch. `start` returns when it listens; `close` leaves the robot at rest."""
 
-    def __init__(self, robot: Robot, settings: BridgeSettings) -> None:
-        """Raises:
-        DescriptionError: the robot's description contradicts itself.
-        InsecureLink: anybody who reaches the address could drive, and the settings do not say that this is wanted.
-        SecretError: the TLS files are no good.
+    def __init__(self, robot: Robot, settings: BridgeSettings, now: clock.Clock = clock.now) -> None:
+        """`now`: what bounds motion is measured with; it counts suspended time.
+
+        Raises:
+            DescriptionError: the robot's description contradicts itself.
+            InsecureLink: anybody who reaches the address could drive, and the settings do not say that this is wanted.
+            SecretError: the TLS files are no good.
         """
         check_link(settings)
         self.description = robot.describe()
@@ -59,6 +64,7 @@ class Bridge:
         self.counters = BridgeCounters()
         self._robot = robot
         self._settings = settings
+        self._now = now
         self._core = EventCore(
             self.description.axes,
             max_event_age=self.description.max_event_age,
@@ -79,6 +85,8 @@ class Bridge:
             secret=settings.secret,
             tls=None if settings.tls is None else settings.tls.bridge_context(),
         )
+        self._watchdogs = Watchdogs(robot, watchdog_seconds(self.description, robot.tick_seconds), now)
+        self._held = ""  # what held up the ticks, until a command executes; "" while nothing has
         self._log: EventLog | None = None
         self._times = EventTimes()
         self._last_known = LastKnown(self.description)
@@ -113,17 +121,19 @@ class Bridge:
 
         Raises:
             ListenError: the address cannot be had.
+            RobotUnavailable: the robot's watchdog process cannot be had.
             OSError: the event log cannot be opened.
         """
         try:
             if self._settings.event_log is not None:
                 self._log = EventLog(self._settings.event_log)
+            await self._watchdogs.start()
             self.address = await self._links.listen(self._settings.host, self._settings.port)
         except BaseException:
             await self.close()
             raise
         self._record("start", self._core.current, epoch=self.epoch)
-        self._issue(time.monotonic())
+        self._issue()
         atexit.register(self._rest_at_exit)
         self._running = asyncio.get_running_loop().create_task(self._run(), name="bridge")
 
@@ -149,6 +159,7 @@ class Bridge:
                 await self._come_to_rest(self._running)
         finally:
             await self._end_run()
+            await asyncio.to_thread(self._watchdogs.close)
             try:
                 self._robot.close()
             finally:
@@ -219,9 +230,10 @@ class Bridge:
         self._shaper.rest()
 
     def _command(self, peer: LinkPeer, command: Command) -> None:
-        now = time.monotonic()
+        now = self._now()
         outcome = self._core.command(command, now)
         if isinstance(outcome, Executed):
+            self._held = ""
             self._shaper.drive(outcome.values, now)
             self.counters.executed += 1
             self._record("executed", outcome.event, issue=command.issue, values=outcome.values)
@@ -236,7 +248,7 @@ class Bridge:
         peer.send(refusal)
 
     def _stop(self, peer: LinkPeer, stop: Stop) -> None:
-        given = self._core.stop(stop.press, stop.by, stop.reason, time.monotonic())
+        given = self._core.stop(stop.press, stop.by, stop.reason, self._now())
         self._note_stop(given, stop.by, stop.reason)
         peer.send(StopTaken(press=stop.press, number=given.number, kept=False))
 
@@ -249,7 +261,7 @@ class Bridge:
         self._record("stop", self._core.current, by=by, reason=reason, number=given.number)
 
     def _reset(self, peer: LinkPeer, reset: Reset) -> None:
-        outcome = self._core.reset(reset.number, time.monotonic())
+        outcome = self._core.reset(reset.number, self._now())
         if isinstance(outcome, ResetTaken):
             self._released(outcome, reset.by)
         elif isinstance(outcome, ResetRefused):
@@ -310,19 +322,28 @@ class Bridge:
         leaving = self._coming_to_rest()
         try:
             while True:
-                if leaving.step(time.monotonic()):
+                self._tell_watchdogs()
+                if leaving.step(self._now()):
                     break
                 await asyncio.sleep(self._robot.tick_seconds)
         finally:  # also when this is cancelled once more
             if not leaving.rests:
                 leaving.at_once()
             leaving.stop()
+            self._tell_watchdogs()
             if not self._rested:
                 self._rested = True
                 self._record("at_rest", self._core.current)
 
+    def _tell_watchdogs(self) -> None:
+        """Also on the way to rest a call may hang."""
+        try:
+            self._watchdogs.ticked(self._now(), not self._shaper.at_rest)
+        except RobotUnavailable as error:
+            _logger.error("%s", error)
+
     def _coming_to_rest(self) -> ComingToRest:
-        return ComingToRest(self._robot, self._shaper, self.description.hold, time.monotonic())
+        return ComingToRest(self._robot, self._shaper, self.description.hold, self._now())
 
     def _fail(self, error: BaseException) -> None:
         """Latch the stop: whoever starts the bridge again, nothing moves until somebody resets it."""
@@ -330,7 +351,7 @@ class Bridge:
             return
         self._failure = f"robot failed: {named(error)}"[:500]
         _logger.error("%s", self._failure, exc_info=error)
-        self._note_stop(self._core.stop("", "", self._failure, time.monotonic()), "", self._failure)
+        self._note_stop(self._core.stop("", "", self._failure, self._now()), "", self._failure)
 
     def _tell_failure(self) -> None:
         """Feed back what has happened, with what was measured last where nothing can be measured any more."""
@@ -350,14 +371,19 @@ class Bridge:
             await asyncio.sleep(metronome.wait(time.monotonic()))
             self.counters.skipped_ticks = metronome.skipped
             try:
-                self._tick(time.monotonic())
+                self._tick(self._now())
             except BaseException as error:  # an adapter may raise what would end the loop, or cancel the task
                 raise RobotFailed(named(error)) from error
 
     def _tick(self, now: float) -> None:
         if self._robot_error is not None:
             raise self._robot_error
-        values = self._shaper.step(now, self._robot.tick_seconds)
+        moved = not self._shaper.at_rest
+        values = self._shaper.step(now, self._robot.tick_seconds)  # asks for positions, which may hang too
+        if (held := self._watchdogs.begin(now, moved)) is not None:
+            self._held_up(held)
+            values = self._shaper.values
+        self._watchdogs.ticked(now, not self._shaper.at_rest)
         self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
         self._robot.tick()
         if self._limits.acting != self._acting:
@@ -371,18 +397,32 @@ class Bridge:
             self._rested = self._shaper.at_rest
             self._record("at_rest" if self._rested else "driven", self._core.current)
         if self._core.issue_due(now):
-            self._issue(time.monotonic())
+            self._issue()
 
-    def _issue(self, now: float) -> None:
-        self._issue_measured(self._robot.measure(), now)
+    def _held_up(self, held: Held) -> None:
+        """No tick came for too long: nobody knows what the robot has done, and whoever drives has to begin anew."""
+        self._shaper.cut()
+        self._core.need_neutral()
+        self.counters.stalls += 1
+        self.counters.watchdog += held.acted
+        self._held = f"came to rest: the bridge was held up for {held.seconds:.2f} s"
+        _logger.error("%s%s", self._held, "; a watchdog brought the robot to rest meanwhile" if held.acted else "")
+        self._record("stall", self._core.current, seconds=held.seconds, watchdog=held.acted)
 
-    def _issue_measured(self, measured: Measurement, now: float) -> None:
+    def _issue(self) -> None:
+        taken = time.monotonic()
+        self._issue_measured(self._robot.measure(), taken)
+
+    def _issue_measured(self, measured: Measurement, taken: float) -> None:
+        """`taken`: when, on the clock of capture times."""
         measured, unknown = self._last_known.settle(measured)
-        if self._source_faults or self._limits.blind:
+        if self._source_faults or self._limits.blind or self._held:
             blind = [f"no motion: the position is unknown ({name})" for name in sorted(self._limits.blind)]
-            measured = measured._replace(faults=[*measured.faults, *self._source_faults, *blind])
+            held = [self._held] if self._held else []
+            measured = measured._replace(faults=[*measured.faults, *held, *self._source_faults, *blind])
         measured = measured._replace(at_rest=measured.at_rest and self._shaper.at_rest)
-        feedback = self._core.issue(measured, now, sorted(self._acted | self._acting), unknown)
+        limits = sorted(self._acted | self._acting)
+        feedback = self._core.issue(measured, self._now(), limits, unknown, time=taken)
         measured_by = time.monotonic()  # what was captured before may show less than this feedback says
         self._times.changed(feedback.event, measured_by)
         self._acted.clear()
@@ -441,13 +481,14 @@ class Bridge:
         """One log line with the counters."""
         counters = self.counters
         _logger.info(
-            "event %d, executed %d, issued %d, media %d, skipped ticks %d, limits %s, refusals %s, bad input %s, "
-            "drops %s, endings %s",
+            "event %d, executed %d, issued %d, media %d, skipped ticks %d, stalls %d, limits %s, refusals %s, "
+            "bad input %s, drops %s, endings %s",
             self._core.current,
             counters.executed,
             counters.issued,
             counters.media,
             counters.skipped_ticks,
+            counters.stalls,
             dict(counters.limits),
             dict(counters.refusals),
             dict(counters.bad_input),

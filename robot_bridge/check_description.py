@@ -18,6 +18,8 @@ def check_description(description: RobotDescription) -> None:
         raise DescriptionError("a robot needs at least one axis")
     if not 0 < description.hold <= 5:
         raise DescriptionError(f"hold must be in (0, 5] s, not {description.hold}")
+    if description.watchdog is not None and not 0 < description.watchdog < description.hold:
+        raise DescriptionError(f"watchdog must be above 0 and less than hold, not {description.watchdog} s")
     if not 0 < description.max_event_age <= 10:
         raise DescriptionError(f"max_event_age must be in (0, 10] s, not {description.max_event_age}")
     if not 0 < description.max_event_rate <= 1000:

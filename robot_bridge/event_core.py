@@ -89,6 +89,7 @@ class EventCore:
         self._current = first_event  # s: latest executed and answered event, 1
         self._pending: int | None = None  # executed, waiting for its feedback, 2
         self._feedback: Feedback | None = None  # latest issue of the current event; None before the first
+        self._issued_at = -math.inf  # s, when that was
         self._issue = 0  # number of the current event's latest issue, 2
         self._issued: dict[int, _Issued] = {}  # issues of the current event, oldest first
         self._nonces = nonces
@@ -248,12 +249,21 @@ class EventCore:
         self._look(now)
         if self._pending is not None or self._issue_wanted or self._feedback is None:
             return True
-        return now - self._feedback.time >= self._refresh_interval
+        return now - self._issued_at >= self._refresh_interval
 
     def issue(
-        self, measured: Measurement, now: float, limits: Sequence[str] = (), unknown: Sequence[str] = ()
+        self,
+        measured: Measurement,
+        now: float,
+        limits: Sequence[str] = (),
+        unknown: Sequence[str] = (),
+        *,
+        time: float | None = None,
     ) -> Feedback:
-        """The feedback of the pending event, which thereby becomes current, or of the current event again."""
+        """The feedback of the pending event, which thereby becomes current, or of the current event again.
+
+        `time`: what it says it was issued at, on the clock of capture times; None: `now`.
+        """
         if self._pending is not None:
             self._current, self._pending = self._pending, None
             self._issued.clear()
@@ -263,10 +273,11 @@ class EventCore:
         nonce, stop = self._nonces(), self._latch.state
         self._remember_issue(_Issued(now, nonce, self._interlock.spell))
         self._latch.shown(stop)
+        self._issued_at = now
         self._feedback = Feedback(
             event=self._current,
             issue=self._issue,
-            time=now,
+            time=now if time is None else time,
             axes=measured.axes,
             joints=measured.joints,
             wrench=measured.wrench,

@@ -252,5 +252,8 @@ class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     body_twists: tuple[BodyTwist, ...] = ()
     start_warning: StartWarning | None = None
     hold: float = 0.3  # s a command is held before the robot comes to rest by itself
+    watchdog: float | None = (
+        None  # s without a tick after which the robot is brought to rest; None: see docs/robot-link.md
+    )
     max_event_age: float = 2.0  # s after which a feedback may no longer be answered
     max_event_rate: float = 25.0  # Hz, the most events per second that the robot wants

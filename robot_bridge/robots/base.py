@@ -67,6 +67,8 @@ class Robot(ABC):
     """
 
     tick_seconds: float = 0.004
+    rests_from_thread: bool = False  # whether `rest_from_thread` may be called while another method hangs
+    rest_call: str = ""  # "package.module:function" that brings the robot to rest from another process; "": none
 
     @abstractmethod
     def describe(self) -> RobotDescription:
@@ -96,6 +98,19 @@ class Robot(ABC):
         Needed only for position limits with a gain of None.
         """
         return None
+
+    def rest_from_thread(self) -> None:
+        """Bring the robot to rest now, called from another thread while `apply`, `tick` or `measure` may hang.
+
+        Called when no tick came for the description's `watchdog` seconds while the robot moves, and again every
+        so often until one comes. It must not wait for anything that a hanging method may hold, and what such a method
+        still writes when it goes on should not move the robot; the next tick applies rest values. Set
+        `rests_from_thread` where it can do that. It needs the interpreter's lock: native code that blocks
+        without releasing that holds up this call too. For such code there is `rest_call`, a function without
+        arguments in a module that is imported by a process of its own; it is also called when the bridge is killed
+        while the robot moves, and has to reach the robot by a way of its own.
+        """
+        raise NotImplementedError
 
     @abstractmethod
     def stop(self) -> None:

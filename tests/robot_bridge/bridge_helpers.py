@@ -125,11 +125,16 @@ class Operator:
         self.feedback = Feedback(event=1, issue=1, time=0.0, axes=[])
 
     async def next(self, kind: type[Kind]) -> Kind:
+        message = await self._next((kind,))
+        assert isinstance(message, kind)
+        return message
+
+    async def _next(self, kinds: tuple[type[LinkMessage], ...]) -> LinkMessage:
         async with asyncio.timeout(PATIENCE):
             async for message in self.link:
                 if isinstance(message, Feedback):
                     self.feedback = message
-                if isinstance(message, kind):
+                if isinstance(message, kinds):
                     return message
         raise AssertionError("the link was closed")
 
@@ -148,11 +153,16 @@ class Operator:
         return [axis.rest for axis in description.axes] if description is not None else []
 
     async def drive(self, values: list[float] = DRIVE) -> Feedback:
-        """Send the next command and wait for its feedback."""
+        """Send the next command and wait for its feedback. A bridge that was held up gets its neutral command first."""
         command = self.command(values)
         self.link.send(command)
         while self.feedback.event != command.event:
-            await self.next(Feedback)
+            message = await self._next((Feedback, Refusal))
+            if isinstance(message, Refusal) and (message.event, message.reason) == (command.event, "not_neutral"):
+                while not self.feedback.neutral_needed:
+                    await self.next(Feedback)
+                await self.arm()
+                return await self.drive(values)
         return self.feedback
 
     async def heard(self, condition: Callable[[Feedback], bool]) -> None:

@@ -189,6 +189,7 @@ def _slide() -> tuple[Geom, ...]:
 DESCRIPTION: Final = RobotDescription(
     name="micromanipulator",
     label="Micromanipulator (simulated)",
+    watchdog=0.25,  # nobody is hurt by a simulation, and busy machines hold it up
     axes=(
         _axis("probe.vx", "Forward", 60 * MICRO),
         _axis("probe.vy", "Left", 60 * MICRO),

@@ -37,6 +37,7 @@ class Micromanipulator(Robot):
     """Axes: the probe's velocity along x, y and z, the focus' velocity, and the change of the light."""
 
     tick_seconds = 0.004
+    rests_from_thread = True
 
     def __init__(self) -> None:
         self._drives = (*(Stepper(place) for place in START), Stepper(0.0))
@@ -91,6 +92,9 @@ class Micromanipulator(Robot):
             focus=self._drives[3].position,
             light=self._light,
         )
+
+    def rest_from_thread(self) -> None:
+        self._values = [0.0] * len(DESCRIPTION.axes)
 
     def stop(self) -> None:
         self._stopped = True

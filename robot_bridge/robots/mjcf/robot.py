@@ -31,6 +31,7 @@ __all__ = ["MjcfRobot"]
 TICK: Final = 0.004  # s, about
 BUSIEST: Final = 0.6  # share of a tick that the simulation may take
 TRIED_TICKS: Final = 25
+WATCHDOG: Final = 0.25  # s; nobody is hurt by a simulation, and busy machines hold it up
 REST_SPEED: Final = 0.02  # rad/s, or of the model's size per second
 MARGIN: Final = 0.01  # of a joint's range, that servos run on
 LATENCY: Final = 0.03  # s that servos follow late
@@ -40,6 +41,8 @@ _logger = logging.getLogger(__name__)
 
 class MjcfRobot(Robot):
     """Every actuator is an axis, but for velocity servos that only damp a position servo."""
+
+    rests_from_thread = True
 
     def __init__(self, path: Path) -> None:
         """Raises:
@@ -108,6 +111,9 @@ class MjcfRobot(Robot):
     def positions(self) -> Sequence[float]:
         qpos = self.data.qpos
         return [value for joint in self._joints for value in joint.values(qpos)]
+
+    def rest_from_thread(self) -> None:
+        self._values = self._rest_values
 
     def stop(self) -> None:
         self._stopped = True
@@ -180,6 +186,7 @@ class MjcfRobot(Robot):
         title = self.model.names[: self.model.names.index(b"\0")].decode(errors="replace")
         return RobotDescription(
             name=name,
+            watchdog=WATCHDOG,
             label=label_of(name if title in ("", "MuJoCo Model") else title),
             axes=axes,
             joints=tuple(part for joint in self._joints for part in joint.parts),

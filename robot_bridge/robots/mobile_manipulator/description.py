@@ -59,6 +59,7 @@ def describe(model: Any) -> RobotDescription:
         planar_base=BASE_ON_FLOOR,
         geofences=GEOFENCES,
         hold=0.3,
+        watchdog=0.25,  # nobody is hurt by a simulation, and busy machines hold it up
         max_event_age=2.0,
         max_event_rate=25.0,
     )

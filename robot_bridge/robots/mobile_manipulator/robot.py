@@ -29,6 +29,8 @@ REST_SPEED: Final = 0.02  # m/s and rad/s, of every joint
 class MobileManipulator(Robot):
     """Axes: the base's velocity in its own frame, then the tool's twist against the base, in the base frame."""
 
+    rests_from_thread = True
+
     def __init__(self) -> None:
         """Raises:
         RobotUnavailable: OpenGL cannot be used here.
@@ -87,6 +89,9 @@ class MobileManipulator(Robot):
     def joint_rates(self, values: Sequence[float]) -> Sequence[float]:
         """The base's rates are left out: no limit by posture needs them."""
         return [0.0, 0.0, 0.0, *self._arm.rates(values[BASE.stop :])]
+
+    def rest_from_thread(self) -> None:
+        self._values = self._rest_values
 
     def stop(self) -> None:
         self._stopped = True

@@ -36,6 +36,7 @@ class PlanarRobot(Robot):
     """A robot for tests and for machines without GL. Moves exactly as commanded unless something is in the way."""
 
     tick_seconds = 0.004
+    rests_from_thread = True
 
     def __init__(self, state: PlanarState | None = None) -> None:
         self._state = state or PlanarState()
@@ -99,6 +100,9 @@ class PlanarRobot(Robot):
 
     def positions(self) -> Sequence[float]:
         return self._state[:3]
+
+    def rest_from_thread(self) -> None:
+        self._command = (0.0, 0.0, 0.0)
 
     def stop(self) -> None:
         self._braked = True

@@ -1,8 +1,8 @@
 """An arm: joint positions out, ahead of the arm by a short horizon; joint states in."""
 
-import time
 from typing import Any
 
+from robot_bridge import clock
 from robot_bridge.robots.ros2.command_stream import Said
 from robot_bridge.robots.ros2.drive import Drive, Sensed
 from robot_bridge.robots.ros2.joint_book import BadJointState, JointBook
@@ -41,7 +41,7 @@ class ArmDrive(Drive):
         return not self._book.missing(self._timeout, now)
 
     def advance(self, said: Said, values: list[float], dt: float) -> Any:
-        now = time.monotonic()
+        now = clock.now()
         moving = any(values)
         if moving:
             measured = self.joints(now)
@@ -91,7 +91,7 @@ class ArmDrive(Drive):
         return self._setpoints.points if said is Said.ZERO else self._setpoints.ahead(values, self._horizon)
 
     def _take(self, message: Any) -> None:
-        now = time.monotonic()
+        now = clock.now()
         try:
             self._book.take(message, header_ns(message.header), now)
             self._states.put(None, now)

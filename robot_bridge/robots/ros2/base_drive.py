@@ -1,9 +1,9 @@
 """A mobile base: twists out, odometry in."""
 
 import math
-import time
 from typing import Any, NamedTuple
 
+from robot_bridge import clock
 from robot_bridge.robots.ros2.command_stream import Said
 from robot_bridge.robots.ros2.drive import Drive, Sensed
 from robot_bridge.robots.ros2.newest import Newest
@@ -85,7 +85,7 @@ class BaseDrive(Drive):
         return self._odometry.faults(now)
 
     def _take(self, message: Any) -> None:
-        now = time.monotonic()
+        now = clock.now()
         try:
             self._odometry.put(base_state(message), now, header_ns(message.header))
         except ValueError as error:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from robot_bridge import clock
 from robot_bridge.protocol.framing import MAX_MEDIA_FRAME
 from robot_bridge.protocol.messages import Media
 from robot_bridge.robots.base import MediaSource, Stamper
@@ -22,8 +23,8 @@ EARLY = 0.7  # of the frame interval: a camera's own rate is never quite even
 
 class _Shot(NamedTuple):
     message: Any
-    captured: float  # s, monotonic
-    arrived: float
+    captured: float  # s, monotonic, as stamps are
+    arrived: float  # s, on the clock that counts suspended time, as ages are
 
 
 class CameraSource(MediaSource):
@@ -79,14 +80,15 @@ class CameraSource(MediaSource):
 
     def _take(self, message: Any) -> None:
         """In the node's thread: the two clocks are read as close to each other as can be."""
-        settings, now, now_ros = self._settings, time.monotonic(), self._ros.now_ns()
+        settings, monotonic, now_ros = self._settings, time.monotonic(), self._ros.now_ns()
+        now = clock.now()
         header = header_ns(message.header)
         last = self._shots.last()
         if last is not None and now - last.time < EARLY / settings.frame_rate:
             return
         try:
             captured = captured_at(
-                settings.captured, arrived=now, arrived_ros=now_ros, header=header, latency=settings.latency
+                settings.captured, arrived=monotonic, arrived_ros=now_ros, header=header, latency=settings.latency
             )
         except ClockMismatch as error:
             self._shots.refuse(str(error), now)

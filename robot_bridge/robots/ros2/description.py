@@ -72,6 +72,7 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         planar_base=None if base is None else _planar_base(base),
         geofences=settings.geofences,
         hold=settings.hold,
+        watchdog=settings.watchdog,
         max_event_age=settings.max_event_age,
         max_event_rate=settings.max_event_rate,
     )

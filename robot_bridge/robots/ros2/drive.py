@@ -1,10 +1,10 @@
 """What the parts of a ROS 2 robot that take commands have in common."""
 
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from robot_bridge import clock
 from robot_bridge.robots.ros2.command_stream import CommandStream, Said
 from robot_bridge.robots.ros2.ros_side import RosSide
 
@@ -39,7 +39,7 @@ class Drive(ABC):
 
     def step(self, values: Sequence[float], dt: float) -> None:
         """One tick with these values."""
-        now = time.monotonic()
+        now = clock.now()
         if now - self._looked >= LOOK_INTERVAL:
             self._heard, self._looked = self._publisher.get_subscription_count() > 0, now
         lost = self._stopped or not (self._heard and self.seen(now))
@@ -51,6 +51,11 @@ class Drive(ABC):
         self._stream.end()
         if self._owes_zero:
             self._say(Said.ZERO, [0.0] * self.size, 0.0)
+
+    def rest_from_thread(self) -> None:
+        """Say zero if the last word was another; the bridge's own tick may hang anywhere in `step`."""
+        if self._owes_zero:
+            self._publisher.publish(self.advance(Said.ZERO, [0.0] * self.size, 0.0))
 
     def stop(self) -> None:
         """Say zero if the last word was another, and no moving values until `reset`."""

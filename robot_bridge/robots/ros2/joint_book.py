@@ -25,7 +25,7 @@ class JointStateMessage(Protocol):
 class JointKnown(NamedTuple):
     position: float = math.nan
     velocity: float = math.nan
-    time: float = -math.inf  # s, monotonic, of its arrival
+    time: float = -math.inf  # s, monotonic, suspended time included; of its arrival
     header: int = 0  # ns of its stamp
 
 

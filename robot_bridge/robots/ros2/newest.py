@@ -13,7 +13,7 @@ BAD_SHOWN = 3.0  # s that a bad message is a fault after the last of them
 @dataclass(frozen=True)
 class Arrived(Generic[Value]):
     value: Value
-    time: float  # s, monotonic
+    time: float  # s, monotonic, suspended time included
     header: int  # ns of the header's stamp; 0: it has none
 
 

@@ -1,8 +1,8 @@
 """A robot behind ROS 2 topics, as the bridge sees it."""
 
-import time
 from collections.abc import Callable, Sequence
 
+from robot_bridge import clock
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.robots.base import Measurement, MediaSource, Robot
 from robot_bridge.robots.ros2.arm_drive import ArmDrive
@@ -20,6 +20,7 @@ class Ros2Robot(Robot):
     """Drives its parts, and gathers what they and the sensors say."""
 
     tick_seconds = 0.01
+    rests_from_thread = True
 
     def __init__(self, settings: Ros2Settings, description: RobotDescription) -> None:
         """Raises:
@@ -55,7 +56,7 @@ class Ros2Robot(Robot):
             raise self._ros.failure
 
     def measure(self) -> Measurement:
-        now = time.monotonic()
+        now = clock.now()
         sensed = [drive.sense(now) for drive in self._drives]
         faults = [fault for drive in self._drives for fault in drive.faults(now)]
         for sensor in (self._ranges, self._wrench, *self._cameras):
@@ -71,8 +72,12 @@ class Ros2Robot(Robot):
         )
 
     def positions(self) -> Sequence[float]:
-        now = time.monotonic()
+        now = clock.now()
         return [value for drive in self._drives for value in drive.joints(now)]
+
+    def rest_from_thread(self) -> None:
+        """rclpy publishes from any thread; a middleware that blocks all of them blocks this one too."""
+        call_all([drive.rest_from_thread for drive in self._drives])
 
     def stop(self) -> None:
         """Says zero to every part whose last word was another, and no motion until `reset`."""

@@ -1,9 +1,9 @@
 """Sensors that a console draws beside the robot's state: ranges and a wrench."""
 
 import math
-import time
 from typing import Any
 
+from robot_bridge import clock
 from robot_bridge.robots.ros2.laser_scan import BadScan, Sectors
 from robot_bridge.robots.ros2.newest import Newest
 from robot_bridge.robots.ros2.ros_side import RosSide, header_ns
@@ -29,7 +29,7 @@ class RangeSensor:
         return self._scans.faults(now)
 
     def _take(self, message: Any) -> None:
-        now = time.monotonic()
+        now = clock.now()
         try:
             self._scans.put(self._sectors.gather(message), now, header_ns(message.header))
         except BadScan as error:
@@ -52,7 +52,7 @@ class WrenchTopic:
         return self._wrenches.faults(now)
 
     def _take(self, message: Any) -> None:
-        now = time.monotonic()
+        now = clock.now()
         force, torque = message.wrench.force, message.wrench.torque
         values = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
         if all(map(math.isfinite, values)):

@@ -141,6 +141,7 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     namespace: Annotated[str, Meta(pattern=r"^(/?[A-Za-z_][A-Za-z0-9_/]*)?$")] = ""
     use_sim_time: bool = False
     hold: Annotated[float, Meta(gt=0, le=5)] = 0.5  # s
+    watchdog: Annotated[float, Meta(gt=0, lt=5)] | None = None  # s, less than hold; None: 0.1, or half of hold
     max_event_age: Annotated[float, Meta(gt=0, le=10)] = 2.0  # s
     max_event_rate: Annotated[float, Meta(gt=0, le=100)] = 25.0  # Hz
     base: Base | None = None

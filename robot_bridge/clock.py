@@ -1,0 +1,25 @@
+"""The clock by which motion is bounded: it goes on while the machine is suspended.
+
+CLOCK_MONOTONIC stands still then, so that a bridge would wake up with what was left of `hold` and drive on. Capture
+times of media stay on CLOCK_MONOTONIC, which cameras stamp with; the two are never compared.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+
+__all__ = ["Clock", "now"]
+
+Clock = Callable[[], float]
+
+if sys.platform == "linux":
+
+    def now() -> float:
+        """Seconds, monotonic, suspended time included."""
+        return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+else:
+
+    def now() -> float:
+        """Seconds, monotonic; this platform has no clock that surely counts suspended time."""
+        return time.monotonic()

@@ -1,0 +1,169 @@
+"""Brings a robot to rest from a process of its own when the bridge is held up or dies.
+
+    python -m robot_bridge.watchdog_process package.module:function SECONDS
+
+It hears of every tick through a pipe and calls the function when none comes for that long while the robot moves, again
+every so often, and when the pipe ends while the robot moves: then the bridge was killed. It needs nothing of the
+bridge's interpreter, so that it also works while native code keeps that from running anything.
+"""
+
+import logging
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import import_module
+
+from robot_bridge import clock
+from robot_bridge.errors import RobotUnavailable
+
+__all__ = ["WatchdogProcess", "watch"]
+
+MOVING, RESTING, LEAVING = b"m", b"r", b"q"
+READY, ACTED = b"+", b"!"
+START_SECONDS = 20.0  # for the function's module to be imported
+CLOSE_SECONDS = 2.0
+SAYS_PER_LIMIT = 4  # ticks that are told, at least, in the time without any that counts
+TRIES = 3
+
+_logger = logging.getLogger(__name__)
+
+
+class WatchdogProcess:
+    """The bridge's side. `start` blocks until the process is ready."""
+
+    def __init__(self, limit: float, call: str) -> None:
+        """`call`: "package.module:function", called there without arguments."""
+        self._limit = limit
+        self._call = call
+        self._process: subprocess.Popen[bytes] | None = None
+        self._moving = False
+        self._said = float("-inf")
+
+    @property
+    def pid(self) -> int | None:
+        """None while it does not run."""
+        return None if self._process is None else self._process.pid
+
+    def start(self) -> None:
+        """Raises:
+        RobotUnavailable: the function cannot be had.
+        """
+        self._process = process = subprocess.Popen(
+            [sys.executable, "-m", __name__, self._call, str(self._limit)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # what ends the bridge from its terminal does not end the watchdog before it
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [os.getcwd(), *sys.path]))},
+        )
+        assert process.stdin is not None  # pipes were asked for
+        assert process.stdout is not None
+        ready, _, _ = select.select([process.stdout], [], [], START_SECONDS)
+        if not ready or os.read(process.stdout.fileno(), 1) != READY:
+            process.kill()
+            process.communicate()  # which closes the pipes
+            self._process = None
+            raise RobotUnavailable(f"the watchdog process cannot call {self._call}")
+        os.set_blocking(process.stdin.fileno(), False)
+        os.set_blocking(process.stdout.fileno(), False)
+
+    def ticked(self, now: float, moving: bool) -> None:
+        """A tick begins; `moving`: what it applies is not at rest.
+
+        Raises:
+            RobotUnavailable: the process has ended or does not read: nothing watches over the robot.
+        """
+        if moving == self._moving and (not moving or now - self._said < self._limit / SAYS_PER_LIMIT):
+            return
+        self._moving, self._said = moving, now
+        self._say(MOVING if moving else RESTING)
+
+    def take_acted(self) -> bool:
+        """Whether it has acted since the last call."""
+        if self._process is None or self._process.stdout is None:
+            return False
+        try:
+            return ACTED in os.read(self._process.stdout.fileno(), 64)
+        except OSError:  # nothing there
+            return False
+
+    def close(self) -> None:
+        """Ends it without its acting: call it when the robot rests. May be called again."""
+        process, self._process = self._process, None
+        if process is None or process.stdin is None:
+            return
+        try:
+            os.write(process.stdin.fileno(), LEAVING)
+        except OSError as error:
+            _logger.error("the watchdog process is gone: %s", error)
+        process.stdin.close()
+        try:
+            process.wait(CLOSE_SECONDS)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+
+    def _say(self, what: bytes) -> None:
+        if self._process is None or self._process.stdin is None:
+            raise RobotUnavailable("the watchdog process does not run")
+        try:
+            os.write(self._process.stdin.fileno(), what)
+        except OSError as error:
+            raise RobotUnavailable(f"the watchdog process is gone: {error}") from error
+
+
+def watch(heard: int, said: int, limit: float, act: Callable[[], None], now: clock.Clock = clock.now) -> None:
+    """Until the pipe `heard` ends or says that the bridge leaves in order. `said`: where an act is reported."""
+    last, moving = now(), False
+    while True:
+        timeout = max(0.0, limit - (now() - last)) if moving else None
+        if not select.select([heard], [], [], timeout)[0]:
+            _act(act, said)
+            last = now()  # again, if still nothing comes
+            continue
+        news = os.read(heard, 4096)
+        if not news:
+            if moving:
+                _act(act, said)
+            return
+        if LEAVING in news:
+            return
+        last, moving = now(), news[-1:] == MOVING
+
+
+def _act(act: Callable[[], None], said: int) -> None:
+    _logger.error("no tick of the bridge: the robot is brought to rest by its watchdog process")
+    for _ in range(TRIES):
+        try:
+            act()
+            break
+        except BaseException as error:
+            _logger.critical("the watchdog process cannot bring the robot to rest: %r", error)
+    try:
+        os.write(said, ACTED)
+    except OSError:  # nobody hears it any more
+        _logger.error("the bridge is gone")
+
+
+def load(call: str) -> Callable[[], None]:
+    """The function that "package.module:function" names."""
+    module, _, name = call.partition(":")
+    function: Callable[[], None] = getattr(import_module(module), name)
+    return function
+
+
+def main() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # a service manager ends the bridge, and this by it
+        signal.signal(number, signal.SIG_IGN)
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    act = load(sys.argv[1])
+    os.write(1, READY)
+    watch(0, 1, float(sys.argv[2]), act)
+
+
+if __name__ == "__main__":
+    main()

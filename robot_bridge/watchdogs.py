@@ -1,0 +1,71 @@
+"""Everything that looks whether the ticks go on: the loop itself, and what acts beside it where the robot allows."""
+
+import asyncio
+from typing import NamedTuple, Protocol
+
+from robot_bridge import clock
+from robot_bridge.robots.base import Robot
+from robot_bridge.stall import StallGauge
+from robot_bridge.watchdog_process import WatchdogProcess
+from robot_bridge.watchdog_thread import WatchdogThread
+
+__all__ = ["Held", "Watchdogs"]
+
+
+class Watchdog(Protocol):
+    def start(self) -> None: ...
+    def ticked(self, now: float, moving: bool) -> None: ...
+    def take_acted(self) -> bool: ...
+    def close(self) -> None: ...
+
+
+class Held(NamedTuple):
+    """The ticks were held up."""
+
+    seconds: float  # since the last one
+    acted: bool  # the robot was brought to rest beside the loop
+
+
+class Watchdogs:
+    """`start`; at every tick `begin`, then `ticked` before anything is applied; `close` when the robot rests."""
+
+    def __init__(self, robot: Robot, limit: float, now: clock.Clock) -> None:
+        self._limit = limit
+        self._now = now
+        self._gauge: StallGauge | None = None  # None before the first tick
+        self._last = now()
+        self._beside: list[Watchdog] = []
+        if robot.rests_from_thread:
+            self._beside.append(WatchdogThread(limit, robot.rest_from_thread, now))
+        if robot.rest_call:
+            self._beside.append(WatchdogProcess(limit, robot.rest_call))
+
+    async def start(self) -> None:
+        """Raises:
+        RobotUnavailable: the robot's own function cannot be called in a process.
+        """
+        for watchdog in self._beside:
+            await asyncio.to_thread(watchdog.start)
+
+    def begin(self, now: float, moving: bool) -> Held | None:
+        """Whether the ticks were held up; `moving`: what was applied last is not at rest."""
+        acted = sum(watchdog.take_acted() for watchdog in self._beside) > 0  # each is asked
+        if self._gauge is None:
+            self._gauge = StallGauge(self._limit, now)
+        seconds, self._last = now - self._last, now
+        gap = self._gauge.tick(now, moving)
+        return Held(seconds, acted) if acted or gap is not None else None
+
+    def ticked(self, now: float, moving: bool) -> None:
+        """The tick goes on; `moving`: what it applies is not at rest.
+
+        Raises:
+            RobotUnavailable: the watchdog process is gone, so that nothing watches over the robot.
+        """
+        for watchdog in self._beside:
+            watchdog.ticked(now, moving)
+
+    def close(self) -> None:
+        """May be called again."""
+        for watchdog in self._beside:
+            watchdog.close()
