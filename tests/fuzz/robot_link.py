@@ -54,10 +54,10 @@ class Rig:
     def __init__(self, monotonic: Callable[[], float], secret: LinkSecret | None = None) -> None:
         self.clock = monotonic
         self.robot = Watched()
-        self.bridge = Bridge(self.robot, BridgeSettings(secret=secret))
+        self.bridge = Bridge(self.robot, BridgeSettings(secret=secret), monotonic)
         self.links = self.bridge._links
         self.links._server = cast(asyncio.Server, self)  # it listens, as far as newcomers can tell
-        self.bridge._issue(monotonic())
+        self.bridge._issue()
         self.executed_at = float("-inf")
 
     def connect(self) -> LinkPeer:

@@ -129,7 +129,7 @@ class Operator:
         assert isinstance(message, kind)
         return message
 
-    async def _next(self, kinds: tuple[type[LinkMessage], ...]) -> LinkMessage:
+    async def _next(self, kinds: tuple[type[object], ...]) -> LinkMessage:
         async with asyncio.timeout(PATIENCE):
             async for message in self.link:
                 if isinstance(message, Feedback):
