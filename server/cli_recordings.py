@@ -17,12 +17,15 @@ from server.access import Access
 from server.cli_access import MakeSettings, RobotOption, StateDirOption
 from server.cli_extras import load_extra
 from server.console_address import read_address
+from server.evidence.anchors import parse_anchor
+from server.evidence.signer import is_public_key
 from server.recording.errors import RecordingError
 from server.recording.replay_app import create_replay_app
 from server.recording.settings import recordings_directory
 from server.recording.shelf import RecordingEntry, Shelf
 from server.recording.verify import Verdict
 from server.recording.verify_file import verify_file
+from server.recording.verify_signature import SignatureReport
 from server.robot_paths import ROBOTS
 from server.serve import PortTaken, bind, running, wait_for_signal
 from server.settings import Settings
@@ -114,6 +117,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     @app.command()
     def verify(
         file: File,
+        key: Annotated[str, typer.Option(help="Public key that has to have signed it; unset: any, or none.")] = "",
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
@@ -121,7 +125,9 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     ) -> None:
         """Check what is promised against a recording. Exit code 1: it is not kept; 2: it cannot be read."""
         path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
-        verdict = _or_usage(lambda: verify_file(path))
+        if key and not is_public_key(key):
+            raise _usage("a public key has 64 hexadecimal digits")
+        verdict = _or_usage(lambda: verify_file(path, key))
         if as_json:
             sys.stdout.write(msgspec.json.encode({"file": str(path), **msgspec.to_builtins(verdict)}).decode() + "\n")
         else:
@@ -250,7 +256,20 @@ def _in_words(verdict: Verdict) -> str:
         looked = f" ({check.looked} looked at)" if check.looked else ""
         lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name}{looked}{'' if check.ok else f': {check.count} times'}")
         lines += [f"        s={each.event}: {each.text}" for each in check.violations[:5]]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_signature_words(verdict.signature)]) + "\n"
+
+
+def _signature_words(report: SignatureReport) -> list[str]:
+    if report.state == "unsigned":
+        return ["unsigned: whoever can write the file can write another story that fits"]
+    until = datetime.fromtimestamp(report.until_time / 1e6).astimezone().isoformat(timespec="milliseconds")
+    lines = [f"{report.state}: {report.signatures} signatures, the last one up to s={report.until_event}, {until}"]
+    if report.signer:
+        lines.append(f"        by {report.signer}")
+    anchor = parse_anchor(report.audit)
+    if anchor is not None:
+        lines.append(f"        with a signed head of the audit {anchor.log}: record {anchor.n}, {anchor.head}")
+    return lines
 
 
 def _usage(text: str) -> typer.Exit:

@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from server.audit_log import AuditLog, open_audit_log
 from server.console import Console
 from server.event_clock import EventClock
+from server.evidence.anchors import anchor_text
 from server.house import House
 from server.link_warden import LinkWarden
 from server.log_context import follow_clock
@@ -18,6 +19,7 @@ from server.recording.recorder import Recorder
 from server.recording.service import RecordingService
 from server.recording.settings import recordings_directory
 from server.recording.shelf import Shelf
+from server.recording.signature import RecordingSigning
 from server.relay.desk import RelayDesk, RelayedMedia
 from server.relay.engines import relay_engines
 from server.scene import SceneView
@@ -57,7 +59,10 @@ async def _session(
     scene = await _start_scene(settings, metrics)
     clock = EventClock()
     shelf = Shelf(recordings_directory(settings.recording, directory.path), settings.recording)
-    recorder = Recorder(settings.recording, shelf, clock, media, lambda news: console.peers.tell("session", news))
+    signing = RecordingSigning(house.state.signer, lambda: anchor_text(audit.newest_anchor()))
+    recorder = Recorder(
+        settings.recording, shelf, clock, media, lambda news: console.peers.tell("session", news), signing
+    )
     engines = relay_engines(settings, media, house.state.signing_key(settings) + robot)
     relays = RelayDesk(settings, engines, lambda: console.peers)
     console = Console(settings, metrics, RelayedMedia(media, relays), scene, audit, clock, recorder)

@@ -12,7 +12,16 @@ import msgspec
 from server.evidence.chain import ChainReport
 from server.evidence.signer import Signer, is_signed
 
-__all__ = ["ANCHORS_NAME", "Anchor", "AnchorFile", "AnchorNote", "check_anchors", "parse_anchor", "sign_anchor"]
+__all__ = [
+    "ANCHORS_NAME",
+    "Anchor",
+    "AnchorFile",
+    "AnchorNote",
+    "anchor_text",
+    "check_anchors",
+    "parse_anchor",
+    "sign_anchor",
+]
 
 ANCHORS_NAME = "audit-anchors.jsonl"
 DOMAIN = b"lockstep audit anchor 1\n"  # nothing else that this key signs begins like that
@@ -54,6 +63,11 @@ def parse_anchor(line: bytes | str) -> Anchor | None:
     except (msgspec.DecodeError, UnicodeError, RecursionError):
         return None
     return found if found.is_valid else None
+
+
+def anchor_text(anchor: Anchor | None) -> str:
+    """What `parse_anchor` takes; "" for None."""
+    return "" if anchor is None else msgspec.json.encode(anchor).decode()
 
 
 class AnchorNote(msgspec.Struct, kw_only=True):

@@ -7,7 +7,6 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Chunk, Footer, Message, Metadata
 from mcap.stream_reader import CRCValidationError, breakup_chunk
@@ -27,14 +26,13 @@ from server.recording.payload import (
     picture_of,
     sound_of,
 )
+from server.recording.raw_records import BROKEN, HEAD, MAGIC
 from server.recording.records import RobotRecord
 from server.recording.scan import scan_file
 from server.recording.topics import OWN_TOPICS
 
 __all__ = ["Record", "RecordingReader"]
 
-MAGIC = b"\x89MCAP0\r\n"
-HEAD = 9  # bytes of opcode and length
 FOOTER = HEAD + 20 + len(MAGIC)
 MAX_RECORD = 256 * 1024 * 1024  # bytes
 
@@ -90,7 +88,7 @@ class RecordingReader:
         try:
             self.info = self._read_info()
             self.index = index or self._read_index() or self._scan()
-        except (McapError, ValueError, KeyError, EOFError) as error:
+        except BROKEN as error:
             self._file.close()
             raise RecordingDamaged(f"{path.name}: {error or type(error).__name__}") from error
         except BaseException:
@@ -181,7 +179,7 @@ class RecordingReader:
             parts = breakup_chunk(content, validate_crc=True)
         except CRCValidationError as error:
             raise RecordingTampered(f"chunk {number} is not what was written") from error
-        except (McapError, ValueError, EOFError, RuntimeError) as error:
+        except BROKEN as error:
             raise RecordingDamaged(f"chunk {number}: {error}") from error
         for part in parts:
             topic = self._topics.get(part.channel_id) if isinstance(part, Message) else None

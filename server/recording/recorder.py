@@ -43,6 +43,7 @@ from server.recording.records import (
 )
 from server.recording.settings import RecordingSettings
 from server.recording.shelf import Shelf
+from server.recording.signature import RecordingSigning
 from server.recording.times import LinkTimes, RecordClock
 from server.session_tap import SessionTap
 
@@ -74,6 +75,7 @@ class Recorder(SessionTap):
     Args:
         clock: which event holds
         tell: tells everyone
+        signing: signs recordings; None: they are not signed
 
     Attributes:
         seats: role of a peer, by its id
@@ -86,12 +88,14 @@ class Recorder(SessionTap):
         clock: EventClock,
         media: RecordedMedia,
         tell: Callable[[RecordingState], None],
+        signing: RecordingSigning | None = None,
     ) -> None:
         self.shelf = shelf
         self._settings = settings
         self._clock = clock
         self._media = media
         self._tell = tell
+        self._signing = signing
         self._role_of: dict[str, str] = {}
         self._times = RecordClock(time.time_ns(), time.monotonic_ns())
         self._link_times = LinkTimes()
@@ -196,6 +200,7 @@ class Recorder(SessionTap):
             lambda: self._times.at(time.monotonic()),
             lambda: self._call_soon(self._media.record_keyframes),
             lambda: self._call_soon(self._ended.set),
+            self._signing,
         )
         self._thread = thread
         self._put_own(self._participants_record(self._participants))

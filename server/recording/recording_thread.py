@@ -18,6 +18,7 @@ from server.recording.items import FeedbackItem, Item, MediaItem, OwnItem, Robot
 from server.recording.records import Degraded, OwnRecord, ParticipantsRecord, SeatRecord
 from server.recording.scan import complete_file
 from server.recording.settings import RecordingSettings
+from server.recording.signature import RecordingSigning
 from server.recording.writer import RecordingWriter
 
 __all__ = ["RecordingThread"]
@@ -36,6 +37,7 @@ class RecordingThread:
         now: ns since 1970 on the recording's clock
         on_part: called from the thread when a file has begun
         on_end: called from the thread when it ends by itself
+        signing: signs what is written; None: nothing does
 
     Attributes:
         failure: why it ended by itself; "" while it runs, or when it was closed
@@ -49,6 +51,7 @@ class RecordingThread:
         now: Callable[[], int],
         on_part: Callable[[], None],
         on_end: Callable[[], None],
+        signing: RecordingSigning | None = None,
     ) -> None:
         self.info = info
         self.failure = ""
@@ -57,6 +60,8 @@ class RecordingThread:
         self._now = now
         self._on_part = on_part
         self._on_end = on_end
+        self._signing = signing
+        self._head = ""  # of the signed chain of the part before
         self._waiting: deque[Item] = deque()
         self._lost = 0  # not told to the file yet; the loop adds, the thread takes
         self._lost_ever = 0
@@ -177,7 +182,12 @@ class RecordingThread:
         )
         suffix = f"-p{self._part}" if self._part > 1 else ""
         writer = RecordingWriter(
-            self._directory / f"{info.recording}{suffix}.mcap", info, robot.record.description, robot.codecs
+            self._directory / f"{info.recording}{suffix}.mcap",
+            info,
+            robot.record.description,
+            robot.codecs,
+            self._signing,
+            self._head,
         )
         self._writer = writer
         now, epoch, event = self._newest, robot.record.epoch, robot.record.event
@@ -204,6 +214,7 @@ class RecordingThread:
         if writer is not None:
             writer.close()
             self._bytes_before += writer.bytes_written
+            self._head = writer.head
 
     def _tell_lost(self, writer: RecordingWriter) -> None:
         lost, self._lost = self._lost, 0

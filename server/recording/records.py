@@ -26,6 +26,7 @@ __all__ = [
     "RestRecord",
     "RobotRecord",
     "SeatRecord",
+    "SignatureRecord",
     "StopRecord",
     "Vector",
     "WrenchRecord",
@@ -77,6 +78,9 @@ class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
     faults: list[str] = []
     limits: list[str] = []
     unknown: list[str] = []
+    nonce: Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)] = 0
+    neutral_needed: bool = False
+    warning: float = 0.0  # s
 
 
 class RefusalRecord(OwnRecord, frozen=True, kw_only=True):
@@ -145,6 +149,21 @@ class Degraded(OwnRecord, frozen=True, kw_only=True):
     lost: Annotated[int, msgspec.Meta(ge=1)]
 
 
+class SignatureRecord(OwnRecord, frozen=True, kw_only=True):
+    """The last message of a chunk: signs all that is in the file up to here (docs/recording.md, "Signatures")."""
+
+    recording: str
+    part: Annotated[int, msgspec.Meta(ge=1)]
+    number: Annotated[int, msgspec.Meta(ge=1)]  # counts the signatures of the file
+    until: Count  # ns since 1970, arrival of the last record that it signs
+    final: bool  # nothing comes behind it
+    head: str  # of the hash chain, 64 hexadecimal digits
+    previous: str  # head of the part before; "" in the first part
+    audit: str  # newest signed head of the audit, JSON; "" when there was none
+    key: str  # Ed25519 public key, 64 hexadecimal digits
+    signature: str  # 128 hexadecimal digits
+
+
 class Vector(msgspec.Struct, frozen=True):
     x: float
     y: float
@@ -172,5 +191,6 @@ OWN_RECORDS: dict[str, type[OwnRecord]] = {
     "lockstep.Note": NoteRecord,
     "lockstep.Degraded": Degraded,
     "lockstep.Wrench": WrenchRecord,
+    "lockstep.Signature": SignatureRecord,
 }
 """By the name of their schema."""

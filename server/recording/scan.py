@@ -3,14 +3,11 @@
 import os
 import struct
 import zlib
-from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
 
 import msgspec
 from mcap.data_stream import ReadDataStream, RecordBuilder
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -28,29 +25,17 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from mcap.stream_reader import CRCValidationError, breakup_chunk
+from mcap.stream_reader import breakup_chunk
 
 from server.recording.errors import DiskTrouble, RecordingDamaged
 from server.recording.event_index import INDEX_NAME, EventIndex, IndexBuilder, TopicEntry
 from server.recording.info import METADATA_NAME, RecordingInfo
 from server.recording.marks import MarkFinder
 from server.recording.payload import VIDEO, own_record_of, picture_of
+from server.recording.raw_records import BROKEN, HEAD, MAGIC, RawRecord, raw_records
 from server.recording.records import Degraded, FeedbackRecord
 
 __all__ = ["Scan", "complete_file", "scan_file"]
-
-MAGIC = b"\x89MCAP0\r\n"
-HEAD = 9  # bytes of opcode and length
-
-
-class RawRecord(NamedTuple):
-    opcode: int
-    offset: int
-    content: bytes
-
-    @property
-    def end(self) -> int:
-        return self.offset + HEAD + len(self.content)
 
 
 class Scan:
@@ -140,23 +125,12 @@ def scan_file(path: Path, info: RecordingInfo) -> Scan:
         if file.read(len(MAGIC)) != MAGIC:
             raise RecordingDamaged(f"{path.name} is no MCAP file")
         try:
-            for raw in _raw_records(file):
+            for raw in raw_records(file):
                 if not scan.take(raw):
                     break
-        except (McapError, CRCValidationError, RecordingDamaged, ValueError, KeyError, RuntimeError):
+        except (*BROKEN, RecordingDamaged):
             pass  # from here on it is broken
     return scan
-
-
-def _raw_records(file: BinaryIO) -> Iterator[RawRecord]:
-    size = os.fstat(file.fileno()).st_size
-    while True:
-        offset = file.tell()
-        head = file.read(HEAD)
-        length = int.from_bytes(head[1:], "little")
-        if len(head) < HEAD or offset + HEAD + length > size:
-            return
-        yield RawRecord(head[0], offset, file.read(length))
 
 
 def complete_file(path: Path, info: RecordingInfo) -> EventIndex:

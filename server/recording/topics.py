@@ -29,6 +29,7 @@ from server.recording.records import (
     RestRecord,
     RobotRecord,
     SeatRecord,
+    SignatureRecord,
     StopRecord,
     WrenchRecord,
 )
@@ -42,6 +43,7 @@ __all__ = [
     "PICTURE_FORMATS",
     "POSE",
     "SCAN",
+    "SIGNATURE",
     "SOUND_FORMATS",
     "Topic",
     "media_topic",
@@ -70,7 +72,9 @@ OWN_TOPICS: dict[type[OwnRecord], str] = {
     NoteRecord: "/lockstep/note",
     Degraded: "/lockstep/degraded",
     WrenchRecord: "/wrench",
+    SignatureRecord: "/lockstep/signature",
 }
+SIGNATURE = OWN_TOPICS[SignatureRecord]
 
 
 class Topic(NamedTuple):
@@ -81,9 +85,11 @@ class Topic(NamedTuple):
     encoding: str  # of the messages: "protobuf" or "json"
 
 
-def topics_of(description: RobotDescription, codecs: Mapping[str, str]) -> list[Topic]:
+def topics_of(description: RobotDescription, codecs: Mapping[str, str], *, signed: bool = False) -> list[Topic]:
     """All that a recording of this robot can have; `codecs`: "H264", "opus" or "PCMU" by stream."""
-    found = [_own(topic, kind) for kind, topic in OWN_TOPICS.items() if kind is not WrenchRecord]
+    found = [_own(topic, kind) for kind, topic in OWN_TOPICS.items() if kind not in (WrenchRecord, SignatureRecord)]
+    if signed:
+        found.append(_own(SIGNATURE, SignatureRecord))
     if description.wrench is not None:
         found.append(_own(OWN_TOPICS[WrenchRecord], WrenchRecord))
     for stream, codec in codecs.items():

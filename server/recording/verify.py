@@ -22,6 +22,7 @@ from server.recording.records import (
     SeatRecord,
     StopRecord,
 )
+from server.recording.verify_signature import SignatureReport
 
 __all__ = ["CHECKS", "Check", "CheckName", "Verdict", "Verifier", "Violation"]
 
@@ -35,6 +36,7 @@ CheckName = Literal[
     "stopped",  # and not while the robot is stopped
     "stamps",  # no picture or sound is stamped newer than it is
     "rendered",  # the operator's page rendered nothing beyond its tolerance
+    "signed",  # everything is what was signed, to its end; or nothing is signed
 ]
 CHECKS: tuple[CheckName, ...] = (
     "readable",
@@ -46,6 +48,7 @@ CHECKS: tuple[CheckName, ...] = (
     "stopped",
     "stamps",
     "rendered",
+    "signed",
 )
 TICK = 0.25  # s from the decision to execute until the feedback's own time: a tick and the measurement, with room
 ROUNDING = 2e-6  # s; times in the file are rounded to ns, capture times of sound to a sample
@@ -76,6 +79,7 @@ class Verdict(msgspec.Struct, kw_only=True):
     events: int  # that were executed
     commands: int  # forwarded
     pictures_and_sounds: int
+    signature: SignatureReport
 
 
 class _Answered(msgspec.Struct):
@@ -101,6 +105,7 @@ class Verifier:
         self._waiting: list[tuple[str, int, int, float]] = []  # stamped with an event whose feedback is not here yet
         self._rendered: dict[tuple[str, str], StreamReport] = {}  # newest, by peer and stream
         self._events = self._commands = self._media = 0
+        self._signature = SignatureReport()
 
     def fail(self, check: CheckName, text: str, event: int = 0, time: int = 0) -> None:
         """Something is not as promised."""
@@ -108,6 +113,13 @@ class Verifier:
         found.count += 1
         if len(found.violations) < MOST:
             found.violations.append(Violation(event, time, text))
+
+    def signed(self, report: SignatureReport) -> None:
+        """What the file's signatures say."""
+        self._signature = report
+        self._checks["signed"].looked += report.signatures
+        for fault in report.faults:
+            self.fail("signed", fault.text, fault.event, fault.time)
 
     def record(self, record: OwnRecord, arrived: int, captured: int) -> None:
         """One of Lockstep's own; times in ns since 1970."""
@@ -283,4 +295,5 @@ class Verifier:
             events=self._events,
             commands=self._commands,
             pictures_and_sounds=self._media,
+            signature=self._signature,
         )

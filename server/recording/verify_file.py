@@ -4,16 +4,21 @@ from pathlib import Path
 
 from server.recording.errors import RecordingError
 from server.recording.payload import own_record_of
+from server.recording.raw_records import MAGIC, raw_records
 from server.recording.reader import Record, RecordingReader
 from server.recording.records import RobotRecord
 from server.recording.topics import stream_of
 from server.recording.verify import Verdict, Verifier
+from server.recording.verify_signature import SignatureChecker, SignatureReport
 
 __all__ = ["verify_file"]
 
 
-def verify_file(path: Path) -> Verdict:
+def verify_file(path: Path, key: str = "") -> Verdict:
     """What a recording keeps of Lockstep's promises.
+
+    Args:
+        key: public key that has to have signed it; "": any, or none
 
     Raises:
         RecordingDamaged: it is no recording at all.
@@ -35,7 +40,17 @@ def verify_file(path: Path) -> Verdict:
             except RecordingError as error:
                 verifier.fail("readable", error.detail)
         _compare(verifier, reader, counts)
+        verifier.signed(_signatures(path, reader, key))
         return verifier.verdict(ended)
+
+
+def _signatures(path: Path, reader: RecordingReader, key: str) -> SignatureReport:
+    checker = SignatureChecker(reader.info, None if reader.interrupted else reader.index, key)
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        for raw in raw_records(file):
+            checker.take(raw)
+    return checker.report()
 
 
 def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:

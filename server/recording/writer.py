@@ -16,7 +16,8 @@ from server.recording.event_index import INDEX_NAME, EventIndex, IndexBuilder, T
 from server.recording.info import METADATA_NAME, RecordingInfo
 from server.recording.marks import MarkFinder
 from server.recording.records import FeedbackRecord, OwnRecord
-from server.recording.topics import Topic, topics_of
+from server.recording.signature import RecordingSigning, Signatures, TopicText
+from server.recording.topics import SIGNATURE, Topic, topics_of
 
 __all__ = ["Entry", "RecordingWriter"]
 
@@ -41,15 +42,30 @@ class Entry(NamedTuple):
 class RecordingWriter:
     """`write` and `flush_if_due` in turn, `close` at the end.
 
+    Args:
+        signing: signs each chunk; None: nothing does
+        previous: head of the part before
+
     Raises:
         DiskTrouble: from all of them. What was flushed before stays whole; `abandon` then.
     """
 
     def __init__(
-        self, path: Path, info: RecordingInfo, description: RobotDescription, codecs: Mapping[str, str]
+        self,
+        path: Path,
+        info: RecordingInfo,
+        description: RobotDescription,
+        codecs: Mapping[str, str],
+        signing: RecordingSigning | None = None,
+        previous: str = "",
     ) -> None:
         self.path = path
         self.info = info
+        topics = topics_of(description, codecs, signed=signing is not None)
+        self._signatures: Signatures | None = None
+        if signing is not None:
+            self._signatures = Signatures(signing, info, map(_text, topics), previous)
+        self._newest = 0  # ns, arrival of the last record
         self._builder = IndexBuilder(EventIndex(epoch=info.epoch, recording=info.recording, part=info.part))
         self._marks = MarkFinder(description)
         self._channels: dict[str, int] = {}
@@ -65,7 +81,7 @@ class RecordingWriter:
         try:
             self._writer.start(profile="", library=LIBRARY)
             self._writer.add_metadata(METADATA_NAME, info.metadata())
-            self._register(topics_of(description, codecs), info.epoch)
+            self._register(topics, info.epoch)
             self._sync()
         except OSError as error:
             self.abandon()
@@ -81,6 +97,11 @@ class RecordingWriter:
             channel = self._writer.register_channel(topic.name, topic.encoding, schemas[topic.schema], {"epoch": epoch})
             self._channels[topic.name] = channel
             self._builder.index.topics.append(TopicEntry(channel, topic.name, topic.schema, topic.encoding))
+
+    @property
+    def head(self) -> str:
+        """Of the signed chain, as far as it is signed; "" without one."""
+        return "" if self._signatures is None else self._signatures.head
 
     @property
     def bytes_written(self) -> int:
@@ -105,6 +126,11 @@ class RecordingWriter:
             self.count_lost(1)
             return
         self._writer.add_message(channel, entry.arrived, entry.data, publish_time=entry.captured, sequence=entry.event)
+        self._newest = entry.arrived
+        if self._signatures is not None:
+            self._signatures.add(
+                entry.topic, entry.event, entry.arrived, entry.captured, entry.data, own=entry.record is not None
+            )
         if self._chunk_since is None:
             self._chunk_since = entry.arrived
         self._waiting += len(entry.data)
@@ -124,17 +150,27 @@ class RecordingWriter:
         self.flush()
         return True
 
-    def flush(self) -> None:
+    def flush(self, *, final: bool = False) -> None:
         """Put the chunk on the disk."""
-        if self._chunk_since is None:
+        if self._chunk_since is None and not (final and self._signatures is not None):
             return
         try:
+            if self._signatures is not None:
+                self._sign(self._signatures, final=final)
             self._writer.flush()
             self._builder.chunk_written(self._whole)
             self._sync()
         except OSError as error:
             raise DiskTrouble(_reason(error)) from error
         self._waiting, self._chunk_since = 0, None
+
+    def _sign(self, signatures: Signatures, *, final: bool) -> None:
+        """The chunk's last message."""
+        record = signatures.sign(final=final)
+        data = msgspec.json.encode(record)
+        channel = self._channels[SIGNATURE]
+        self._writer.add_message(channel, self._newest, data, publish_time=self._newest, sequence=record.event)
+        self._builder.add(SIGNATURE, record.event, self._newest // 1000, keyframe=False, feedback=False)
 
     def _sync(self) -> None:
         self._file.flush()
@@ -145,7 +181,7 @@ class RecordingWriter:
         """Write what waits, the index and the summary. Idempotent."""
         if self._file.closed:
             return self._builder.index
-        self.flush()
+        self.flush(final=True)
         index = self._builder.index
         try:
             self._writer.add_attachment(
@@ -164,6 +200,10 @@ class RecordingWriter:
             self._file.close()  # what Python still had buffered may not fit
         with suppress(OSError):
             os.truncate(self.path, self._whole)  # else readers stop at the broken record
+
+
+def _text(topic: Topic) -> TopicText:
+    return TopicText(topic.name, topic.encoding, topic.schema, topic.schema_encoding, topic.schema_data)
 
 
 def _reason(error: OSError) -> str:

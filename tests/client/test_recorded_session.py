@@ -12,10 +12,13 @@ import pytest
 from bench.emulator import Network, load_profile
 from client import Console
 from robot_bridge.robots.event_strip import read_event_strip
+from server.evidence.anchors import parse_anchor
+from server.evidence.signer import evidence_signer
 from server.recording.payload import own_record_of
 from server.recording.reader import Record, RecordingReader
 from server.recording.records import CommandRecord, FeedbackRecord
 from server.recording.verify_file import verify_file
+from server.state_dir import StateDir
 from tests.client.truth import until_logged
 from tests.support.stack import Stack, running_stack
 
@@ -27,6 +30,7 @@ SAME = 2e-6  # s; times in the file are rounded
 
 class Session(NamedTuple):
     recording: Path
+    state: Path  # the console's directory
     log: list[dict[str, Any]]
 
 
@@ -44,7 +48,7 @@ async def _recorded(directory: Path) -> Session:
         await until_logged(stack, "feedback", lambda record: record["event"] >= newest)
         log = list(stack.records())
     (path,) = recordings.glob("*.mcap")
-    return Session(path, log)
+    return Session(path, directory / "state", log)
 
 
 async def _drive(stack: Stack) -> None:
@@ -62,6 +66,24 @@ def test_the_recording_keeps_every_promise(session: Session) -> None:
     assert verdict.ok, json.dumps({name: str(check.violations) for name, check in verdict.checks.items()}, indent=1)
     assert verdict.events >= EVENTS
     assert verdict.checks["stamps"].looked > EVENTS
+
+
+def test_it_is_signed_with_the_consoles_key_to_its_end_and_a_flipped_byte_is_named(
+    session: Session, tmp_path: Path
+) -> None:
+    signer = evidence_signer(StateDir(session.state))
+    found = verify_file(session.recording, signer.public_key).signature
+    assert found.state == "signed"
+    anchor = parse_anchor(found.audit)
+    assert anchor is not None
+    assert (anchor.log, anchor.key) == ("audit", signer.public_key)
+    data = bytearray(session.recording.read_bytes())
+    data[len(data) // 2] ^= 1
+    flipped = tmp_path / "flipped.mcap"
+    flipped.write_bytes(data)
+    verdict = verify_file(flipped)
+    assert verdict.signature.state == "broken"
+    assert "chunk" in verdict.checks["signed"].violations[0].text
 
 
 def test_at_ten_random_events_command_feedback_pictures_and_sound_are_those_with_that_reference(

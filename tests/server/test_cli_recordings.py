@@ -4,9 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from typer.testing import CliRunner, Result
 
 from server.cli import app
+from server.evidence.signer import Signer
+from server.recording.signature import RecordingSigning
 from tests.server.recording.makers import Story
 
 EVENTS = 60
@@ -48,6 +51,21 @@ def test_a_recording_is_verified_by_its_id_or_its_path(directory: Path) -> None:
     assert "FAIL" not in words.stdout
     found = json.loads(_lockstep(directory, "verify", str(directory / "one.mcap"), "--json").stdout)
     assert all(check["count"] == 0 for check in found["checks"].values())
+
+
+def test_who_signed_it_is_said_and_a_key_that_did_not_is_named(directory: Path) -> None:
+    signer = Signer(Ed25519PrivateKey.generate())
+    Story(events=EVENTS).write(directory / "two.mcap", signing=RecordingSigning(signer, lambda: ""))
+    good = _lockstep(directory, "verify", "two", "--key", signer.public_key)
+    assert good.exit_code == 0, good.output
+    assert f"up to s={EVENTS}" in good.stdout
+    assert f"by {signer.public_key}" in good.stdout
+    assert _lockstep(directory, "verify", "two", "--key", "0" * 64).exit_code == 1
+    assert _lockstep(directory, "verify", "two", "--key", "key").exit_code == 2
+    unsigned = _lockstep(directory, "verify", "one")
+    assert unsigned.exit_code == 0
+    assert "unsigned" in unsigned.stdout
+    assert _lockstep(directory, "verify", "one", "--key", signer.public_key).exit_code == 1
 
 
 def test_a_tampered_recording_ends_with_1_and_what_is_none_with_2(directory: Path) -> None:

@@ -33,6 +33,7 @@ from server.recording.records import (
     RobotRecord,
     SeatRecord,
 )
+from server.recording.signature import RecordingSigning
 from server.recording.topics import CAMERA, MICROPHONE, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS
 from server.recording.writer import Entry, RecordingWriter
 
@@ -165,8 +166,8 @@ class Story:
             epoch=EPOCH, event=event, peer="p1", name="Ada", report=Report(event=event, streams=[stream])
         )
 
-    def write(self, path: Path, *, close: bool = True) -> RecordingWriter:
-        return _write(path, self.entries(), close=close)
+    def write(self, path: Path, *, close: bool = True, signing: RecordingSigning | None = None) -> RecordingWriter:
+        return _write(path, self.entries(), close=close, signing=signing)
 
 
 def rewritten(path: Path, entries: list[Entry], change: Callable[[Entry], list[Entry]]) -> Path:
@@ -175,8 +176,10 @@ def rewritten(path: Path, entries: list[Entry], change: Callable[[Entry], list[E
     return path
 
 
-def _write(path: Path, entries: list[Entry], *, close: bool = True) -> RecordingWriter:
-    writer = RecordingWriter(path, INFO, DESCRIPTION, CODECS)
+def _write(
+    path: Path, entries: list[Entry], *, close: bool = True, signing: RecordingSigning | None = None
+) -> RecordingWriter:
+    writer = RecordingWriter(path, INFO, DESCRIPTION, CODECS, signing)
     for entry in entries:
         writer.flush_if_due(entry.arrived)
         writer.write(entry)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import av
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from foxglove.messages import CompressedVideo
 from foxglove.messages import JointStates as SdkJointStates
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
@@ -11,6 +12,8 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo as Mes
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.reader import make_reader
 
+from server.evidence.signer import Signer
+from server.recording.signature import RecordingSigning
 from tests.server.recording.makers import Story
 
 EVENTS = 60
@@ -19,7 +22,8 @@ EVENTS = 60
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recordings") / "a.mcap"
-    Story(events=EVENTS, real=True).write(path)
+    signing = RecordingSigning(Signer(Ed25519PrivateKey.generate()), lambda: "")
+    Story(events=EVENTS, real=True).write(path, signing=signing)
     return path
 
 
@@ -60,7 +64,8 @@ def test_schemas_are_those_of_the_foxglove_sdk(file: Path) -> None:
 def test_rerun_loads_it(codec: str, sounds: tuple[str, ...], tmp_path: Path) -> None:
     """With pictures in VP8, or sound in G.711, all the rest: it knows neither."""
     file = tmp_path / "a.mcap"
-    Story(events=EVENTS, real=True, codecs=(codec,), sounds=sounds).write(file)
+    signing = RecordingSigning(Signer(Ed25519PrivateKey.generate()), lambda: "")
+    Story(events=EVENTS, real=True, codecs=(codec,), sounds=sounds).write(file, signing=signing)
     rerun = pytest.importorskip("rerun")
     target = tmp_path / "a.rrd"
     recording = rerun.RecordingStream("lockstep-test")

@@ -7,15 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from robot_bridge.protocol.messages import Feedback
+from server.evidence.signer import Signer
 from server.recording import recording_thread
 from server.recording.info import RecordingInfo
 from server.recording.items import FeedbackItem, MediaItem, OwnItem, RobotItem
+from server.recording.payload import own_record
 from server.recording.reader import RecordingReader
 from server.recording.recording_thread import RecordingThread
-from server.recording.records import RobotRecord, SeatRecord
+from server.recording.records import RobotRecord, SeatRecord, SignatureRecord
 from server.recording.settings import RecordingSettings
+from server.recording.signature import RecordingSigning
+from server.recording.topics import SIGNATURE
+from server.recording.verify_file import verify_file
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, SECOND, START
 
 PATIENCE = 10.0
@@ -35,6 +41,7 @@ class Made:
             lambda: self.now,
             self._part,
             self.ended.set,
+            RecordingSigning(Signer(Ed25519PrivateKey.generate()), lambda: ""),
         )
 
     def _part(self) -> None:
@@ -102,6 +109,21 @@ def test_a_file_that_is_large_enough_goes_on_in_the_next(tmp_path: Path) -> None
         with RecordingReader(tmp_path / ("r.mcap" if number == 1 else f"r-p{number}.mcap")) as reader:
             events += [record.event for record in reader.records(topics={"/camera/front"})]
     assert events == list(range(1, 31))
+
+
+def test_every_part_is_signed_to_its_end_and_names_the_head_of_the_one_before(tmp_path: Path) -> None:
+    made = Made(tmp_path)
+    made.robot()
+    made.feedback(1)
+    made.robot("epoch-2")
+    made.feedback(1, "epoch-2")
+    made.thread.start()
+    made.thread.close()
+    first, second = (verify_file(tmp_path / name).signature for name in ("r.mcap", "r-p2.mcap"))
+    assert (first.state, second.state, first.previous) == ("signed", "signed", "")
+    with RecordingReader(tmp_path / "r.mcap") as reader:
+        *_, closing = reader.records(topics={SIGNATURE})
+    assert second.previous == own_record(SignatureRecord, closing.data).head
 
 
 def test_nothing_waits_for_a_disk_that_is_too_slow_and_what_is_missing_is_told(

@@ -1,0 +1,226 @@
+"""A signed recording verifies, and whatever is done to it afterwards is named."""
+
+import random
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import msgspec
+import pytest
+import zstandard
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Chunk, Message
+from mcap.stream_reader import breakup_chunk
+
+from server.evidence.signer import Signer
+from server.recording.errors import RecordingError
+from server.recording.raw_records import MAGIC, RawRecord, raw_records
+from server.recording.reader import RecordingReader
+from server.recording.records import SignatureRecord
+from server.recording.scan import complete_file
+from server.recording.signature import RecordingSigning
+from server.recording.topics import SIGNATURE
+from server.recording.verify import Verdict
+from server.recording.verify_file import verify_file
+from tests.server.recording.makers import INFO, Story
+
+EVENTS = 150
+KEY = Signer(Ed25519PrivateKey.generate())
+OTHER = Signer(Ed25519PrivateKey.generate())
+Block = list[RawRecord]  # a chunk with its message indexes
+
+
+def signing(signer: Signer = KEY) -> RecordingSigning:
+    return RecordingSigning(signer, lambda: "")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Of a signed recording."""
+    path = tmp_path_factory.mktemp("recordings") / "a.mcap"
+    Story(events=EVENTS).write(path, signing=signing())
+    return path.read_bytes()
+
+
+@pytest.fixture
+def path(whole: bytes, tmp_path: Path) -> Path:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(whole)
+    return path
+
+
+def faults(verdict: Verdict) -> str:
+    return "\n".join(each.text for each in verdict.checks["signed"].violations)
+
+
+def rebuilt(path: Path, change: Callable[[list[Block]], list[Block]]) -> None:
+    """Other chunks; index, summary and checksums are made to fit by who has no key."""
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        records = list(raw_records(file))
+    front = [raw for raw in records if raw.opcode in (Opcode.HEADER, Opcode.METADATA)]
+    blocks: list[Block] = []
+    for raw in records:
+        if raw.opcode == Opcode.CHUNK:
+            blocks.append([raw])
+        elif raw.opcode == Opcode.MESSAGE_INDEX:
+            blocks[-1].append(raw)
+        elif raw.opcode == Opcode.DATA_END:
+            break
+    parts = [*front, *(raw for block in change(blocks) for raw in block)]
+    path.write_bytes(
+        MAGIC + b"".join(bytes([raw.opcode]) + len(raw.content).to_bytes(8, "little") + raw.content for raw in parts)
+    )
+    complete_file(path, INFO)
+
+
+def with_messages(block: Block, change: Callable[[list[Message]], list[Message]]) -> Block:
+    """The same chunk with other messages, a checksum that fits, and no message indexes."""
+    chunk = Chunk.read(ReadDataStream(BytesIO(block[0].content)))
+    parts = breakup_chunk(chunk)
+    builder = RecordBuilder()
+    messages = [part for part in parts if isinstance(part, Message)]
+    for part in [*(each for each in parts if not isinstance(each, Message)), *change(messages)]:
+        part.write(builder)
+    data = builder.end()
+    changed = Chunk(
+        compression="zstd",
+        data=zstandard.compress(data),
+        message_start_time=chunk.message_start_time,
+        message_end_time=chunk.message_end_time,
+        uncompressed_crc=0,
+        uncompressed_size=len(data),
+    )
+    record = RecordBuilder()
+    changed.write(record)
+    return [RawRecord(Opcode.CHUNK, 0, record.end()[9:])]
+
+
+def test_a_signed_recording_verifies_names_its_signer_and_is_signed_to_its_end(path: Path) -> None:
+    verdict = verify_file(path, KEY.public_key)
+    assert verdict.ok, faults(verdict)
+    with RecordingReader(path) as reader:
+        chunks, ended, last = len(reader.index.chunks), reader.index.ended, reader.index.last_event
+    found = verdict.signature
+    assert (found.state, found.signer, found.signatures) == ("signed", KEY.public_key, chunks)
+    assert (found.until_event, found.until_time) == (last, ended)
+
+
+def test_the_file_stays_one_that_the_mcap_library_reads_with_a_schema_for_the_signatures(path: Path) -> None:
+    with path.open("rb") as stream:
+        found = [message.data for _, _, message in make_reader(stream, validate_crcs=True).iter_messages([SIGNATURE])]
+    records = [msgspec.json.decode(data, type=SignatureRecord) for data in found]
+    assert [record.number for record in records] == list(range(1, len(records) + 1))
+    assert [record.final for record in records] == [False] * (len(records) - 1) + [True]
+
+
+def test_any_flipped_byte_is_named_wherever_it_lies(whole: bytes, path: Path) -> None:
+    """Behind the header, which says who wrote the library."""
+    places = random.Random(7)
+    start = whole.index(b"lockstep") + 8 + 16
+    for _ in range(60):
+        at = places.randrange(start, len(whole))
+        flipped = bytearray(whole)
+        flipped[at] ^= 1 << places.randrange(8)
+        path.write_bytes(flipped)
+        try:
+            verdict = verify_file(path)
+        except RecordingError:
+            continue
+        assert not verdict.ok, f"byte {at} of {len(whole)}"
+
+
+def test_a_chunk_that_was_taken_out_is_named(path: Path) -> None:
+    rebuilt(path, lambda blocks: [*blocks[:2], *blocks[3:]])
+    verdict = verify_file(path)
+    assert verdict.signature.state == "broken"
+    assert "chunks were taken out: signature 4 comes behind signature 2" in faults(verdict)
+
+
+def test_chunks_that_changed_places_are_named(path: Path) -> None:
+    rebuilt(path, lambda blocks: [blocks[0], blocks[2], blocks[1], *blocks[3:]])
+    assert "chunks were reordered or repeated" in faults(verify_file(path))
+
+
+def test_a_message_that_was_changed_taken_out_put_in_or_moved_is_named_even_with_a_checksum_that_fits(
+    path: Path, whole: bytes
+) -> None:
+    def edited(messages: list[Message]) -> list[Message]:
+        picture = next(each for each in messages if not each.data.startswith(b"{"))
+        picture.data = picture.data[:-1] + bytes([picture.data[-1] ^ 1])
+        return messages
+
+    def later(messages: list[Message]) -> list[Message]:
+        messages[3].publish_time += 1
+        return messages
+
+    changes: list[Callable[[list[Message]], list[Message]]] = [
+        edited,
+        later,
+        lambda messages: [*messages[:3], *messages[4:]],
+        lambda messages: [*messages[:3], messages[3], *messages[3:]],
+        lambda messages: [*messages[:3], messages[4], messages[3], *messages[5:]],
+    ]
+    for change in changes:
+        path.write_bytes(whole)
+        rebuilt(path, lambda blocks, change=change: [*blocks[:2], with_messages(blocks[2], change), *blocks[3:]])  # type: ignore[misc]
+        assert "are not those that were signed" in faults(verify_file(path))
+
+
+def test_what_was_put_behind_the_signature_of_a_chunk_is_named(path: Path) -> None:
+    rebuilt(path, lambda blocks: [*blocks[:2], with_messages(blocks[2], lambda found: [*found, found[0]]), *blocks[3:]])
+    assert "the end of chunk 2 was signed by nobody" in faults(verify_file(path))
+
+
+def test_a_tail_that_was_cut_off_is_named_with_the_event_up_to_which_it_is_signed(path: Path) -> None:
+    rebuilt(path, lambda blocks: blocks[:-2])
+    verdict = verify_file(path)
+    assert verdict.signature.state == "open"
+    assert not verdict.ok
+    assert "no closing signature" in faults(verdict)
+    with RecordingReader(path) as reader:
+        assert verdict.signature.until_event == reader.index.last_event
+        assert verdict.signature.until_time == reader.index.ended
+
+
+def test_an_interrupted_recording_is_signed_up_to_its_last_chunk(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    writer = Story(events=EVENTS).write(path, close=False, signing=signing())
+    writer.abandon()
+    complete_file(path, INFO)
+    verdict = verify_file(path)
+    assert (verdict.signature.state, verdict.signature.signer) == ("open", KEY.public_key)
+    assert [name for name, check in verdict.checks.items() if not check.ok] == ["signed"]
+
+
+def test_another_signer_than_the_one_that_is_asked_for_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=EVENTS).write(path, signing=signing(OTHER))
+    assert verify_file(path).signature.signer == OTHER.public_key
+    verdict = verify_file(path, KEY.public_key)
+    assert f"signed by {OTHER.public_key}, not by {KEY.public_key}" in faults(verdict)
+
+
+def test_a_stranger_who_signs_changed_chunks_anew_is_another_key(path: Path, tmp_path: Path) -> None:
+    forged = tmp_path / "forged.mcap"
+    Story(events=EVENTS, force_at=60).write(forged, signing=signing(OTHER))
+    theirs: list[list[Block]] = []
+    rebuilt(forged, lambda blocks: theirs.append(blocks) or blocks)  # type: ignore[func-returns-value]
+    rebuilt(path, lambda blocks: [*blocks[:2], *theirs[0][2:]])
+    assert "is of another key" in faults(verify_file(path))
+
+
+def test_an_unsigned_recording_is_said_to_be_one_and_fails_only_where_a_key_is_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=40).write(path)
+    verdict = verify_file(path)
+    assert (verdict.ok, verdict.signature.state) == (True, "unsigned")
+    assert faults(verify_file(path, KEY.public_key)) == "it is not signed at all"
+
+
+def test_metadata_that_was_changed_is_named(path: Path, whole: bytes) -> None:
+    path.write_bytes(whole.replace(b"Ada", b"Bob", 1))
+    assert "are not those that were signed" in faults(verify_file(path))
