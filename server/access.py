@@ -1,5 +1,6 @@
 """Access tokens: signed (JWT, HS256, RFC 7519), with a role, a name, an id and an end."""
 
+import math
 import secrets
 import time
 from collections.abc import Callable
@@ -30,6 +31,7 @@ class Identity(NamedTuple):
     token_id: str
     expires: float  # s since 1970
     robots: tuple[str, ...] = ()  # of a fleet, that it is good for; empty: all
+    issued: float = math.inf  # s since 1970, when the link was made; infinite: not known
 
     def may_see(self, robot: str) -> bool:
         """Whether this link is good for that robot; "" is the robot of a console that has only one."""
@@ -111,7 +113,7 @@ class Access:
 
     def sign(self, identity: Identity, issued: float) -> str:
         """The token that stands for `identity`; the same one whenever the arguments are."""
-        role, name, token_id, expires, robots = identity
+        role, name, token_id, expires, robots = identity[:5]
         return self._encode(_LinkClaims("lockstep", expires, issued, role, name, token_id, robots))
 
     def verify(self, token: str) -> Identity:
@@ -124,7 +126,7 @@ class Access:
         """
         claims = self._decode(token, _LinkClaims)
         self._check(claims.jti, claims.exp)
-        identity = Identity(claims.role, claims.name, claims.jti, claims.exp, claims.robots)
+        identity = Identity(claims.role, claims.name, claims.jti, claims.exp, claims.robots, claims.iat)
         if self._robot is not None and not identity.may_see(self._robot):
             raise LinkOtherRobot("this link is good for other robots only")
         return identity

@@ -3,6 +3,7 @@
 import asyncio
 import gzip
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Annotated, TypeVar
 
 import msgspec
@@ -14,10 +15,20 @@ from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.serial import MAX_EVENT, event_gap
 from server.access import Identity, require_role
 from server.body import read_json
-from server.errors import BadParameter, ConsoleError, NotFound, RecordingFailed, RecordingUnreadable, RobotFailed
+from server.errors import (
+    BadParameter,
+    ConsoleError,
+    NotAllowed,
+    NotFound,
+    RecordingFailed,
+    RecordingUnreadable,
+    RobotFailed,
+)
 from server.recording.errors import RecordingError
 from server.recording.event_index import EventIndex
+from server.recording.library import Library
 from server.recording.reader import Record, RecordingReader
+from server.recording.rights import RecordingReaderRight, check_end
 from server.recording.service import RecordingService
 from server.recording.shelf import RecordingEntry
 
@@ -83,25 +94,45 @@ async def _caller(request: Request) -> Identity:
 Caller = Annotated[Identity, Depends(_caller)]
 
 
+def _right(request: Request, caller: Identity) -> RecordingReaderRight:
+    """What the caller may read."""
+    everything = _service(request).opens_all
+    return (
+        RecordingReaderRight(caller.role, None) if everything else RecordingReaderRight.of(caller.role, caller.issued)
+    )
+
+
+def _told_audit(request: Request, caller: Identity, what: str, recording_id: str) -> None:
+    _service(request).audit.record("recording", caller.actor, what, recording_id)
+
+
 @router.get("/api/recordings")
 async def recordings(request: Request, caller: Caller) -> Response:
     library = _service(request).library
-    found = await asyncio.to_thread(library.entries)
-    return _json(RecordingList(state=library.state(), recordings=found))
+    return _json(await _list(request, library, caller))
 
 
 @router.post("/api/recordings")
 async def start(request: Request, caller: Caller) -> Response:
     require_role(caller, "operator", "supervisor")
     wanted = await read_json(request, RecordingRequest)
-    return _json(_service(request).library.start(caller.name, wanted.name.strip()), 201)
+    state = _service(request).library.start(caller.name, wanted.name.strip())
+    _told_audit(request, caller, "started", state.recording)
+    return _json(state, 201)
 
 
 @router.post("/api/recordings/stop")
 async def stop(request: Request, caller: Caller) -> Response:
     """Answers when the file is closed."""
-    require_role(caller, "operator", "supervisor")
-    return _json(await _service(request).library.stop())
+    service = _service(request)
+    holds_seat = service.holds_seat(caller.token_id)
+    check_end(caller.role, automatic=service.library.automatic, holds_seat=holds_seat)
+    running = service.library.state().recording
+    actor = caller.actor
+    state = await service.library.stop()
+    if running:
+        service.audit.record("recording", actor, "ended", running)
+    return _json(state)
 
 
 @router.get("/api/recordings/{recording_id}")
@@ -111,14 +142,18 @@ async def details(
     """`after`: only what the index has from that chunk on, for one who follows a running recording."""
 
     packed = "gzip" in request.headers.get("accept-encoding", "")
+    right = _right(request, caller)
+    actor = caller.actor
 
     def read(reader: RecordingReader, entry: RecordingEntry) -> bytes:
+        whole = right.part_of(reader.index)
         description = reader.description() if reader.index.chunks else None
-        index = reader.index.after(after).sparse(EVENT_SPACING)
+        index = whole.after(after).sparse(EVENT_SPACING)
         body = msgspec.json.encode(RecordingDetails(info=entry, description=description, index=index))
         return gzip.compress(body, compresslevel=1) if packed else body
 
     body = await _with_reader(request, recording_id, read)
+    _service(request).audit.again("reading", actor, recording_id)
     headers = {"Cache-Control": "no-store", "Vary": "Accept-Encoding"} | (
         {"Content-Encoding": "gzip"} if packed else {}
     )
@@ -127,16 +162,19 @@ async def details(
 
 @router.get("/api/recordings/{recording_id}/chunks/{number}")
 async def chunk(request: Request, caller: Caller, recording_id: str, number: int) -> Response:
-    """A chunk never changes."""
+    """A chunk never changes, but who may read it does: nobody keeps it."""
+    right = _right(request, caller)
+    actor = caller.actor
 
     def read(reader: RecordingReader, entry: RecordingEntry) -> bytes:
-        try:
-            return b"".join(map(_framed, reader.chunk(number)))
-        except IndexError as error:
-            raise NotFound("no such chunk") from error
+        if not 0 <= number < len(reader.index.chunks):
+            raise NotFound("no such chunk")
+        right.check_reads(reader.index.chunks[number].started)
+        return b"".join(map(_framed, reader.chunk(number)))
 
     body = await _with_reader(request, recording_id, read)
-    headers = {"Cache-Control": "private, max-age=86400, immutable"}
+    _service(request).audit.again("reading", actor, recording_id)
+    headers = {"Cache-Control": "no-store"}
     return Response(body, media_type="application/octet-stream", headers=headers)
 
 
@@ -154,9 +192,17 @@ async def records(
     if not 0 <= event_gap(last, first) <= MAX_EVENTS:
         raise BadParameter(f"from 0 to {MAX_EVENTS} events at once")
     topics = None if topic is None else frozenset(topic)
+    right = _right(request, caller)
+    actor = caller.actor
     reader, _ = await _open(request, recording_id)
+    try:
+        right.part_of(reader.index)
+    except NotAllowed:
+        reader.close()
+        raise
+    _service(request).audit.again("reading", actor, recording_id)
     # The response closes the iterator, and that the file, also when whoever asked is gone.
-    body = _bounded(reader, first, last, topics, decodable)
+    body = _bounded(reader, first, last, topics, decodable, right)
     return StreamingResponse(body, media_type="application/octet-stream", headers={"Cache-Control": "no-store"})
 
 
@@ -164,7 +210,10 @@ async def records(
 async def ticket(request: Request, caller: Caller, recording_id: str) -> Response:
     """For a link that the browser downloads by itself: it sends no token."""
     require_role(caller, "operator", "supervisor")
-    await _with_reader(request, recording_id, lambda reader, entry: None)
+    right = _right(request, caller)
+    actor = caller.actor
+    await _with_reader(request, recording_id, lambda reader, entry: right.check_reads(entry.started))
+    _service(request).audit.record("recording", actor, "downloaded", recording_id)
     root = request.scope.get("root_path", "")
     permission = _service(request).access.issue_file_ticket(recording_id, caller.token_id)
     return _json(FileTicket(f"{root}/api/recordings/{recording_id}/file?ticket={permission}"))
@@ -174,11 +223,22 @@ async def ticket(request: Request, caller: Caller, recording_id: str) -> Respons
 async def download(request: Request, recording_id: str, ticket: str = "") -> Response:
     """Of a running recording what is there now; `lockstep export` and other tools take that too."""
     access = _service(request).access
-    if ticket:
+    right, caller = None, None
+    if ticket:  # whose making was audited, and checked against the link
         access.verify_file_ticket(ticket, recording_id)
     else:
-        require_role(await _caller(request), "operator", "supervisor")
-    path = await _with_reader(request, recording_id, lambda reader, entry: reader.path)
+        caller = await _caller(request)
+        require_role(caller, "operator", "supervisor")
+        right = _right(request, caller)
+
+    def read(reader: RecordingReader, entry: RecordingEntry) -> Path:
+        if right is not None:
+            right.check_reads(entry.started)
+        return reader.path
+
+    path = await _with_reader(request, recording_id, read)
+    if caller is not None:
+        _told_audit(request, caller, "downloaded", recording_id)
     return FileResponse(
         path, media_type="application/x-mcap", filename=path.name, headers={"Cache-Control": "no-store"}
     )
@@ -192,8 +252,14 @@ async def delete(request: Request, caller: Caller, recording_id: str) -> Respons
         await asyncio.to_thread(library.delete, recording_id)
     except OSError as error:
         raise RecordingFailed(error.strerror or str(error)) from error
+    _told_audit(request, caller, "deleted", recording_id)
+    return _json(await _list(request, library, caller))
+
+
+async def _list(request: Request, library: Library, caller: Identity) -> RecordingList:
+    right = _right(request, caller)
     found = await asyncio.to_thread(library.entries)
-    return _json(RecordingList(state=library.state(), recordings=found))
+    return RecordingList(state=library.state(), recordings=[each for each in found if right.sees(each.ended)])
 
 
 async def _open(request: Request, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
@@ -227,12 +293,19 @@ def _told(error: RecordingError | OSError) -> ConsoleError:
 
 
 def _bounded(
-    reader: RecordingReader, first: int, last: int, topics: frozenset[str] | None, decodable: bool
+    reader: RecordingReader,
+    first: int,
+    last: int,
+    topics: frozenset[str] | None,
+    decodable: bool,
+    right: RecordingReaderRight,
 ) -> Iterator[bytes]:
     """Ends early where the file is broken: the status is on its way already."""
     sent = 0
     try:
         for record in reader.records(first, last, topics, decodable=decodable):
+            if not right.reads(reader.index.chunks[record.chunk].started):
+                continue
             part = _framed(record)
             sent += len(part)
             if sent > MAX_BYTES:

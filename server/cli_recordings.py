@@ -184,7 +184,7 @@ def _ask(settings: Settings, robot: str, method: str, path: str, body: dict[str,
     url = settings.public_url or read_address(state.directory)
     if not url:
         raise _usage("no console has run with this state directory")
-    headers = {"Authorization": f"Bearer {state.access.issue('operator', 'command line')}"}
+    headers = {"Authorization": f"Bearer {state.access.issue('supervisor', 'command line')}"}
     try:
         # Its certificate may be its own; whoever can write the state directory can name any address there anyway.
         with httpx.Client(verify=not settings.tls, trust_env=False, timeout=HTTP_SECONDS) as http:

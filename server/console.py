@@ -133,6 +133,11 @@ class Console:
 
     # what peers and HTTP ask for
 
+    def link_holds_seat(self, link: str) -> bool:
+        """Whether a peer with the link of this id drives."""
+        holder = self.peers.by_id(self.seat.rules.holder)
+        return holder is not None and holder.identity.token_id == link
+
     @property
     def latched_stop(self) -> Stop | None:
         return self._desk.latched

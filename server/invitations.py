@@ -51,7 +51,7 @@ class Invitation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @property
     def identity(self) -> Identity:
-        return Identity(self.role, self.name, self.id, self.expires, self.robots)
+        return Identity(self.role, self.name, self.id, self.expires, self.robots, self.created)
 
     def concerns(self, robot: str) -> bool:
         """Whether it is good for that robot; "" is the robot of a console that has only one."""

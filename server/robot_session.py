@@ -61,7 +61,13 @@ async def _session(
     shelf = Shelf(recordings_directory(settings.recording, directory.path), settings.recording)
     signing = RecordingSigning(house.state.signer, lambda: anchor_text(audit.newest_anchor()))
     recorder = Recorder(
-        settings.recording, shelf, clock, media, lambda news: console.peers.tell("session", news), signing
+        settings.recording,
+        shelf,
+        clock,
+        media,
+        lambda news: console.peers.tell("session", news),
+        signing,
+        lambda what, detail: console.audit.record("recording", what=what, detail=detail),
     )
     engines = relay_engines(settings, media, house.state.signing_key(settings) + robot)
     relays = RelayDesk(settings, engines, lambda: console.peers)
@@ -98,7 +104,7 @@ async def _session(
         recorder=recorder,
         relays=relays,
         voice=voice,
-        recordings=RecordingService(ConsoleLibrary(recorder), access),
+        recordings=RecordingService(ConsoleLibrary(recorder), access, console.audit, console.link_holds_seat),
     )
     try:
         async with asyncio.TaskGroup() as tasks:

@@ -77,6 +77,18 @@ class EventIndex(msgspec.Struct, kw_only=True):
             marks=[each for each in self.marks if each.time >= begin],
         )
 
+    def without_chunks_before(self, chunk: int) -> "EventIndex":
+        """As if it began with that chunk, but for the list of chunks itself, whose numbers stay."""
+        later = self.after(chunk)
+        events = later.events
+        return msgspec.structs.replace(
+            later,
+            started=self.chunks[chunk].started,
+            first_event=events[0].event if events else self.chunks[chunk].first_event,
+            chunks=self.chunks,
+            counts={},
+        )
+
     def sparse(self, spacing: int) -> "EventIndex":
         """With events at least `spacing` µs apart, for who loads the chunks that it looks at anyway."""
         events: list[EventEntry] = []

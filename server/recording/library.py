@@ -15,6 +15,10 @@ __all__ = ["ConsoleLibrary", "FileLibrary", "Library"]
 
 
 class Library(Protocol):
+    @property
+    def automatic(self) -> bool:
+        """Whether it records without being asked."""
+
     def state(self) -> RecordingState: ...
 
     def start(self, by: str, name: str) -> RecordingState:
@@ -39,6 +43,10 @@ class ConsoleLibrary:
     def __init__(self, recorder: Recorder) -> None:
         self._recorder = recorder
         self._indexes = KnownIndexes()
+
+    @property
+    def automatic(self) -> bool:
+        return self._recorder.automatic
 
     def state(self) -> RecordingState:
         return self._recorder.state()
@@ -88,6 +96,8 @@ class FileLibrary:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._indexes = KnownIndexes()
+
+    automatic = False
 
     def state(self) -> RecordingState:
         return RecordingState(state="off")

@@ -76,6 +76,7 @@ class Recorder(SessionTap):
         clock: which event holds
         tell: tells everyone
         signing: signs recordings; None: they are not signed
+        audited: hears what nobody asked for: what was done, and to which recording
 
     Attributes:
         seats: role of a peer, by its id
@@ -89,6 +90,7 @@ class Recorder(SessionTap):
         media: RecordedMedia,
         tell: Callable[[RecordingState], None],
         signing: RecordingSigning | None = None,
+        audited: Callable[[str, str], None] = lambda what, detail: None,
     ) -> None:
         self.shelf = shelf
         self._settings = settings
@@ -96,6 +98,7 @@ class Recorder(SessionTap):
         self._media = media
         self._tell = tell
         self._signing = signing
+        self._audited = audited
         self._role_of: dict[str, str] = {}
         self._times = RecordClock(time.time_ns(), time.monotonic_ns())
         self._link_times = LinkTimes()
@@ -114,7 +117,7 @@ class Recorder(SessionTap):
         """Until cancelled; the file is closed then."""
         self._loop = asyncio.get_running_loop()
         try:
-            await asyncio.to_thread(self._prepare)
+            self._tell_pruned(await asyncio.to_thread(self._prepare))
             ticks = 0
             while True:
                 if self._settings.automatic and self._thread is None:
@@ -132,21 +135,27 @@ class Recorder(SessionTap):
                     self._tell(self.state())
                     ticks += 1
                     if ticks % PRUNE_TICKS == 1:
-                        await asyncio.to_thread(self.shelf.prune)
+                        self._tell_pruned(await asyncio.to_thread(self.shelf.prune))
         finally:
             await asyncio.shield(self.close())
 
-    def _prepare(self) -> None:
+    def _prepare(self) -> list[str]:
+        """What was deleted to make room."""
         try:
             self.shelf.prepare()
             self.shelf.recover()
-            self.shelf.prune()
+            return self.shelf.prune()
         except OSError as error:
             log.error("the directory of recordings cannot be used", reason=str(error))
+            return []
+
+    def _tell_pruned(self, gone: list[str]) -> None:
+        for recording in gone:
+            self._audited("deleted to make room", recording)
 
     def _try_again(self) -> None:
         try:
-            self.start("", "")
+            self._audited("started by itself", self.start("", "").recording)
         except RecordingFailed as error:
             log.error("recording does not begin", reason=error.detail)
 
@@ -169,6 +178,11 @@ class Recorder(SessionTap):
             lost=thread.lost,
             detail="" if path is not None else "waiting for the robot",
         )
+
+    @property
+    def automatic(self) -> bool:
+        """Whether it records without being asked; until somebody ends that."""
+        return self._settings.automatic
 
     @property
     def running(self) -> RecordingThread | None:
@@ -237,6 +251,7 @@ class Recorder(SessionTap):
     async def _give_up(self) -> None:
         await self.close()
         if self._failure:
+            self._audited("failed", self._failure)
             self._tell(self.state())
 
     def _call_soon(self, call: Callable[[], None]) -> None:

@@ -25,7 +25,7 @@ REQUESTS = 200.0  # Hz, of one address, after a burst of twice as many
 def create_replay_app(path: Path, access: Access, host: str) -> FastAPI:
     """Answers /api/recordings and the page, both for this file alone."""
     app = FastAPI(title="Lockstep replay", docs_url=None, redoc_url=None, openapi_url=None)
-    app.state.recordings = RecordingService(FileLibrary(path), access)
+    app.state.recordings = RecordingService(FileLibrary(path), access, opens_all=True)
     app.include_router(api_recordings.router)
     app.include_router(page_router())
     app.add_exception_handler(ConsoleError, _answer_console_error)

@@ -1,6 +1,7 @@
 """Recordings over HTTP: who may what, and what comes back."""
 
 import json
+import time
 from collections.abc import AsyncIterator
 from itertools import pairwise
 from pathlib import Path
@@ -8,10 +9,12 @@ from typing import Any
 
 import pytest
 
+from robot_bridge.protocol.console import Role, SeatRequest
+from server.access import Identity
 from server.recording.reader import RecordingReader
 from server.recording.settings import RecordingSettings
 from server.settings import Settings
-from tests.server.recording.makers import Story
+from tests.server.recording.makers import SECOND, START, Story
 from tests.server.rig import Rig, eventually, running_rig
 
 
@@ -73,6 +76,76 @@ async def test_a_session_is_recorded_read_by_event_downloaded_and_deleted_by_rol
         assert (await rig.http.get(path, headers=observer)).status_code == 404
 
 
+async def test_a_link_reads_nothing_that_was_recorded_before_it_was_made_and_all_of_what_is_read_is_audited(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "one.mcap"
+    Story(events=200).write(path)
+    middle = START // SECOND + 4
+    async with running_rig(recording=RecordingSettings(directory=tmp_path, free_bytes=0)) as rig:
+        base = "/api/recordings/one"
+        for role in ("observer", "operator"):
+            newcomer = _issued(rig, role, middle + 1000)
+            assert (await rig.http.get("/api/recordings", headers=newcomer)).json()["recordings"] == []
+            for request in (base, f"{base}/chunks/0", f"{base}/records?from=1&to=9", f"{base}/file"):
+                answer = await rig.http.get(request, headers=newcomer)
+                assert (answer.status_code, answer.json()["error"]) == (403, "not_allowed"), request
+        assert (await rig.http.post(f"{base}/ticket", headers=newcomer)).status_code == 403
+        guest = _issued(rig, "operator", middle)
+        (entry,) = (await rig.http.get("/api/recordings", headers=guest)).json()["recordings"]
+        index = (await rig.http.get(base, headers=guest)).json()["index"]
+        first = min(chunk for _, _, chunk in index["events"])
+        assert first > 0
+        assert (await rig.http.get(f"{base}/chunks/{first - 1}", headers=guest)).status_code == 403
+        allowed = await rig.http.get(f"{base}/chunks/{first}", headers=guest)
+        assert (allowed.status_code, allowed.headers["cache-control"]) == (200, "no-store")
+        found = await rig.http.get(f"{base}/records?from=1&to=200", headers=guest)
+        assert min(head["arrived"] for head, _ in frames(found.content)) >= middle * 1_000_000
+        assert (await rig.http.get(f"{base}/file", headers=guest)).status_code == 403, "it began before the link"
+        early = _issued(rig, "operator", middle - 1000)
+        assert (await rig.http.get(f"{base}/file", headers=early)).status_code == 200
+        assert (await rig.http.post(f"{base}/ticket", headers=early)).status_code == 200
+        supervisor = rig.token("supervisor")
+        assert (await rig.http.get(f"{base}/chunks/0", headers=supervisor)).status_code == 200
+        assert (await rig.http.delete(base, headers=supervisor)).status_code == 200
+        rig.services.console.audit.flush(beyond=True)
+        audit = [each for each in rig.services.audit if each.kind in ("recording", "reading")]
+        done = [(each.role, each.what, each.detail) for each in audit if each.kind == "recording"]
+        assert done == [*[("operator", "downloaded", "one")] * 2, ("supervisor", "deleted", "one")]
+        read = {each.role: each.count for each in audit if each.kind == "reading" and each.what == "one"}
+        assert read == {"operator": 3, "supervisor": 1}
+
+
+async def test_who_starts_and_ends_a_recording_is_audited_and_an_automatic_one_ends_only_from_the_seat(
+    tmp_path: Path,
+) -> None:
+    settings = RecordingSettings(directory=tmp_path, free_bytes=0, automatic=True)
+    async with running_rig(recording=settings) as rig, rig.peer("operator") as peer:
+        recorder = rig.services.recorder
+        await eventually(lambda: recorder.state().state == "recording")
+        refused = await rig.http.post("/api/recordings/stop", headers=rig.token("operator"))
+        assert (refused.status_code, refused.json()["error"]) == (403, "not_allowed")
+        assert recorder.state().state == "recording"
+        peer.send("session", SeatRequest())
+        await eventually(lambda: bool(rig.services.console.seat.rules.holder))
+        assert (await rig.http.post("/api/recordings/stop", headers=rig.token("operator"))).status_code == 403
+        assert (await rig.http.post("/api/recordings/stop", headers=peer.headers)).json()["state"] == "off"
+        started = (await rig.http.post("/api/recordings", headers=rig.token("operator"))).json()["recording"]
+        assert (await rig.http.post("/api/recordings/stop", headers=rig.token("operator"))).status_code == 200
+        audit = [each for each in rig.services.audit if each.kind == "recording"]
+        assert [(each.role, each.what) for each in audit] == [
+            ("", "started by itself"),
+            *[("operator", "ended"), ("operator", "started"), ("operator", "ended")],
+        ]
+        assert [each.detail for each in audit[2:]] == [started, started]
+
+
+def _issued(rig: Rig, role: Role, at: float) -> dict[str, str]:
+    """A link that was made at that time, s since 1970."""
+    identity = Identity(role, role, f"{role}-{at}", time.time() + 3600)
+    return {"Authorization": f"Bearer {rig.access.sign(identity, at)}"}
+
+
 async def test_a_directory_that_cannot_be_used_is_told_and_shown_as_failed(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no directory")
     async with running_rig(recording=RecordingSettings(directory=tmp_path / "file" / "recordings")) as rig:
@@ -105,7 +178,7 @@ async def test_a_damaged_part_and_a_deleted_file_are_told_apart(tmp_path: Path) 
     with RecordingReader(path) as reader:
         offset = reader.index.chunks[1].offset
     async with running_rig(recording=RecordingSettings(directory=path.parent, free_bytes=0)) as rig:
-        observer = rig.token("observer")
+        observer = _issued(rig, "observer", 0.0)
         details = await rig.http.get("/api/recordings/one", headers=observer)
         assert details.headers["content-encoding"] == "gzip"
         times = [arrived for _, arrived, _ in details.json()["index"]["events"]]
