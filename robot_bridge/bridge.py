@@ -27,14 +27,14 @@ from robot_bridge.link_server import LinkPeer, LinkServer
 from robot_bridge.link_session import BadInput
 from robot_bridge.metronome import Metronome
 from robot_bridge.motion_limits import MotionLimits
-from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop, StopTaken
+from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop
 from robot_bridge.robots.base import Measurement, MediaSource, Robot, Stamp
 from robot_bridge.robots.event_strip import with_event_strip
 from robot_bridge.settings import BridgeSettings
 from robot_bridge.stall import watchdog_seconds
 from robot_bridge.start_signal import StartSignal
-from robot_bridge.stop_latch import ResetRefused, ResetTaken, StopGiven, StopLatch
-from robot_bridge.stop_store import wall_microseconds
+from robot_bridge.stop_keeper import StopKeeper
+from robot_bridge.stop_latch import OVERTAKEN, ResetRefused, ResetTaken, ResetWaits, StopGiven
 from robot_bridge.watchdogs import Held, Watchdogs
 
 __all__ = ["Bridge"]
@@ -69,9 +69,10 @@ class Bridge:
             self.description.axes,
             max_event_age=self.description.max_event_age,
             first_event=settings.first_event,
-            latch=StopLatch(numbers_after=wall_microseconds()),
             start_warning=self.description.start_warning,
         )
+        self._keeper = StopKeeper(settings.state_dir)
+        self._resetting: tuple[LinkPeer, Reset] | None = None  # who waits for a reset to be on the disk
         self._signal = StartSignal(self.description)
         self._limits = MotionLimits(self.description, robot, robot.tick_seconds)
         self._shaper = AxisShaper(self.description.axes, hold=self.description.hold, limiter=self._limits)
@@ -122,9 +123,11 @@ class Bridge:
         Raises:
             ListenError: the address cannot be had.
             RobotUnavailable: the robot's watchdog process cannot be had.
+            StateDirInUse, StateDirUnusable: the stop cannot be kept where the settings say.
             OSError: the event log cannot be opened.
         """
         try:
+            self._core.begin(await self._keeper.open(self._now()))
             if self._settings.event_log is not None:
                 self._log = EventLog(self._settings.event_log)
             await self._watchdogs.start()
@@ -132,7 +135,10 @@ class Bridge:
         except BaseException:
             await self.close()
             raise
+        self._keeper.start(self._written)
         self._record("start", self._core.current, epoch=self.epoch)
+        if self._core.stop_state.stopped:
+            self._stop_due = True
         self._issue()
         atexit.register(self._rest_at_exit)
         self._running = asyncio.get_running_loop().create_task(self._run(), name="bridge")
@@ -159,10 +165,13 @@ class Bridge:
                 await self._come_to_rest(self._running)
         finally:
             await self._end_run()
-            await asyncio.to_thread(self._watchdogs.close)
+            in_order = False
             try:
+                await asyncio.to_thread(self._watchdogs.close)
                 self._robot.close()
+                in_order = not self._failure
             finally:
+                await self._keeper.close(in_order=in_order)
                 if self._log is not None:
                     await asyncio.to_thread(self._log.close)
 
@@ -250,7 +259,7 @@ class Bridge:
     def _stop(self, peer: LinkPeer, stop: Stop) -> None:
         given = self._core.stop(stop.press, stop.by, stop.reason, self._now())
         self._note_stop(given, stop.by, stop.reason)
-        peer.send(StopTaken(press=stop.press, number=given.number, kept=False))
+        self._keeper.answer(peer, stop.press, given.number)
 
     def _note_stop(self, given: StopGiven, by: str, reason: str) -> None:
         """The robot rests first, whatever else a stop brings with it."""
@@ -258,14 +267,35 @@ class Bridge:
             return
         self._shaper.rest()
         self._stop_due |= given.latched
+        self._keeper.changed()
+        if given.overtaken and self._resetting is not None:
+            self._refuse_reset(self._resetting[0], ResetRefused(given.overtaken, "stale_reset", OVERTAKEN))
+            self._resetting = None
         self._record("stop", self._core.current, by=by, reason=reason, number=given.number)
 
     def _reset(self, peer: LinkPeer, reset: Reset) -> None:
         outcome = self._core.reset(reset.number, self._now())
         if isinstance(outcome, ResetTaken):
             self._released(outcome, reset.by)
+        elif isinstance(outcome, ResetWaits):
+            self._resetting = peer, reset
+            self._keeper.changed()
         elif isinstance(outcome, ResetRefused):
-            self._refuse(peer, self._core.refusal(0, outcome.reason, outcome.detail, stop=outcome.number))
+            self._refuse_reset(peer, outcome)
+
+    def _written(self, version: int, error: str) -> None:
+        """The latch was written to the disk, or could not be."""
+        outcome = self._core.written(version, error)
+        if outcome is None or self._resetting is None:
+            return
+        (peer, reset), self._resetting = self._resetting, None
+        if isinstance(outcome, ResetTaken):
+            self._released(outcome, reset.by)
+        else:
+            self._refuse_reset(peer, outcome)
+
+    def _refuse_reset(self, peer: LinkPeer, refused: ResetRefused) -> None:
+        self._refuse(peer, self._core.refusal(0, refused.reason, refused.detail, stop=refused.number))
 
     def _released(self, reset: ResetTaken, by: str) -> None:
         if not self._stop_due:  # else the robot has not been told yet

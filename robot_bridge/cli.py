@@ -52,6 +52,13 @@ def run(
     mjcf: Annotated[Path | None, typer.Option(help="Instead: a MuJoCo model of your own, this MJCF file.")] = None,
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any free one.")] = 5600,
+    state_dir: Annotated[
+        Path | None,
+        typer.Option(
+            help="Directory of this bridge alone that keeps a latched STOP over restarts; by default one below "
+            "~/.local/state/lockstep/bridges for each robot and port. With --port 0 there is none by default.",
+        ),
+    ] = None,
     event_log: Annotated[
         Path | None, typer.Option(help="Append a JSON line for each event, refusal and medium.")
     ] = None,
@@ -82,6 +89,7 @@ def run(
             host=host,
             port=port,
             event_log=event_log,
+            state_dir=state_dir or _default_state_dir(ros2, mjcf, name, port),
             secret=_secret(link_secret_file),
             tls=_tls(link_tls_cert, link_tls_key, link_tls_ca),
             insecure=insecure_link,
@@ -96,6 +104,16 @@ def run(
     except OSError as error:
         typer.echo(f"lockstep robot: {error}", err=True)
         raise typer.Exit(EXIT_FAILED) from error
+
+
+def _default_state_dir(ros2: Path | None, mjcf: Path | None, name: str, port: int) -> Path | None:
+    """By the XDG base directory specification. A bridge on any free port is another one each time: it has none."""
+    if port == 0:
+        return None
+    base = os.environ.get("XDG_STATE_HOME", "")
+    file = ros2 or mjcf
+    own = f"{name if file is None else file.stem}-{port}"
+    return (Path(base) if os.path.isabs(base) else Path("~/.local/state").expanduser()) / "lockstep" / "bridges" / own
 
 
 def _secret(path: Path | None) -> LinkSecret | None:

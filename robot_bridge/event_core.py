@@ -74,11 +74,10 @@ class EventCore:
         max_event_age: float,
         first_event: int = FIRST_EVENT,
         refresh_interval: float = REFRESH_INTERVAL,
-        latch: StopLatch | None = None,
         start_warning: StartWarning | None = None,
         nonces: Callable[[], int] = draw_nonce,
     ) -> None:
-        """`latch`: None for one that keeps nothing. `nonces`: draws that of each issue."""
+        """`nonces`: draws that of each issue."""
         if not is_event(first_event):
             raise ValueError(f"the first event must be a valid reference, not {first_event}")
         self._rest_values = [axis.rest for axis in axes]
@@ -95,7 +94,7 @@ class EventCore:
         self._nonces = nonces
         self._issue_wanted = True  # issue again at the end of this tick
         self._rested: int | None = None  # moving commands up to this event are void, 2
-        self._latch = latch or StopLatch()
+        self._latch = StopLatch()
         self._interlock = RestartInterlock(start_warning)
 
     @property
@@ -117,10 +116,9 @@ class EventCore:
     def stop_state(self) -> StopState:
         return self._latch.state
 
-    @property
-    def latch(self) -> StopLatch:
-        """For whoever writes it to the disk; its verbs are called through the core."""
-        return self._latch
+    def begin(self, latch: StopLatch) -> None:
+        """Before the first issue: the latch as it was left. From then on its verbs are called through the core."""
+        self._latch = latch
 
     @property
     def neutral_needed(self) -> bool:

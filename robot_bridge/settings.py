@@ -15,6 +15,7 @@ class BridgeSettings:
     host: str = "127.0.0.1"
     port: int = 5600  # 0: any free one
     event_log: Path | None = None  # JSON lines of all that happened to events; None writes nothing
+    state_dir: Path | None = None  # keeps the latched stop over restarts; None: in memory only, and feedback says so
     first_event: int = FIRST_EVENT  # tests start near the wrap
     max_links: int = 32  # admitted ones
     max_strangers: int = 16  # connections that are not admitted yet; the oldest goes when there are more

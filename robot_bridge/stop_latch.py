@@ -17,6 +17,7 @@ __all__ = [
     "LEAST_STOP",
     "MAX_NUMBER",
     "MAX_PRESSES",
+    "OVERTAKEN",
     "ResetNeedless",
     "ResetOutcome",
     "ResetRefused",
@@ -113,6 +114,11 @@ class StopLatch:
     @property
     def keeps(self) -> bool:
         return self._keeps
+
+    @property
+    def last_number(self) -> int:
+        """None up to this is given again."""
+        return self._last_number
 
     @property
     def record(self) -> StopRecord:

@@ -129,18 +129,21 @@ class StopStore:
         os.replace(path.with_suffix(".new"), path)
         self._sync_directory()
 
-    def reserve(self, number: int) -> None:
-        """No number above this will be given before the next call; in place, since the file is the lock.
+    def reserve(self, number: int) -> int:
+        """The number that this was raised to: none above it may be given before the next call.
+
+        Written in place, since the file is the lock.
 
         Raises:
             OSError: as `write`.
         """
-        data = msgspec.json.encode(Reserved(up_to=min(number + RESERVED, MAX_NUMBER)))
+        up_to = min(number + RESERVED, MAX_NUMBER)
         os.ftruncate(self._lock, 0)
         os.lseek(self._lock, 0, os.SEEK_SET)
-        write_all(self._lock, data)
+        write_all(self._lock, msgspec.json.encode(Reserved(up_to=up_to)))
         os.fsync(self._lock)
         self._sync_directory()
+        return up_to
 
     def close(self) -> None:
         """Let another bridge have it. Idempotent."""

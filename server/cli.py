@@ -44,7 +44,7 @@ from server.cli_recordings import add_recording_commands
 from server.file_limit import raise_file_limit
 from server.fleet.robot_names import BadFleet, is_named
 from server.fleet.robots import robot_settings
-from server.fleet.simulated import own_event_log, simulated_robots
+from server.fleet.simulated import own_event_log, own_state_dir, simulated_robots
 from server.heap import share_arenas
 from server.link_access import link_access
 from server.logs import LogFormat, configure_logs
@@ -52,7 +52,7 @@ from server.run_console import run_console, say
 from server.serve import PortTaken, bind
 from server.settings import Settings
 from server.state import open_state
-from server.state_dir import StateDirUnusable
+from server.state_dir import StateDirUnusable, default_state_dir
 from server.unknown_settings import unknown_settings
 
 __all__ = ["app", "main"]
@@ -188,10 +188,11 @@ def up(
     if unknown:
         raise _usage(f"no robot {unknown[0]!r}; there are {', '.join(robot_names())}")
     for number, (name, kind) in enumerate(kinds.items()):
-        log = [] if event_log is None else ["--event-log", str(own_event_log(event_log, name))]
+        own = ["--state-dir", str(own_state_dir(settings.state_dir or default_state_dir(), name, kind, settings.port))]
+        own += [] if event_log is None else ["--event-log", str(own_event_log(event_log, name))]
         port_of_bridge = robot_port + number if robot_port else 0
         bridges[name] = BridgeProcess(
-            kind, "127.0.0.1", port_of_bridge, [*options, *log], secret.reveal(), say, robot_python
+            kind, "127.0.0.1", port_of_bridge, [*options, *own], secret.reveal(), say, robot_python
         )
     if "" not in bridges:  # where they will be, is known when they run
         settings = settings.model_copy(update={"robots": tuple(f"{name}=tcp://127.0.0.1:1" for name in bridges)})

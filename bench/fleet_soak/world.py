@@ -22,13 +22,19 @@ class _Bridge:
         self.name = name
         self.event_log = folder / f"{name}.jsonl"
         self.port = 0
+        self._folder = folder
+        self._lives = 0
         self._picture_rate = picture_rate
         self._life = AsyncExitStack()
         self._process: Running | None = None
 
     async def start(self) -> None:
         port, log = str(self.port), str(self.event_log)
-        command = ["robot_bridge", "planar", "--port", port, "--event-log", log, "--json"]
+        self._lives += (
+            1  # a new state directory for each: one that was killed begins stopped, which is not at issue here
+        )
+        state = str(self._folder / f"{self.name}-state-{self._lives}")
+        command = ["robot_bridge", "planar", "--port", port, "--event-log", log, "--state-dir", state, "--json"]
         if self._picture_rate is not None:
             command = ["bench.fleet_soak.spare_planar", port, log, str(self._picture_rate)]
         life = AsyncExitStack()

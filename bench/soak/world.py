@@ -41,6 +41,7 @@ class World:
         self._bridge: Running | None = None
         self._server: Running | None = None
         self._bridge_port = self._server_port = 0
+        self._bridges = 0  # started
         self._robot_address = ""
         self._troubles = 0
         self._calm_since = time.monotonic()
@@ -157,9 +158,14 @@ class World:
 
     async def _start_bridge(self) -> None:
         command = (sys.executable, "-m", "robot_bridge", self._robot, "--port", str(self._bridge_port), "--json")
+        self._bridges += (
+            1  # a new state directory for each: one that was killed begins stopped, which is not at issue here
+        )
+        state = self.event_log.with_name(f"bridge-state-{self._bridges}")
+        files = ("--event-log", str(self.event_log), "--state-dir", str(state))
         life = AsyncExitStack()
         self._bridge, ready = await life.enter_async_context(
-            running_process(*command, "--event-log", str(self.event_log), environment=self._environment)
+            running_process(*command, *files, environment=self._environment)
         )
         self._bridge_life = life
         self._bridge_port = int(ready["robot"].rsplit(":", 1)[1])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from server.fleet.robot_names import check_names
 
-__all__ = ["own_event_log", "simulated_robots"]
+__all__ = ["own_event_log", "own_state_dir", "simulated_robots"]
 
 
 def simulated_robots(given: Sequence[str]) -> dict[str, str]:
@@ -39,6 +39,11 @@ def _free(kind: str, numbers: Counter[str], taken: set[str]) -> str:
         name = kind if numbers[kind] == 1 else f"{kind}-{numbers[kind]}"
         if name not in taken:
             return name
+
+
+def own_state_dir(state_dir: Path, robot: str, kind: str, port: int) -> Path:
+    """Where the bridge of a simulated robot keeps its stop. `port`: of the console, so that two have one each."""
+    return state_dir / "bridges" / f"{robot or kind}-{port}"
 
 
 def own_event_log(path: Path, robot: str) -> Path:

@@ -8,6 +8,7 @@ import pytest
 from playwright.async_api import Browser
 
 from bench.browsers.console_page import LEFT_Y, RB, ConsolePage, open_console
+from client import Console
 from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
@@ -35,6 +36,10 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
         await console.tilt(LEFT_Y, 0)
         await console.until(f"s.connected && s.epoch !== {epoch!r} && s.streams.overview?.rendered > 3", 60)
         assert (await console.stats())["event"] < 10, "references start anew with the epoch"
+        await console.until("s.stop.stopped && s.stop.reason.includes('did not end in order')")
+        async with Console(stack.operator, video=False, audio=False) as operator:
+            await operator.reset()
+        await console.until("!s.stop.stopped && s.seat && s.seat.mine")
         await console.arm()
         await console.drive_forward()
         await _nothing_wrong(console)

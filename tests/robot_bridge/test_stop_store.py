@@ -1,0 +1,144 @@
+"""What a bridge begins with, whatever it finds on its disk; and that what it writes is found again."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from robot_bridge.errors import StateDirInUse, StateDirUnusable
+from robot_bridge.stop_latch import StopRecord
+from robot_bridge.stop_store import LATEST_CLOCK, Found, Kept, StopStore, start_of, wall_microseconds
+
+STOPPED = StopRecord(stopped=True, by="Ada", reason="smoke", number=41, press="ab", presses=[("ab", 41)])
+WALL = 1_000  # a clock that was set back: numbers on the disk are above it
+
+
+def found(directory: Path) -> Found:
+    store = StopStore(directory)
+    try:
+        return store.open()
+    finally:
+        store.close()
+
+
+def kept_in(directory: Path, record: StopRecord, *, ended: bool = True) -> None:
+    store = StopStore(directory)
+    store.open()
+    store.reserve(record.number)
+    store.write(Kept(latch=record, ended=ended))
+    store.close()
+
+
+def test_a_new_directory_begins_unlatched(tmp_path: Path) -> None:
+    start = start_of(found(tmp_path / "new" / "robot"), WALL)
+    assert (start.record, start.numbers_after, start.stop_reason) == (StopRecord(), WALL, "")
+
+
+def test_a_directory_that_somebody_made_beforehand_is_new(tmp_path: Path) -> None:
+    (tmp_path / "lost+found").mkdir()
+    assert start_of(found(tmp_path), WALL).stop_reason == ""
+
+
+@pytest.mark.parametrize("record", [STOPPED, StopRecord(number=7)])
+def test_a_bridge_that_ended_in_order_is_found_as_it_was(tmp_path: Path, record: StopRecord) -> None:
+    kept_in(tmp_path, record)
+    start = start_of(found(tmp_path), WALL)
+    assert (start.record, start.stop_reason) == (record, "")
+    assert start.numbers_after >= record.number
+
+
+@pytest.mark.parametrize("record", [STOPPED, StopRecord(number=7)])
+def test_a_bridge_that_did_not_end_in_order_begins_stopped(tmp_path: Path, record: StopRecord) -> None:
+    kept_in(tmp_path, record, ended=False)
+    start = start_of(found(tmp_path), WALL)
+    assert start.record == record
+    assert "did not end in order" in start.stop_reason
+
+
+def test_a_used_directory_without_the_stop_file_begins_stopped_and_its_numbers_go_on(tmp_path: Path) -> None:
+    kept_in(tmp_path, STOPPED)
+    (tmp_path / "stop.json").unlink()
+    start = start_of(found(tmp_path), WALL)
+    assert start.stop_reason == "The robot's stop file is missing"
+    assert start.numbers_after > STOPPED.number
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"{", b"\xff\xfe", b"[" * 100_000, b'{"version":2,"latch":{},"ended":true}', b'{"latch":{}}']
+)
+def test_a_stop_file_that_cannot_be_read_means_stopped(tmp_path: Path, data: bytes) -> None:
+    kept_in(tmp_path, STOPPED)
+    (tmp_path / "stop.json").write_bytes(data)
+    start = start_of(found(tmp_path), WALL)
+    assert start.stop_reason.startswith("The robot's stop file cannot be read (")
+    assert start.numbers_after > STOPPED.number
+
+
+def test_a_number_that_no_message_can_carry_is_unreadable(tmp_path: Path) -> None:
+    kept_in(tmp_path, StopRecord(number=2**53))
+    assert "cannot be read" in start_of(found(tmp_path), WALL).stop_reason
+
+
+def test_with_both_files_lost_the_clock_goes_on_with_the_numbers(tmp_path: Path) -> None:
+    kept_in(tmp_path, STOPPED)
+    for path in tmp_path.iterdir():
+        path.unlink()
+    assert start_of(found(tmp_path), wall_microseconds()).numbers_after > STOPPED.number
+
+
+@pytest.mark.parametrize(("clock", "after"), [(-5, 0), (2**60, LATEST_CLOCK)])
+def test_a_clock_that_cannot_be_right_does_not_use_up_the_numbers(clock: int, after: int) -> None:
+    assert start_of(Found(used=False, kept=None), clock).numbers_after == after
+
+
+def test_a_damaged_reserve_counts_as_unknown(tmp_path: Path) -> None:
+    kept_in(tmp_path, STOPPED)
+    (tmp_path / "numbers.json").write_text("nonsense")
+    assert found(tmp_path).reserved == 0
+
+
+def test_a_second_bridge_is_told_that_the_directory_is_in_use(tmp_path: Path) -> None:
+    first = StopStore(tmp_path)
+    first.open()
+    with pytest.raises(StateDirInUse, match=str(tmp_path)):
+        StopStore(tmp_path).open()
+    first.close()
+    found(tmp_path)
+
+
+def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StateDirUnusable, match="file"):
+        StopStore(tmp_path / "file" / "robot").open()
+
+
+def test_what_is_written_is_whole_or_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept_in(tmp_path, STOPPED)
+    store = StopStore(tmp_path)
+    store.open()
+
+    def full(descriptor: int, data: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(OSError, match="No space"):
+        store.write(Kept(latch=StopRecord(), ended=True))
+    monkeypatch.undo()
+    store.close()
+    assert start_of(found(tmp_path), WALL).record == STOPPED
+
+
+def test_files_are_their_owners_alone_and_reach_the_disk_with_their_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[str] = []
+    fsync = os.fsync
+
+    def watched(descriptor: int) -> None:
+        synced.append(os.readlink(f"/proc/self/fd/{descriptor}"))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", watched)
+    kept_in(tmp_path / "robot", STOPPED)
+    assert synced[-2:] == [str(tmp_path / "robot" / "stop.new"), str(tmp_path / "robot")]
+    assert {path.stat().st_mode & 0o777 for path in (tmp_path / "robot").iterdir()} == {0o600}
