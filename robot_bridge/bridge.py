@@ -25,6 +25,7 @@ from robot_bridge.event_times import EventTimes
 from robot_bridge.last_known import LastKnown
 from robot_bridge.link_server import LinkPeer, LinkServer
 from robot_bridge.link_session import BadInput
+from robot_bridge.lockout_file import LockoutFile
 from robot_bridge.metronome import Metronome
 from robot_bridge.motion_limits import MotionLimits
 from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop
@@ -73,6 +74,7 @@ class Bridge:
         )
         self._keeper = StopKeeper(settings.state_dir)
         self._resetting: tuple[LinkPeer, Reset] | None = None  # who waits for a reset to be on the disk
+        self._lockout = None if settings.lockout_file is None else LockoutFile(settings.lockout_file)
         self._signal = StartSignal(self.description)
         self._limits = MotionLimits(self.description, robot, robot.tick_seconds)
         self._shaper = AxisShaper(self.description.axes, hold=self.description.hold, limiter=self._limits)
@@ -130,6 +132,8 @@ class Bridge:
             self._core.begin(await self._keeper.open(self._now()))
             if self._settings.event_log is not None:
                 self._log = EventLog(self._settings.event_log)
+            if self._lockout is not None:
+                await asyncio.to_thread(self._lockout.start)
             await self._watchdogs.start()
             self.address = await self._links.listen(self._settings.host, self._settings.port)
         except BaseException:
@@ -167,6 +171,8 @@ class Bridge:
             await self._end_run()
             in_order = False
             try:
+                if self._lockout is not None:
+                    await asyncio.to_thread(self._lockout.close)
                 await asyncio.to_thread(self._watchdogs.close)
                 self._robot.close()
                 in_order = not self._failure
@@ -408,6 +414,7 @@ class Bridge:
     def _tick(self, now: float) -> None:
         if self._robot_error is not None:
             raise self._robot_error
+        self._look_at_lockout(now)
         moved = not self._shaper.at_rest
         values = self._shaper.step(now, self._robot.tick_seconds)  # asks for positions, which may hang too
         if (held := self._watchdogs.begin(now, moved)) is not None:
@@ -428,6 +435,20 @@ class Bridge:
             self._record("at_rest" if self._rested else "driven", self._core.current)
         if self._core.issue_due(now):
             self._issue()
+
+    def _look_at_lockout(self, now: float) -> None:
+        """The switch file, or the robot's own input: whoever stands at the robot comes before whoever is far away."""
+        file = "" if self._lockout is None else self._lockout.reason
+        reason = " · ".join(filter(None, (file, self._robot.locked_out())))[:500]
+        if reason == self._core.stop_state.locked_out:
+            return
+        if not reason:
+            self._core.let_in()
+            self._record("let_in", self._core.current)
+            return
+        self._record("locked_out", self._core.current, reason=reason)
+        if (given := self._core.lock_out(reason, now)) is not None:
+            self._note_stop(given, "at the robot", reason)
 
     def _held_up(self, held: Held) -> None:
         """No tick came for too long: nobody knows what the robot has done, and whoever drives has to begin anew."""

@@ -59,6 +59,10 @@ def run(
             "~/.local/state/lockstep/bridges for each robot and port. With --port 0 there is none by default.",
         ),
     ] = None,
+    lockout_file: Annotated[
+        Path | None,
+        typer.Option(help="While this file exists nobody drives; also while its folder cannot be read."),
+    ] = None,
     event_log: Annotated[
         Path | None, typer.Option(help="Append a JSON line for each event, refusal and medium.")
     ] = None,
@@ -89,6 +93,7 @@ def run(
             host=host,
             port=port,
             event_log=event_log,
+            lockout_file=lockout_file,
             state_dir=state_dir or _default_state_dir(ros2, mjcf, name, port),
             secret=_secret(link_secret_file),
             tls=_tls(link_tls_cert, link_tls_key, link_tls_ca),

@@ -18,7 +18,20 @@ from robot_bridge.thread_name import name_thread
 __all__ = ["EventKind", "EventLog"]
 
 EventKind = Literal[
-    "start", "executed", "feedback", "refused", "media", "stop", "reset", "rest", "limit", "driven", "at_rest", "stall"
+    "locked_out",
+    "let_in",
+    "start",
+    "executed",
+    "feedback",
+    "refused",
+    "media",
+    "stop",
+    "reset",
+    "rest",
+    "limit",
+    "driven",
+    "at_rest",
+    "stall",
 ]
 Field = str | int | float | bool | list[float] | list[str]
 

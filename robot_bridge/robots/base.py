@@ -125,6 +125,13 @@ class Robot(ABC):
     def reset(self) -> None:
         """The stop was released: undo `stop`. Must not move anything."""
 
+    def locked_out(self) -> str:
+        """Why somebody at the robot keeps it from being driven (key switch, teach pendant); "" when nobody does.
+
+        Asked in every tick. While it says so the robot is stopped, and nobody far away can release it.
+        """
+        return ""
+
     def sources(self) -> Sequence[MediaSource]:
         """Cameras and microphones; their names are those in the description."""
         return ()

@@ -10,7 +10,7 @@ from robot_bridge.robots.ros2.base_drive import BaseDrive
 from robot_bridge.robots.ros2.camera import CameraSource
 from robot_bridge.robots.ros2.drive import Drive
 from robot_bridge.robots.ros2.ros_side import RosSide
-from robot_bridge.robots.ros2.sensors import RangeSensor, WrenchTopic
+from robot_bridge.robots.ros2.sensors import LockoutTopic, RangeSensor, WrenchTopic
 from robot_bridge.robots.ros2.settings import Ros2Settings
 
 __all__ = ["Ros2Robot"]
@@ -36,8 +36,11 @@ class Ros2Robot(Robot):
                 self._drives.append(ArmDrive(self._ros, settings.arm, self.tick_seconds))
             self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges)
             self._wrench = None if settings.wrench is None else WrenchTopic(self._ros, settings.wrench)
+            self._lockout = None if settings.lockout is None else LockoutTopic(self._ros, settings.lockout)
             self._cameras = [CameraSource(self._ros, camera) for camera in settings.cameras]
             self._ros.start()
+            if self._lockout is not None:
+                self._lockout.wait()
         except BaseException:
             self._ros.close()
             raise
@@ -70,6 +73,9 @@ class Ros2Robot(Robot):
             at_rest=all(part.at_rest for part in sensed),
             faults=faults,
         )
+
+    def locked_out(self) -> str:
+        return "" if self._lockout is None else self._lockout.reason(clock.now())
 
     def positions(self) -> Sequence[float]:
         now = clock.now()

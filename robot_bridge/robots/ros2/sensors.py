@@ -1,15 +1,18 @@
-"""Sensors that a console draws beside the robot's state: ranges and a wrench."""
+"""Sensors beside the robot's state: ranges and a wrench, which a console draws, and the lock-out."""
 
 import math
+import threading
 from typing import Any
 
 from robot_bridge import clock
 from robot_bridge.robots.ros2.laser_scan import BadScan, Sectors
 from robot_bridge.robots.ros2.newest import Newest
 from robot_bridge.robots.ros2.ros_side import RosSide, header_ns
-from robot_bridge.robots.ros2.settings import Ranges, Wrench
+from robot_bridge.robots.ros2.settings import Lockout, Ranges, Wrench
 
-__all__ = ["RangeSensor", "WrenchTopic"]
+__all__ = ["LockoutTopic", "RangeSensor", "WrenchTopic"]
+
+FIRST_WORD = 3.0  # s for the first message of a lock-out, while the nodes find each other
 
 
 class RangeSensor:
@@ -59,3 +62,28 @@ class WrenchTopic:
             self._wrenches.put(values, now, header_ns(message.header))
         else:
             self._wrenches.refuse("wrench with a value that is not a number", now)
+
+
+class LockoutTopic:
+    """std_msgs/Bool, from a key switch or a teach pendant."""
+
+    def __init__(self, ros: RosSide, settings: Lockout) -> None:
+        self._topic = settings.topic
+        self._said: Newest[bool] = Newest(settings.topic, settings.timeout)
+        self._heard = threading.Event()
+        ros.subscribe(ros.message("std_msgs", "Bool"), settings.topic, self._take)
+
+    def wait(self) -> None:
+        """Blocks until something was heard, or for `FIRST_WORD`: a bridge that starts is not locked out for that."""
+        self._heard.wait(FIRST_WORD)
+
+    def reason(self, now: float) -> str:
+        """Why nobody may drive; "" when everybody may. Who is not heard of may have locked it."""
+        said = self._said.fresh(now)
+        if said is None:
+            return f"nothing is heard of the lock-out ({self._topic})"
+        return f"locked at the robot ({self._topic})" if said.value else ""
+
+    def _take(self, message: Any) -> None:
+        self._said.put(bool(message.data), clock.now())
+        self._heard.set()

@@ -133,6 +133,13 @@ class CameraTopic(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     timeout: Timeout = 2.0
 
 
+class Lockout(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """std_msgs/Bool: true keeps everybody from driving. Silence for longer than `timeout` does too."""
+
+    topic: Topic
+    timeout: Timeout = 1.0
+
+
 class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     name: Name
     label: str = ""
@@ -148,6 +155,7 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     arm: Arm | None = None
     ranges: Ranges | None = None
     wrench: Wrench | None = None
+    lockout: Lockout | None = None
     cameras: Annotated[tuple[CameraTopic, ...], Meta(max_length=8)] = ()
     geofences: Annotated[tuple[Geofence, ...], Meta(max_length=32)] = ()
     bodies: tuple[Body, ...] = ()  # more of the kinematic model than the base

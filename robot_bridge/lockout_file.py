@@ -1,0 +1,74 @@
+"""A switch file at the robot: while it exists, nobody drives. A thread looks at it, because a disk may hang."""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+__all__ = ["LockoutFile", "look_at"]
+
+INTERVAL = 0.2  # s between two looks
+PATIENCE = 1.5  # s without a look after which nobody knows
+JOIN_SECONDS = 1.0
+
+
+def look_at(path: Path) -> str:
+    """Why the robot is locked out; "" when it is not. What cannot be looked at counts as locked."""
+    try:
+        path.lstat()
+        return f"locked at the robot ({path})"
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        return f"the lock-out file cannot be looked at ({path}: {error.strerror or error})"
+    try:
+        path.parent.stat()
+    except OSError as error:
+        return f"the folder of the lock-out file cannot be looked at ({path.parent}: {error.strerror or error})"
+    return ""
+
+
+class LockoutFile:
+    """Ask for `reason` after `start`; before the first look the robot counts as locked."""
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        look: Callable[[Path], str] = look_at,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._path = path
+        self._look = look
+        self._clock = clock
+        self._seen: tuple[str, float] = (f"the lock-out file was not looked at yet ({path})", clock())
+        self._looked = threading.Event()
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="lock-out file", daemon=True)
+
+    @property
+    def reason(self) -> str:
+        """Why the robot is locked out now; "" when it is not."""
+        reason, seen_at = self._seen
+        if not reason and self._clock() - seen_at > PATIENCE:
+            return f"the lock-out file cannot be looked at in time ({self._path})"
+        return reason
+
+    def start(self) -> None:
+        """Blocks until the first look is over, for at most `PATIENCE`."""
+        self._thread.start()
+        self._looked.wait(PATIENCE)
+
+    def close(self) -> None:
+        """Blocks shortly; a look that hangs is left behind."""
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join(JOIN_SECONDS)
+
+    def _run(self) -> None:
+        while True:
+            began = self._clock()
+            self._seen = (self._look(self._path), began)
+            self._looked.set()
+            if self._ending.wait(INTERVAL):
+                return
