@@ -1,7 +1,6 @@
 """The bridge's listening side: admits links, hands their messages on, sends to them by role."""
 
 import asyncio
-import socket
 import ssl
 import time
 from collections import Counter
@@ -9,9 +8,10 @@ from collections.abc import Callable
 from functools import cache
 from typing import Protocol
 
+from robot_bridge.applicants import Applicants
 from robot_bridge.counters import BridgeCounters
 from robot_bridge.errors import ListenError
-from robot_bridge.link_guard import LinkGuard
+from robot_bridge.link_acceptor import LinkAcceptor, listening_socket
 from robot_bridge.link_session import BadInput, BridgeSession
 from robot_bridge.link_transport import TICK_INTERVAL, LinkTransport
 from robot_bridge.protocol.description import RobotDescription
@@ -30,12 +30,10 @@ from robot_bridge.protocol.messages import (
     Stop,
     encode_message,
 )
-from robot_bridge.tls_acceptor import TlsAcceptor
 
 __all__ = ["LinkHandler", "LinkPeer", "LinkServer"]
 
 CLOSE_TIMEOUT = 1.0  # s for goodbyes to leave when the bridge closes
-BACKLOG = 64
 
 
 class LinkHandler(Protocol):
@@ -58,7 +56,9 @@ class LinkPeer(LinkTransport):
     """One admitted or applying link."""
 
     def __init__(self, server: "LinkServer", clock: Callable[[], float], secret: LinkSecret | None) -> None:
-        super().__init__(BridgeSession(clock(), self._admit, secret), clock)
+        session = BridgeSession(clock(), self._admit, secret)
+        super().__init__(session, clock)
+        self._bridge_session = session
         self._server = server
         self.name = ""  # what the client calls itself, "console"
         self.address = ""  # where it comes from, "10.0.0.9"
@@ -72,6 +72,11 @@ class LinkPeer(LinkTransport):
         address = transport.get_extra_info("peername")
         self.address = str(address[0]) if address else ""
         self._server.connected(self)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if self._bridge_session.challenged:
+            self._server.challenged(self)
 
     def received(self, event: LinkMessage | BadInput) -> None:
         self._server.received(self, event)
@@ -108,14 +113,14 @@ class LinkServer:
         self._secret = secret
         self._tls = tls
         self._clock = clock
-        self._guard = LinkGuard()
         self._connections: set[LinkPeer] = set()  # sockets, those that are closing included
-        self._strangers: dict[LinkPeer, None] = {}  # not admitted yet, oldest first
+        self._silent: Applicants[LinkPeer] = Applicants(max_strangers)  # have not said hello
+        self._challenged: Applicants[LinkPeer] = Applicants(max_strangers)  # have, and owe the proof
         self._known: set[LinkPeer] = set()  # admitted
         self._operator: LinkPeer | None = None
         self._events: set[LinkPeer] = set()
         self._media: set[LinkPeer] = set()
-        self._server: asyncio.Server | TlsAcceptor | None = None
+        self._acceptor: LinkAcceptor | None = None
         self._all_gone = asyncio.Event()
 
     @property
@@ -134,20 +139,15 @@ class LinkServer:
         Raises:
             ListenError: the address cannot be had.
         """
-        loop = asyncio.get_running_loop()
         try:
-            if self._tls is None:
-                self._server = await loop.create_server(self._new_peer, host, port)
-                address = self._server.sockets[0].getsockname()
-            else:
-                listener = socket.create_server((host, port), family=family_of(host), backlog=BACKLOG)
-                address = listener.getsockname()
-                self._server = TlsAcceptor(
-                    listener, self._tls, self._new_peer, self._tls_failed, max_handshakes=self._max_strangers
-                )
-                self._server.start()
+            listener = await asyncio.to_thread(listening_socket, host, port)  # which may look up a name
         except OSError as error:
             raise ListenError(f"cannot listen on {host}:{port}: {error}") from error
+        address = listener.getsockname()
+        self._acceptor = LinkAcceptor(
+            listener, self._tls, self._new_peer, self._tls_failed, max_handshakes=self._max_strangers
+        )
+        self._acceptor.start()
         return str(address[0]), int(address[1])
 
     def _new_peer(self) -> LinkPeer:
@@ -165,11 +165,9 @@ class LinkServer:
 
     async def close(self, reason: str = "the bridge is closing") -> None:
         """Stop listening, say goodbye to all with this reason, and wait until they are gone."""
-        server, self._server = self._server, None
-        if isinstance(server, TlsAcceptor):
-            await server.close()
-        elif server is not None:
-            server.close()
+        acceptor, self._acceptor = self._acceptor, None
+        if acceptor is not None:
+            await acceptor.close()
         for peer in list(self._connections):
             peer.end("closing", reason)
         try:
@@ -204,12 +202,11 @@ class LinkServer:
 
     def admit(self, peer: LinkPeer, hello: Hello) -> Hello | Goodbye:
         """Called once the peer has proven the secret, where there is one."""
-        self._guard.succeeded(peer.address)
         if len(self._known) >= self._max_links:
             return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
         if hello.role == "operator" and self._operator is not None:
             return Goodbye(error="taken", detail="another operator link is open")
-        self._strangers.pop(peer, None)
+        self._forget_applicant(peer)
         self._known.add(peer)
         match hello.role:
             case "operator":
@@ -223,27 +220,30 @@ class LinkServer:
 
     def connected(self, peer: LinkPeer) -> None:
         self._connections.add(peer)
-        self._strangers[peer] = None
-        if self._server is None:
+        if self._acceptor is None:
             peer.end("closing", "the bridge is closing")
-        elif self._is_blocked(peer.address):
-            self._counters.bad_input["throttled"] += 1
-            peer.end("unauthorised", "too many failed tries from this address; wait")
-        elif len(self._strangers) > self._max_strangers:
-            next(iter(self._strangers)).end("full", "too many connections that have not been admitted")
+        else:
+            self._bound(self._silent, peer)
 
-    def _is_blocked(self, address: str) -> bool:
-        """An address with an admitted link is never made to wait for what somebody else tries from there."""
-        if not self._guard.is_blocked(address, self._clock()):
-            return False
-        return all(peer.address != address for peer in self._known)
+    def challenged(self, peer: LinkPeer) -> None:
+        """It has said hello and owes the proof: those who say nothing cannot push it out any more."""
+        if peer in self._silent:
+            self._silent.remove(peer)
+            self._bound(self._challenged, peer)
+
+    def _bound(self, applicants: Applicants[LinkPeer], peer: LinkPeer) -> None:
+        gone = applicants.add(peer, peer.address)
+        if gone is not None:
+            gone.end("full", "too many connections that have not been admitted")
+
+    def _forget_applicant(self, peer: LinkPeer) -> None:
+        self._silent.remove(peer)
+        self._challenged.remove(peer)
 
     def received(self, peer: LinkPeer, event: LinkMessage | BadInput) -> None:
         match event:
             case BadInput():
                 self._counters.bad_input[event.name] += 1
-                if event.name == "unauthorised":
-                    self._guard.failed(peer.address, self._clock())
                 if peer.session.ended is None:
                     self._handler.link_bad_input(peer, event)
             case Hello():
@@ -256,7 +256,7 @@ class LinkServer:
     def ended(self, peer: LinkPeer) -> None:
         if peer.session.ended is not None:
             self._counters.endings[peer.session.ended.error] += 1
-        self._strangers.pop(peer, None)
+        self._forget_applicant(peer)
         self._known.discard(peer)
         self._events.discard(peer)
         self._media.discard(peer)
@@ -268,10 +268,6 @@ class LinkServer:
         self._connections.discard(peer)
         self._counters.drops.update(peer.drops)
         self._all_gone.set()
-
-
-def family_of(host: str) -> socket.AddressFamily:
-    return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 
 def encode_once(message: LinkMessage) -> Callable[[], bytes]:

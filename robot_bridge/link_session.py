@@ -191,6 +191,11 @@ class BridgeSession(LinkSession):
         self._challenged: Hello | None = None  # the hello that was answered with a challenge
         self._nonce = b""  # of that challenge
 
+    @property
+    def challenged(self) -> bool:
+        """Whether the client has said a proper hello and owes the proof."""
+        return self._challenged is not None and self.state is LinkState.HANDSHAKE
+
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         """Returns the hello when it was admitted."""
         if not isinstance(message, Hello):

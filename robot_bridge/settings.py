@@ -19,7 +19,9 @@ class BridgeSettings:
     lockout_file: Path | None = None  # while it exists, nobody drives; None: there is none
     first_event: int = FIRST_EVENT  # tests start near the wrap
     max_links: int = 32  # admitted ones
-    max_strangers: int = 16  # connections that are not admitted yet; the oldest goes when there are more
+    max_strangers: int = (
+        128  # connections in each stage before admission; of more, the busiest address loses its oldest
+    )
     secret: LinkSecret | None = None  # that clients have to know
     tls: LinkTls | None = None
     insecure: bool = False  # listen beyond loopback although anybody could drive

@@ -1,0 +1,54 @@
+"""Connections that wait to be admitted: how many, and which of them goes when there are too many. No I/O, no clock."""
+
+import ipaddress
+from collections import Counter
+from typing import Generic, TypeVar
+
+__all__ = ["Applicants", "address_group"]
+
+Applicant = TypeVar("Applicant")
+PREFIX = 64  # bits of an IPv6 address: one customer has all addresses behind them
+
+
+def address_group(address: str) -> str:
+    """What counts as one address: an IPv4 address, or the /64 of an IPv6 address."""
+    try:
+        parsed = ipaddress.ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    if isinstance(parsed, ipaddress.IPv4Address):
+        return str(parsed)
+    if parsed.ipv4_mapped is not None:
+        return str(parsed.ipv4_mapped)
+    return str(ipaddress.ip_network((parsed, PREFIX), strict=False))
+
+
+class Applicants(Generic[Applicant]):
+    """When there are too many, the oldest of the address that has the most goes.
+
+    So one address only ever takes from itself, and whoever needs less time than it takes to fill all places gets in.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._groups: dict[Applicant, str] = {}  # oldest first
+
+    def __len__(self) -> int:
+        return len(self._groups)
+
+    def __contains__(self, applicant: object) -> bool:
+        return applicant in self._groups
+
+    def add(self, applicant: Applicant, address: str) -> Applicant | None:
+        """The one that has to go, and is forgotten here; None while there is room."""
+        self._groups[applicant] = address_group(address)
+        if len(self._groups) <= self._limit:
+            return None
+        (most, _), *_ = Counter(self._groups.values()).most_common(1)
+        oldest = next(each for each, group in self._groups.items() if group == most)
+        del self._groups[oldest]
+        return oldest
+
+    def remove(self, applicant: Applicant) -> None:
+        """It was admitted, or is gone."""
+        self._groups.pop(applicant, None)

@@ -1,0 +1,133 @@
+"""Accepts connections of the robot link, at a bounded rate, and shakes hands for TLS where that is asked for."""
+
+import asyncio
+import contextlib
+import socket
+import ssl
+from collections.abc import Callable
+
+from robot_bridge.applicants import Applicants
+
+__all__ = ["LinkAcceptor", "listening_socket"]
+
+HANDSHAKE_TIMEOUT = 2.0  # s
+SILENCE = 2.0  # s that a TLS client may take for its first byte
+PAUSE = 0.1  # s, when the system has no descriptor left
+BACKLOG = 128
+RATE = 1000.0  # connections accepted per second; the others wait in the kernel, and cost the robot nothing
+BURST = 100
+
+
+def listening_socket(host: str, port: int) -> socket.socket:
+    """Raises:
+    OSError: the address cannot be had.
+    """
+    if not host and socket.has_dualstack_ipv6():
+        return socket.create_server(("", port), family=socket.AF_INET6, dualstack_ipv6=True, backlog=BACKLOG)
+    found = {
+        each[0] for each in socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    }
+    family = socket.AF_INET if socket.AF_INET in found else socket.AF_INET6
+    return socket.create_server((host, port), family=family, backlog=BACKLOG)
+
+
+class LinkAcceptor:
+    """Takes over a listening socket. `close` ends it and what is still shaking hands.
+
+    TLS begins when the first byte has come: a connection that says nothing costs a descriptor and no more.
+    """
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        context: ssl.SSLContext | None,
+        factory: Callable[[], asyncio.Protocol],
+        failed: Callable[[], None],
+        *,
+        max_handshakes: int,
+    ) -> None:
+        """`failed`: a TLS handshake did. `max_handshakes`: that wait for a first byte, and as many that go on."""
+        self._listener = listener
+        self._context = context
+        self._factory = factory
+        self._failed = failed
+        self._silent: Applicants[asyncio.Task[None]] = Applicants(max_handshakes)
+        self._shaking: Applicants[asyncio.Task[None]] = Applicants(max_handshakes)
+        self._accepting: asyncio.Task[None] | None = None
+        self._tokens = float(BURST)
+        self._filled = 0.0  # s, when tokens were added last
+
+    def start(self) -> None:
+        self._listener.setblocking(False)
+        self._accepting = asyncio.get_running_loop().create_task(self._accept(), name="link acceptor")
+
+    async def close(self) -> None:
+        """May be called again."""
+        if self._accepting is not None:
+            self._accepting.cancel()
+            await asyncio.wait([self._accepting])
+            self._accepting = None
+        self._listener.close()
+
+    async def _accept(self) -> None:
+        loop = asyncio.get_running_loop()
+        async with asyncio.TaskGroup() as tasks:
+            while True:
+                await self._take_token(loop.time())
+                try:
+                    connection, address = await loop.sock_accept(self._listener)
+                except OSError:
+                    await asyncio.sleep(PAUSE)
+                    continue
+                task = tasks.create_task(self._open(connection, address[0]))
+                task.add_done_callback(self._silent.remove)
+                task.add_done_callback(self._shaking.remove)
+                if self._context is not None:
+                    self._bound(self._silent, task, address[0])
+
+    async def _take_token(self, now: float) -> None:
+        self._tokens = min(float(BURST), self._tokens + (now - self._filled) * RATE)
+        self._filled = now
+        if self._tokens < 1.0:
+            await asyncio.sleep((1.0 - self._tokens) / RATE)
+        self._tokens -= 1.0
+
+    def _bound(self, applicants: Applicants[asyncio.Task[None]], task: asyncio.Task[None], address: str) -> None:
+        gone = applicants.add(task, address)
+        if gone is not None:
+            gone.cancel()
+
+    async def _open(self, connection: socket.socket, address: str) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            connection.setblocking(False)
+            if self._context is None:
+                await loop.connect_accepted_socket(self._factory, connection)
+                return
+            await _first_byte(connection)
+            task = asyncio.current_task()
+            assert task is not None  # this is one
+            self._silent.remove(task)
+            self._bound(self._shaking, task, address)
+            await loop.connect_accepted_socket(
+                self._factory, connection, ssl=self._context, ssl_handshake_timeout=HANDSHAKE_TIMEOUT
+            )
+        except (OSError, asyncio.CancelledError) as error:  # ssl.SSLError and TimeoutError are OSErrors
+            if self._context is not None:
+                self._failed()
+            with contextlib.suppress(OSError):
+                connection.close()
+            if isinstance(error, asyncio.CancelledError):
+                raise
+
+
+async def _first_byte(connection: socket.socket) -> None:
+    """Raises TimeoutError when none comes in time."""
+    loop = asyncio.get_running_loop()
+    came = loop.create_future()
+    loop.add_reader(connection, lambda: came.done() or came.set_result(None))
+    try:
+        async with asyncio.timeout(SILENCE):
+            await came
+    finally:
+        loop.remove_reader(connection)
