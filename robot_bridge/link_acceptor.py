@@ -5,6 +5,7 @@ import contextlib
 import socket
 import ssl
 from collections.abc import Callable
+from functools import partial
 
 from robot_bridge.applicants import Applicants
 
@@ -80,6 +81,7 @@ class LinkAcceptor:
                     await asyncio.sleep(PAUSE)
                     continue
                 task = tasks.create_task(self._open(connection, address[0]))
+                task.add_done_callback(partial(_close_if_cancelled, connection))
                 task.add_done_callback(self._silent.remove)
                 task.add_done_callback(self._shaking.remove)
                 if self._context is not None:
@@ -112,20 +114,34 @@ class LinkAcceptor:
             await loop.connect_accepted_socket(
                 self._factory, connection, ssl=self._context, ssl_handshake_timeout=HANDSHAKE_TIMEOUT
             )
-        except (OSError, asyncio.CancelledError) as error:  # ssl.SSLError and TimeoutError are OSErrors
+        except OSError:  # ssl.SSLError and TimeoutError among them
             if self._context is not None:
                 self._failed()
             with contextlib.suppress(OSError):
                 connection.close()
-            if isinstance(error, asyncio.CancelledError):
-                raise
+        except asyncio.CancelledError:
+            self._failed()
+            raise
+
+
+def _close_if_cancelled(connection: socket.socket, task: asyncio.Task[None]) -> None:
+    """Also a task that was cancelled before its first step."""
+    if task.cancelled():
+        with contextlib.suppress(OSError):
+            connection.close()
 
 
 async def _first_byte(connection: socket.socket) -> None:
     """Raises TimeoutError when none comes in time."""
     loop = asyncio.get_running_loop()
     came = loop.create_future()
-    loop.add_reader(connection, lambda: came.done() or came.set_result(None))
+
+    def readable() -> None:
+        loop.remove_reader(connection)
+        if not came.done():
+            came.set_result(None)
+
+    loop.add_reader(connection, readable)
     try:
         async with asyncio.timeout(SILENCE):
             await came

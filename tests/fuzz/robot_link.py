@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import cast
 
 from robot_bridge.bridge import Bridge
+from robot_bridge.link_acceptor import LinkAcceptor
 from robot_bridge.link_server import LinkPeer
 from robot_bridge.link_session import HELLO_TIMEOUT, SILENCE, ClientSession
 from robot_bridge.link_transport import TICK_INTERVAL
@@ -56,7 +57,7 @@ class Rig:
         self.robot = Watched()
         self.bridge = Bridge(self.robot, BridgeSettings(secret=secret), monotonic)
         self.links = self.bridge._links
-        self.links._server = cast(asyncio.Server, self)  # it listens, as far as newcomers can tell
+        self.links._acceptor = cast(LinkAcceptor, self)  # it listens, as far as newcomers can tell
         self.bridge._issue()
         self.executed_at = float("-inf")
 
@@ -191,10 +192,17 @@ def stranger(clock: Clock, data: bytes, code: int) -> None:
     rig = Rig(clock)
     operator = rig.connect()
     rig.hear(operator, wire(Hello(role="operator")))
-    rig.hear(operator, wire(Command(event=event_after(rig.bridge.event), issue=1, values=[0.4, 0.2, 0.5])))
-    check(rig.bridge.counters.executed == 1, "the operator could not drive")
+    for values in (REST, [0.4, 0.2, 0.5]):
+        clock.now += TICK
+        rig.tick(clock.now)
+        seen = rig.bridge._core.feedback
+        assert seen is not None  # the bridge has issued one
+        rig.hear(
+            operator, wire(Command(event=event_after(seen.event), issue=seen.issue, nonce=seen.nonce, values=values))
+        )
+    check(rig.bridge.counters.executed == 2, "the operator could not drive")
     play(rig, clock, rig.connect(), data, code, MAX_CONTROL_FRAME)
-    check(rig.bridge.counters.executed == 1, "a stranger drove")
+    check(rig.bridge.counters.executed == 2, "a stranger drove")
 
 
 def without_the_secret(clock: Clock, data: bytes, code: int) -> None:

@@ -8,7 +8,7 @@ from typing import get_args
 import msgspec
 import pytest
 
-from robot_bridge.link_guard import REFILL, TRIES
+from robot_bridge.link_acceptor import RATE
 from robot_bridge.link_session import FROM_CLIENT, FROM_ROBOT, HELLO_TIMEOUT, PING_INTERVAL, SILENCE, kind_of
 from robot_bridge.media_outbox import ORDERED_DEPTH
 from robot_bridge.protocol import description
@@ -124,10 +124,9 @@ def test_the_numbers_are_those_of_the_code() -> None:
     assert f"hello within {HELLO_TIMEOUT:g} s" in TEXT
     assert f"up to {ORDERED_DEPTH} messages" in TEXT
     assert f"({BridgeSettings().max_links} unless configured)" in TEXT
-    assert f"At most {BridgeSettings().max_strangers} connections that are not admitted" in TEXT
+    assert f"at most {BridgeSettings().max_strangers} connections (unless configured)" in TEXT
     assert f"({MAX_HELLO_FRAME} bytes)" in TEXT
-    assert f"failed {TRIES} times" in TEXT
-    assert f"{REFILL:g} s for each further try" in TEXT
+    assert f"{RATE:g} connections a second" in TEXT
     assert f"at least {MIN_SECRET_BYTES} bytes" in TEXT
     assert all(f"`{codec}`" in TEXT for codec in get_args(MediaCodec))
     assert first_column(section("goodbye, both ways")) == {"type", "error", "detail"}

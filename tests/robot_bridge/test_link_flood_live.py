@@ -1,0 +1,135 @@
+"""Connections of people who know no secret, many and fast, while a console far away opens its link."""
+
+import asyncio
+import contextlib
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from robot_bridge.bridge import Bridge
+from robot_bridge.link_client import RobotLink
+from robot_bridge.link_tls import LinkTls
+from robot_bridge.protocol.framing import frame
+from robot_bridge.protocol.link_secret import LinkSecret
+from robot_bridge.protocol.messages import Hello, encode_message
+from robot_bridge.settings import BridgeSettings
+from tests.robot_bridge.bridge_helpers import RecordingRobot
+from tests.support.certificates import Authority
+
+SECRET = LinkSecret.draw()
+DELAY = 0.05  # s each way between console and bridge
+FLOOD = 640  # connections a second
+OPEN = 400  # connections that the flood keeps open; the bridge closes most of them
+
+
+class SlowPath:
+    """TCP to a bridge that takes a while each way, like a network."""
+
+    def __init__(self, to: tuple[str, int]) -> None:
+        self._to = to
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._server: asyncio.Server | None = None
+        self.address = ("", 0)
+
+    async def __aenter__(self) -> "SlowPath":
+        self._server = await asyncio.start_server(self._carry, "127.0.0.1", 0)
+        self.address = self._server.sockets[0].getsockname()[:2]
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        assert self._server is not None
+        self._server.close()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._tasks.add(task)
+        there_reader, there_writer = await asyncio.open_connection(*self._to)
+        try:
+            with contextlib.suppress(ConnectionError):
+                await asyncio.gather(_later(reader, there_writer), _later(there_reader, writer))
+        finally:
+            for each in (writer, there_writer):
+                each.transport.abort()
+            self._tasks.discard(task)
+
+
+async def _later(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    while data := await reader.read(65536):
+        await asyncio.sleep(DELAY)
+        writer.write(data)
+    writer.close()
+
+
+FLOODING = """
+import contextlib, socket, sys, time
+
+host, says = sys.argv[1], bytes.fromhex(sys.argv[5])
+port, rate, kept = int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4])
+sockets, made, began = [], 0, time.monotonic()
+print("floods", flush=True)
+while True:
+    while made < (time.monotonic() - began) * rate:
+        made += 1
+        connection = socket.socket()
+        connection.setblocking(False)
+        connection.bind((host, 0))
+        connection.connect_ex(("127.0.0.1", port))
+        sockets.append(connection)
+        if len(sockets) > kept:
+            sockets.pop(0).close()
+    time.sleep(0.005)
+    for connection in sockets[-20:]:
+        with contextlib.suppress(OSError):
+            connection.send(says)
+"""
+
+
+@asynccontextmanager
+async def flood(address: tuple[str, int], host: str, says: bytes) -> AsyncIterator[None]:
+    """Connections from `host`, each of which says this and nothing else."""
+    arguments = (host, str(address[1]), str(FLOOD), str(OPEN), says.hex())
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-c", FLOODING, *arguments), stdout=asyncio.subprocess.PIPE
+    )
+    try:
+        assert process.stdout is not None
+        async with asyncio.timeout(20):
+            await process.stdout.readline()
+        yield
+    finally:
+        process.kill()
+        await process.wait()
+
+
+@pytest.mark.parametrize("tls", [False, True], ids=["plain", "tls"])
+@pytest.mark.parametrize("host", ["127.0.0.2", "127.0.0.1"], ids=["from-elsewhere", "from-the-console's-address"])
+@pytest.mark.parametrize("says", [b"", b"hello"], ids=["silent", "hello"])
+async def test_a_console_gets_its_link_every_time(tls: bool, host: str, says: bytes, tmp_path: Path) -> None:
+    bridge_tls = trust = None
+    if tls:
+        authority = Authority(tmp_path)
+        bridge_tls = LinkTls(certificate=authority.issue("bridge"))
+        trust = LinkTls(authority=authority.certificate).client_context()
+    if says:
+        says = (
+            frame(encode_message(Hello(role="operator", nonce=bytes(32)))) if not tls else b"\x16\x03\x01\x02\x00\x01"
+        )
+    settings = BridgeSettings(port=0, secret=SECRET, tls=bridge_tls)
+    async with (
+        Bridge(RecordingRobot(), settings) as bridge,
+        SlowPath(bridge.address) as path,
+        flood(bridge.address, host, says),
+    ):
+        async with asyncio.timeout(20):
+            while not bridge.counters.endings["full"] + bridge.counters.bad_input["tls"]:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        for _ in range(10):
+            async with RobotLink(*path.address, "operator", secret=SECRET, tls=trust) as link:
+                assert link.connected
