@@ -85,6 +85,7 @@ class Bridge:
             self.counters,
             max_links=settings.max_links,
             max_strangers=settings.max_strangers,
+            operator_grace=settings.operator_grace,
             secret=settings.secret,
             tls=None if settings.tls is None else settings.tls.bridge_context(),
         )

@@ -84,6 +84,10 @@ def run(
     event_strip: Annotated[
         bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")
     ] = False,
+    operator_grace: Annotated[
+        float,
+        typer.Option(min=0, help="Seconds for which a console whose link broke keeps the robot from other consoles."),
+    ] = 10.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the address as one JSON line once ready.")] = False,
 ) -> None:
     """Run a robot and its bridge until interrupted."""
@@ -98,6 +102,7 @@ def run(
             secret=_secret(link_secret_file),
             tls=_tls(link_tls_cert, link_tls_key, link_tls_ca),
             insecure=insecure_link,
+            operator_grace=operator_grace,
             event_strip=event_strip,
         )
         check_link(settings)  # before the robot is made, which can take long

@@ -1,6 +1,7 @@
 """The bridge's listening side: admits links, hands their messages on, sends to them by role."""
 
 import asyncio
+import math
 import ssl
 import time
 from collections import Counter
@@ -101,6 +102,7 @@ class LinkServer:
         *,
         max_links: int,
         max_strangers: int,
+        operator_grace: float = 0.0,
         secret: LinkSecret | None = None,
         tls: ssl.SSLContext | None = None,
         clock: Callable[[], float] = time.monotonic,
@@ -110,6 +112,9 @@ class LinkServer:
         self._counters = counters
         self._max_links = max_links
         self._max_strangers = max_strangers
+        self._operator_grace = operator_grace
+        self._kept_for = ""  # name of the client whose operator link broke; "" when none has
+        self._kept_until = -math.inf  # s, for that client
         self._secret = secret
         self._tls = tls
         self._clock = clock
@@ -206,17 +211,25 @@ class LinkServer:
             return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
         if hello.role == "operator" and self._operator is not None:
             return Goodbye(error="taken", detail="another operator link is open")
+        if hello.role == "operator" and self._is_kept_from(hello.name):
+            left = self._kept_until - self._clock()
+            return Goodbye(error="taken", detail=f"kept for {self._kept_for}, whose link broke, for {left:.0f} s more")
         self._forget_applicant(peer)
         self._known.add(peer)
         match hello.role:
             case "operator":
                 self._operator = peer
+                self._kept_for = ""
             case "events":
                 self._events.add(peer)
                 return Hello(role="robot", name=self._hello.name, epoch=self._hello.epoch)
             case _:
                 self._media.add(peer)
         return self._hello
+
+    def _is_kept_from(self, name: str) -> bool:
+        """Whether somebody else's operator link broke just now: a stall gives the robot to nobody."""
+        return self._kept_for not in ("", name) and self._clock() < self._kept_until
 
     def connected(self, peer: LinkPeer) -> None:
         self._connections.add(peer)
@@ -262,6 +275,8 @@ class LinkServer:
         self._media.discard(peer)
         if self._operator is peer:
             self._operator = None
+            if not peer.session.left:
+                self._kept_for, self._kept_until = peer.name, self._clock() + self._operator_grace
             self._handler.operator_lost()
 
     def disconnected(self, peer: LinkPeer) -> None:

@@ -74,6 +74,7 @@ class LinkSession:
         self.state = LinkState.HANDSHAKE
         self.role: LinkRole | None = None  # the client's role; None before it is known
         self.ended: Goodbye | None = None  # why it ended, whoever said it; None while it lives
+        self.left = False  # the other side ended it because it goes away
         self._reader = FrameReader(max_frame)
         self._allowed: tuple[type[LinkMessage], ...] = ()
         self._outgoing: list[LinkMessage] = []
@@ -123,6 +124,7 @@ class LinkSession:
                 self._last_valid = now
                 return None
             case Goodbye():
+                self.left = message.error == "closing"
                 self._finish(message)
                 return None
         if isinstance(message, self._allowed):

@@ -22,6 +22,7 @@ class BridgeSettings:
     max_strangers: int = (
         128  # connections in each stage before admission; of more, the busiest address loses its oldest
     )
+    operator_grace: float = 10.0  # s that a broken operator link is kept for the client of the same name
     secret: LinkSecret | None = None  # that clients have to know
     tls: LinkTls | None = None
     insecure: bool = False  # listen beyond loopback although anybody could drive

@@ -32,8 +32,17 @@ class LinkSink(Protocol):
 
 class LinkKeeper:
     def __init__(
-        self, host: str, port: int, role: LinkRole, sink: LinkSink, backoff: Backoff, access: LinkAccess
+        self,
+        host: str,
+        port: int,
+        role: LinkRole,
+        sink: LinkSink,
+        backoff: Backoff,
+        access: LinkAccess,
+        name: str = "console",
     ) -> None:
+        """`name`: a bridge keeps a robot for the console whose link broke by it."""
+        self._name = name
         self._access = access
         self._host = host
         self._port = port
@@ -76,7 +85,7 @@ class LinkKeeper:
     async def _once(self) -> None:
         loop = asyncio.get_running_loop()
         secret, tls = self._access
-        async with RobotLink(self._host, self._port, self._role, name="console", secret=secret, tls=tls) as link:
+        async with RobotLink(self._host, self._port, self._role, name=self._name, secret=secret, tls=tls) as link:
             hello, since = link.hello, loop.time()
             if hello.description is None:
                 raise LinkLost("the bridge sent no description")

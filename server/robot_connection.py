@@ -3,6 +3,7 @@
 import asyncio
 import random
 from collections import Counter
+from pathlib import Path
 from typing import Protocol
 
 import structlog
@@ -10,6 +11,7 @@ import structlog
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback, LinkMessage, LinkRole, Media, Refusal, Reset, Rest, Stop
 from server.backoff import Backoff
+from server.console_name import console_name
 from server.link_access import LinkSettings, link_access
 from server.link_keeper import LinkKeeper
 
@@ -29,6 +31,8 @@ class RobotSettings(LinkSettings, Protocol):
     def link_backoff(self) -> float: ...
     @property
     def link_backoff_cap(self) -> float: ...
+    @property
+    def state_dir(self) -> Path | None: ...
 
 
 class RobotHost(Protocol):
@@ -68,6 +72,7 @@ class RobotConnection:
                 self,
                 Backoff(settings.link_backoff, settings.link_backoff_cap, random.Random()),
                 access,
+                console_name(settings.state_dir),
             )
             for role in _ROLES
         }

@@ -28,3 +28,10 @@ def test_the_unit_starts_a_command_that_the_program_has(unit: Path) -> None:
     )
     assert done.returncode == 0
     assert [word for word in words if word.startswith("--") and word not in done.stdout] == []
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
+def test_the_unit_asks_for_the_robot_links_secret(unit: Path) -> None:
+    lines = unit.read_text().splitlines()
+    assert "LoadCredential=link_secret:/etc/lockstep/link_secret" in lines
+    assert "Environment=LOCKSTEP_LINK_SECRET_FILE=%d/link_secret" in lines
