@@ -7,14 +7,14 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from robot_bridge.protocol.console import Participant, Seat, StreamInfo, StreamOffer
 from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Feedback, StopState, Text
-from server.access import Identity, require_role
+from robot_bridge.protocol.messages import Feedback, PressId, StopNumber, StopState, Text
+from server.access import Identity
 from server.body import read_json
-from server.errors import LinkDown
 from server.json_answer import json_answer
 from server.services import authorized, services, takes_stops
+from server.stop_presses import new_press
 
-__all__ = ["Delivered", "Health", "ScenePath", "SessionInfo", "StopRequest", "router"]
+__all__ = ["Delivered", "Health", "Released", "ResetRequest", "ScenePath", "SessionInfo", "StopRequest", "router"]
 
 router = APIRouter()
 Caller = Annotated[Identity, Depends(authorized)]
@@ -44,9 +44,16 @@ class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StopRequest(msgspec.Struct, frozen=True):
-    """Body of POST /api/stop."""
+    """Body of POST /api/stop. Repeats of one press carry its id, which is 32 random hex digits; "": a new one."""
 
     reason: Text = ""
+    press: PressId = ""
+
+
+class ResetRequest(msgspec.Struct, frozen=True):
+    """Body of POST /api/reset."""
+
+    number: StopNumber  # of the newest stop that the caller has seen
 
 
 class Health(msgspec.Struct, frozen=True, kw_only=True):
@@ -64,10 +71,20 @@ class ScenePath(msgspec.Struct, frozen=True):
 
 
 class Delivered(msgspec.Struct, frozen=True):
-    """Answer of POST /api/stop and /api/reset."""
+    """Answer of POST /api/stop: the robot has latched it."""
 
     delivered: bool
     event: int
+    number: int  # of the stop
+    press: str
+
+
+class Released(msgspec.Struct, frozen=True):
+    """Answer of POST /api/reset: the robot says that this stop is released."""
+
+    released: bool
+    event: int
+    number: int
 
 
 @router.get("/api/session")
@@ -98,18 +115,20 @@ async def stop(request: Request) -> Response:
     robot = takes_stops(request)
     caller = robot.access.bearer(request.headers.get("authorization"))
     wanted = await read_json(request, StopRequest)
-    delivered, event = robot.stop(caller.actor, "http", wanted.reason)
-    if not delivered:
-        raise LinkDown("the robot cannot be told now; the stop is kept and sent first when the link is back")
-    return json_answer(Delivered(True, event))
+    stopped = await robot.stop(new_press(caller.actor, "http", wanted.reason, wanted.press))
+    if not stopped.outcome.delivered:
+        raise stopped.error()
+    return json_answer(Delivered(True, stopped.event, stopped.outcome.number, stopped.outcome.press))
 
 
 @router.post("/api/reset")
 async def reset(request: Request, caller: Caller) -> Response:
-    require_role(caller, "operator", "supervisor")
+    """The holder of the control seat, or a supervisor. The right is looked at again once the body has come."""
+    wanted = await read_json(request, ResetRequest)
+    caller = await authorized(request)
     console = services(request).console
-    console.reset(caller.actor, "http", console.clock.stop.number)
-    return json_answer(Delivered(True, console.clock.event))
+    await console.stops.reset(caller.actor, "http", wanted.number)
+    return json_answer(Released(True, console.clock.event, wanted.number))
 
 
 @router.post("/api/scene")

@@ -18,6 +18,7 @@ AuditKind = Literal[
     "claim",  # the claims on the seat changed
     "stop",
     "reset",
+    "silence",  # a supervisor silenced the stops of a link, or that ended
     "refusal",  # merged: `count` of the same within a second
     "invitation",
     "revocation",

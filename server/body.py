@@ -43,7 +43,7 @@ def _decoder(kind: type[Body]) -> msgspec.json.Decoder[Body]:
 
 
 async def read_json(request: Request, kind: type[Body]) -> Body:
-    """The body as `kind`; an empty body is `kind()`.
+    """The body as `kind`; an empty body is an empty object.
 
     Raises:
         BadJson: not JSON, or a field of the wrong type.
@@ -51,9 +51,10 @@ async def read_json(request: Request, kind: type[Body]) -> Body:
     """
     body = await _read(request, MAX_JSON)
     try:
-        return _decoder(kind).decode(body) if body else kind()
+        found: Body = _decoder(kind).decode(body or b"{}")
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
         raise BadJson(str(error)) from error
+    return found
 
 
 async def _read(request: Request, bound: int) -> bytes:

@@ -12,6 +12,7 @@ from robot_bridge.protocol.console import (
     SeatRelease,
     SeatRequest,
     SeatTake,
+    SilenceStops,
     decode_client_message,
 )
 from robot_bridge.protocol.errors import MessageError
@@ -24,7 +25,7 @@ ChannelName = Literal["control", "session", "stop"]
 
 CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
     "control": (Command, Rest, Report, Ping, Stop),  # a stop is never turned away for the channel it took
-    "session": (SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, Rename, Note, Stop),
+    "session": (SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, SilenceStops, Rename, Note, Stop),
     "stop": (Stop, Reset),
 }
 

@@ -16,8 +16,13 @@ What happens to a command, in this order:
 | its event is the current one, and was the sender's own | answered with the current feedback |
 | its event is the one in flight, and is the sender's own | absorbed |
 | not the next event, or something is in flight | refused `out_of_order` |
-| it moves, and the sender has sent no neutral command since it got the seat | refused `not_neutral` |
+| the issue that it answers is none that the console knows | refused `late` |
+| its nonce is not that of this issue | refused `unseen` |
+| it moves, and no neutral command of the sender was executed since that was last needed | refused `not_neutral` |
 | else | clamped to the axes' ranges and the speed cap, forwarded |
+
+A neutral command is needed of a new holder of the seat, and of every holder after a stop, a reset, a new link or
+epoch, and whatever else the robot says so after (`Feedback.neutral_needed`). It counts once it was executed.
 
 A repeat of somebody else's event is not answered: after a hand-over the new holder would take the old one's
 execution for its own.
@@ -29,21 +34,28 @@ from typing import NamedTuple
 import msgspec
 
 from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Command, Feedback, Refusal, RefusalReason, Reset, Rest, Stop
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopTaken
 from robot_bridge.protocol.serial import event_after, is_newer
 from server.event_clock import EventClock
 from server.seat import ControlSeat
 from server.speed_cap import SpeedCap, within_share
+from server.stop_presses import StopPresses
 
-__all__ = ["Absorbed", "Answer", "CommandDesk", "Forward", "Outcome", "Refuse"]
+__all__ = ["Absorbed", "Answer", "CommandDesk", "CommandOutcome", "Forward", "ForwardRest", "Refuse", "RestOutcome"]
 
-STOP_REPEAT = 0.05  # s within which a further stop, with no reset between, says nothing new
+KNOWN_ISSUES = 64  # of the current event; at two a second the oldest was issued long before any `max_event_age`
 
 
 class Forward(NamedTuple):
-    """Send to the robot, now."""
+    """Send the command to the robot, now."""
 
-    message: Command | Rest | Stop | Reset
+    command: Command
+
+
+class ForwardRest(NamedTuple):
+    """Send the rest to the robot, now."""
+
+    rest: Rest
 
 
 class Answer(NamedTuple):
@@ -62,54 +74,59 @@ class Absorbed(NamedTuple):
     """Nothing to do: the same is already on its way."""
 
 
-Outcome = Forward | Answer | Refuse | Absorbed
+CommandOutcome = Forward | Answer | Refuse | Absorbed
+RestOutcome = ForwardRest | Refuse | Absorbed
 
 
 class CommandDesk:
-    """Call `link_up` before anything is forwarded, `link_down` when the link ends, and show it all the bridge says."""
+    """Call `link_up` before anything is forwarded, `link_down` when the link ends, and show it all the bridge says.
 
-    def __init__(self, clock: EventClock, seat: ControlSeat, speed_cap: SpeedCap | None = None) -> None:
+    `presses`: those of STOP; while one has no answer no command passes.
+    """
+
+    def __init__(
+        self,
+        clock: EventClock,
+        seat: ControlSeat,
+        presses: StopPresses | None = None,
+        speed_cap: SpeedCap | None = None,
+    ) -> None:
         self._clock = clock
         self._seat = seat
+        self._presses = presses or StopPresses()
         self._speed_cap = speed_cap or SpeedCap("off")
         self._description: RobotDescription | None = None
         self._link_is_up = False
         self._in_flight: Command | None = None
         self._sender = ""  # peer whose command was forwarded last
         self._sent_event = 0  # of that command; 0 before the first of this epoch
+        self._abandoned = False  # its sender has given up the seat since
         self._resting: Rest | None = None  # forwarded and not yet followed by a feedback
-        self._unconfirmed_stop: Stop | None = None  # asked for, no feedback has shown it yet; outlives the link
-        self._last_stop_at = -math.inf
+        self._nonces: dict[int, int] = {}  # issue of the current event -> its nonce, oldest first
+        self._issued_event = 0  # that they belong to; 0 before the first feedback
+        self._shown_stop = 0  # number of the newest stop that a feedback has shown
+        self._newest_stop = 0  # and of the newest that the bridge has told of
 
     @property
     def in_flight(self) -> Command | None:
         return self._in_flight
 
-    @property
-    def latched(self) -> Stop | None:
-        """The stop that holds or is still to arrive; None when there is none."""
-        held = self._clock.stop
-        return self._unconfirmed_stop or (
-            Stop(by=held.by, reason=held.reason, press=held.press) if held.stopped else None
-        )
-
-    def link_up(self, description: RobotDescription) -> Stop | None:
-        """Returns a stop that nobody knows to have arrived: send it first of all."""
+    def link_up(self, description: RobotDescription) -> None:
         self._description = description
         self._link_is_up = True
         self._forget()
-        return self._unconfirmed_stop
-
-    def epoch_ends(self) -> None:
-        """Call before the clock begins another epoch: a bridge that starts anew must not release a latched stop."""
-        self._sent_event = 0
-        self._unconfirmed_stop = self.latched
 
     def link_down(self) -> None:
         self._link_is_up = False
         self._forget()
 
-    def command(self, peer: str, command: Command, now: float = math.inf) -> Outcome:
+    def epoch_ends(self) -> None:
+        """Call before the clock begins another epoch: nothing that is known of this one holds in the next."""
+        self._sent_event = self._shown_stop = self._newest_stop = 0
+        self._nonces.clear()
+        self._forget()
+
+    def command(self, peer: str, command: Command, now: float = math.inf) -> CommandOutcome:
         """Without `now` nothing that was measured counts any more, and a speed cap in force is at its lowest."""
         description, feedback = self._description, self._clock.feedback
         if not self._seat.holds(peer):
@@ -120,7 +137,7 @@ class CommandDesk:
             return self._refuse(command, "wrong_size", f"{len(description.axes)} values are needed")
         if not all(map(math.isfinite, command.values)):
             return self._refuse(command, "not_a_number")
-        if self._unconfirmed_stop is not None or feedback.stop.stopped:
+        if self._stop_is_coming or feedback.stop.stopped:
             return self._refuse(command, "stopped")
         is_repeat = self._sender == peer and self._sent_event == command.event
         if is_repeat and command.event == feedback.event:
@@ -129,60 +146,72 @@ class CommandDesk:
             return Absorbed()
         if self._in_flight is not None or command.event != event_after(feedback.event):
             return self._refuse(command, "out_of_order")
-        self._speed_cap.answered(peer, feedback.event, command, now)
-        if not self.moves(command):
-            self._seat.neutral(peer)
-        elif not self._seat.may_move(peer):
+        return self._next(peer, command, description, feedback.event, now)
+
+    def _next(
+        self, peer: str, command: Command, description: RobotDescription, event: int, now: float
+    ) -> CommandOutcome:
+        nonce = self._nonces.get(command.issue)
+        if nonce is None:
+            return self._refuse(command, "late")
+        if nonce != command.nonce:
+            return self._refuse(command, "unseen", "its nonce is not that of the feedback that it answers")
+        self._speed_cap.answered(peer, event, command, now)
+        if self.moves(command) and not self._seat.may_move(peer):
             return self._refuse(command, "not_neutral", "send a neutral command first")
         self._in_flight = self._clamped(command, description, self._speed_cap.share(now))
-        self._sender, self._sent_event = peer, command.event
+        self._sender, self._sent_event, self._abandoned = peer, command.event, False
         return Forward(self._in_flight)
+
+    @property
+    def _stop_is_coming(self) -> bool:
+        """A stop is on its way to the bridge, or has arrived and no feedback has shown it."""
+        return bool(self._presses.pending) or self._newest_stop > self._shown_stop
 
     def moves(self, command: Command) -> bool:
         """Whether `command` is an intention to move."""
         axes = () if self._description is None else self._description.axes
         return any(value != axis.rest for value, axis in zip(command.values, axes, strict=False))
 
-    def rest(self, peer: str, rest: Rest) -> Outcome:
+    def rest(self, peer: str, rest: Rest) -> RestOutcome:
         """A rest of the holder always passes. One that names an event that is far ahead names the next instead."""
         if not self._seat.holds(peer):
             return self._refuse(rest, "no_seat")
         latest = event_after(self._clock.event)
         return self._forward_rest(Rest(event=latest) if is_newer(rest.event, latest) else rest)
 
-    def abandon(self) -> Outcome:
+    def abandon(self) -> RestOutcome:
         """The holder is gone or gave up the seat: what it has under way is void too."""
+        self._abandoned = True
         return self._forward_rest(Rest(event=event_after(self._clock.event)))
 
-    def stop(self, by: str, reason: str, now: float) -> Forward | Absorbed:
-        """Anyone's, past every gate, also when the link is down: then `link_up` brings it up again."""
-        stop, stopped = Stop(by=by, reason=reason), self._clock.stop.stopped
-        if (stopped or self._unconfirmed_stop is not None) and now - self._last_stop_at < STOP_REPEAT:
-            return Absorbed()
-        if not stopped or not self._link_is_up:
-            self._unconfirmed_stop = self._unconfirmed_stop or stop
-        self._last_stop_at = now
-        return Forward(stop)
-
-    def reset(self, by: str, number: int) -> Outcome:
-        """The caller has checked the role. `number`: of the newest stop that the sender has seen."""
-        if not self._link_is_up:
-            return self._refuse(None, "link_down")
-        self._last_stop_at = -math.inf
-        self._unconfirmed_stop = None  # the link keeps order: the bridge stops, then resets
-        return Forward(Reset(by=by, number=number))
+    def stop_taken(self, taken: StopTaken) -> None:
+        """The bridge has latched a stop."""
+        self._newest_stop = max(self._newest_stop, taken.number)
 
     def feedback(self, feedback: Feedback) -> None:
         """A feedback that the event clock accepted."""
-        if self._in_flight is not None and not is_newer(self._in_flight.event, feedback.event):
+        if feedback.event != self._issued_event:
+            self._nonces.clear()
+        self._issued_event = feedback.event
+        self._nonces[feedback.issue] = feedback.nonce
+        if len(self._nonces) > KNOWN_ISSUES:
+            del self._nonces[next(iter(self._nonces))]
+        answered = self._in_flight
+        if answered is not None and not is_newer(answered.event, feedback.event):
             self._in_flight = None
+        else:
+            answered = None
         self._resting = None
-        if feedback.stop.stopped:
-            self._unconfirmed_stop = None
+        if feedback.stop.stopped or feedback.neutral_needed or feedback.stop.number > self._shown_stop:
+            self._seat.neutral_needed()
+        elif answered is not None and not self.moves(answered) and not self._abandoned:
+            self._seat.neutral(self._sender)
+        self._shown_stop = max(self._shown_stop, feedback.stop.number)
 
     def refused(self, refusal: Refusal) -> str:
         """The bridge refused something; returns the peer to tell, or "" for none."""
-        if self._in_flight is not None and refusal.event in (0, self._in_flight.event) and not refusal.stop:
+        if self._in_flight is not None and refusal.event in (0, self._in_flight.event):
             self._in_flight = None
             return self._sender
         return self._seat.holder
@@ -190,15 +219,15 @@ class CommandDesk:
     def _forget(self) -> None:
         self._in_flight = None
         self._resting = None
-        self._last_stop_at = -math.inf
+        self._seat.neutral_needed()
 
-    def _forward_rest(self, rest: Rest) -> Outcome:
+    def _forward_rest(self, rest: Rest) -> RestOutcome:
         if not self._link_is_up:
             return self._refuse(rest, "link_down")
         if rest == self._resting:
             return Absorbed()
         self._resting = rest
-        return Forward(rest)
+        return ForwardRest(rest)
 
     def _clamped(self, command: Command, description: RobotDescription, share: float) -> Command:
         values = [
@@ -206,6 +235,6 @@ class CommandDesk:
         ]
         return msgspec.structs.replace(command, values=values)
 
-    def _refuse(self, message: Command | Rest | None, reason: RefusalReason, detail: str = "") -> Refuse:
-        event = 0 if message is None else message.event
-        return Refuse(Refusal(event=event, reason=reason, current=self._clock.event, detail=detail))
+    def _refuse(self, message: Command | Rest, reason: RefusalReason, detail: str = "") -> Refuse:
+        refusal = Refusal(event=message.event, reason=reason, current=self._clock.event, detail=detail)
+        return Refuse(refusal)

@@ -20,6 +20,7 @@ from robot_bridge.protocol.console import (
     SeatRequest,
     SeatTake,
     ServerMessage,
+    SilenceStops,
     StopStateNotice,
     Welcome,
     encode_console_message,
@@ -38,12 +39,13 @@ from robot_bridge.protocol.messages import (
     Rest,
     Stop,
     StopState,
+    StopTaken,
 )
 from server.audit import Actor
 from server.audit_trail import AuditTrail, RecordKeeper
 from server.channels import ChannelName
-from server.command_desk import Absorbed, Answer, CommandDesk, Forward, Outcome, Refuse
-from server.errors import ChannelError, Flood, LinkDown
+from server.command_desk import Absorbed, Answer, CommandDesk, Forward, ForwardRest, Refuse, RestOutcome
+from server.errors import ChannelError, Flood, Silenced
 from server.event_clock import EventClock
 from server.feedback_fanout import FeedbackFanout
 from server.feedback_viewer import FeedbackViewer, NoViewer
@@ -57,13 +59,16 @@ from server.seat_keeper import SeatKeeper
 from server.session_tap import SessionTap
 from server.settings import Settings
 from server.speed_cap import SpeedCap
+from server.stop_keeper import StopKeeper
+from server.stop_presses import new_press
+from server.stop_service import StopService
 from server.versions import console_version, description_hash, page_build
 
 __all__ = ["Console", "FeedbackViewer", "MediaFeed"]
 
 log = structlog.get_logger(__name__)
 
-UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
+TAKEN = "Another console has taken the robot. This one cannot drive it; STOP still works while its media link is up."
 UNWRITTEN = "The audit log cannot be written ({}). The console goes on; what happens now may be missing from the log."
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
@@ -87,26 +92,31 @@ class Console:
         audit_log: RecordKeeper,
         clock: EventClock | None = None,
         tap: SessionTap | None = None,
+        *,
+        stops: StopKeeper,
     ) -> None:
         self.clock = clock or EventClock()
         self._tap = tap or SessionTap()
         self.audit = AuditTrail(self.clock, audit_log)
         self.robot = RobotConnection(settings, self)
-        self.peers = Peers(settings, metrics, lambda peer: self.people.joined(peer), self._tap.told)
+        self.peers = Peers(settings, metrics, self._joined, self._tap.told)
         times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
         self.people = People(self.peers, self.clock, self.audit, self.seat.renamed, self._refuse_request)
-        self.people.remember(audit_log)
         self.further_news: list[Callable[[], ServerMessage]] = []  # what else newcomers are told
         self._metrics = metrics
         self._media = media
         self._viewer = viewer or NoViewer()
         self.speed_cap = SpeedCap(settings.speed_cap)
-        self._desk = CommandDesk(self.clock, self.seat.rules, self.speed_cap)
+        self._desk = CommandDesk(self.clock, self.seat.rules, stops.presses, self.speed_cap)
+        self.stops = StopService(
+            self.robot, stops, self.peers, self.clock, self._holder, self.audit, metrics, self._tap
+        )
         self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.drivers, self.peers.observers)
         self._forwarded_at = 0.0  # when the command in flight left
         self._shown_stop = StopState()  # what everyone was told last
         self._link_was_up = False
+        self._robot_is_taken = False  # by another console, and everyone was told
         self._audit_trouble = ""
 
     async def run(self) -> None:
@@ -115,6 +125,7 @@ class Console:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._guard("feedback", self._fanout.run))
             tasks.create_task(self._guard("seat", self.seat.watch))
+            tasks.create_task(self._guard("stops", self.stops.run))
             tasks.create_task(self._guard("audit", self.audit.run))
             tasks.create_task(self._guard("participants", self.people.share))
             tasks.create_task(self._guard("robot", self.robot.run))
@@ -131,50 +142,10 @@ class Console:
             detail=self.robot.detail,
         )
 
-    # what peers and HTTP ask for
-
     def link_holds_seat(self, link: str) -> bool:
         """Whether a peer with the link of this id drives."""
         holder = self.peers.by_id(self.seat.rules.holder)
         return holder is not None and holder.identity.token_id == link
-
-    @property
-    def latched_stop(self) -> Stop | None:
-        return self._desk.latched
-
-    def stop(self, by: Actor, where: str, reason: str) -> bool:
-        """Latch the stop. False when no link lives: then it is sent as soon as one does, before all else."""
-        self._metrics.stops.labels(where).inc()
-        outcome = self._desk.stop(by.name, reason, time.monotonic())
-        if isinstance(outcome, Absorbed):
-            return True
-        stop = outcome.message
-        if not isinstance(stop, Stop):
-            raise TypeError(stop)
-        delivered = self.robot.send_stop(stop)
-        if not delivered:
-            self.peers.tell("session", Notice(level="error", text=UNDELIVERED))
-        if self.clock.stop.stopped:
-            self.audit.again("stop", by, f"{where}, again")
-        else:
-            self.audit.record("stop", by, where if delivered else f"{where}, not delivered yet", reason)
-        self._tap.stop_asked(by, where, reason, delivered=delivered)
-        log.warning("stop", by=by.name, where=where, reason=reason, delivered=delivered)
-        return delivered
-
-    def reset(self, by: Actor, where: str, number: int) -> None:
-        """Release the latched stop; the caller has checked the role. `number`: of the newest stop that they have seen.
-
-        Raises:
-            LinkDown: the robot cannot be told.
-        """
-        outcome = self._desk.reset(by.name, number)
-        if not isinstance(outcome, Forward) or not self._forward(outcome):
-            raise LinkDown(self.robot.detail)
-        self._metrics.resets.inc()
-        self.audit.record("reset", by, where)
-        self._tap.reset_asked(by, where)
-        log.warning("reset", by=by.name, where=where)
 
     def audit_trouble(self, trouble: str, lost: int) -> None:
         """The audit log cannot be written, for a reason, or can again: "". `lost`: records that never will be."""
@@ -205,6 +176,8 @@ class Console:
             for news in self.further_news:
                 peer.send("session", news())
             self.people.welcome(peer)
+            if self.stops.trouble:
+                peer.send("session", Notice(level="warning", text=self.stops.trouble))
             if self._audit_trouble:
                 peer.send("session", Notice(level="warning", text=UNWRITTEN.format(self._audit_trouble)))
 
@@ -213,23 +186,25 @@ class Console:
         self.seat.heard(peer)
         match message:
             case Command():
-                self._settle(peer, "control", self._desk.command(peer.id, message, now), message)
+                self._command(peer, message, now)
             case Rest():
-                self._settle(peer, "control", self._desk.rest(peer.id, message))
+                self._rest(peer, self._desk.rest(peer.id, message))
             case Ping():
                 peer.send("control", Pong(id=message.id))
             case Stop():
-                self.stop(peer.actor, channel, message.reason)
+                self._stop(peer, channel, message)
             case SeatRelease():
                 self.seat.handle(peer, message)
             case Note():
                 self.people.write(peer, message.text)
-            case Reset() | SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | Rename() if not peer.asks.take(
-                now
+            case Reset():
+                self.stops.reset_by_peer(peer, message.number)
+            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SilenceStops() | Rename() if (
+                not peer.asks.take(now)
             ):
                 self._refuse_request(peer, "too_often")
-            case Reset():
-                self._reset_by(peer, message.number)
+            case SilenceStops():
+                self._silence(peer, message)
             case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake():
                 self.seat.handle(peer, message)
             case Rename():
@@ -259,11 +234,10 @@ class Console:
 
     def rest_robot(self, why: str) -> None:
         """Before anybody else drives: what the last holder has under way is void too."""
-        rest = self._desk.abandon()
-        if isinstance(rest, Forward) and self._forward(rest):
+        outcome = self._desk.abandon()
+        if isinstance(outcome, ForwardRest) and self.robot.send(outcome.rest):
             self._metrics.rests.labels(why).inc()
-            if isinstance(rest.message, Rest):
-                self._tap.rest(Actor(), rest.message, why)
+            self._tap.rest(Actor(), outcome.rest, why)
 
     def refuse(self, peer: Peer, refusal: SeatRefusal) -> None:
         self._refuse_request(peer, refusal.reason, refusal.detail)
@@ -272,6 +246,7 @@ class Console:
 
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
         """References of different epochs are never compared: every peer starts anew."""
+        self.stops.epoch_ends(self.clock.stop)
         self._desk.epoch_ends()
         self.clock.begin(epoch)
         self.speed_cap.forget()
@@ -286,10 +261,8 @@ class Console:
             raise TypeError("a link is up only after its hello")
         self._link_was_up = True
         self._metrics.link_up.set(1)
-        stop = self._desk.link_up(self.robot.description)
-        if stop is not None:
-            self.robot.send_stop(stop)
-            self.audit.record("stop", Actor(stop.by), "sent again", stop.reason)
+        self.stops.link_up()
+        self._desk.link_up(self.robot.description)
         self.audit.record("link_up")
         self.peers.tell("session", self.state_of_robot(self.robot.description))
 
@@ -297,9 +270,16 @@ class Console:
         if self._link_was_up:
             self._metrics.link_losses.inc()
             self.audit.record("link_down", detail=detail)
+        if self._link_was_up or not detail.startswith("taken"):
+            self._robot_is_taken = False
+        if detail.startswith("taken") and not self._robot_is_taken:
+            self._robot_is_taken = True
+            self.audit.record("link_down", what="taken", detail=detail)
+            self.peers.tell("session", Notice(level="error", text=TAKEN))
         self._link_was_up = False
         self._metrics.link_up.set(0)
         self._desk.link_down()
+        self.stops.link_down(detail)
         if self.robot.description is not None:
             self.peers.tell("session", self.state_of_robot(self.robot.description))
 
@@ -309,6 +289,7 @@ class Console:
             return
         answered = self._desk.in_flight
         self._desk.feedback(feedback)
+        self.stops.feedback(feedback.stop)
         self._tap.feedback(feedback, now)
         self._fanout.publish(encode_console_message(feedback))
         self.speed_cap.fed_back(feedback, now)
@@ -325,6 +306,8 @@ class Console:
         self._viewer.feedback(feedback)
 
     def refusal_received(self, refusal: Refusal) -> None:
+        if self.stops.refused(refusal):
+            return
         self._metrics.refusals.labels(refusal.reason).inc()
         peer = self.peers.by_id(self._desk.refused(refusal))
         self._tap.refused(Actor() if peer is None else peer.actor, refusal, "robot")
@@ -332,12 +315,17 @@ class Console:
             self.audit.refused(peer.actor, refusal.reason)
             peer.send("control", refusal)
 
+    def stop_taken(self, taken: StopTaken) -> None:
+        self._desk.stop_taken(taken)
+        self.stops.taken(taken)
+
     def media_received(self, media: Media) -> None:
         self._media.feed(media, time.monotonic())
 
     # what follows from the cores' outcomes
 
-    def _settle(self, peer: Peer, channel: ChannelName, outcome: Outcome, command: Command | None = None) -> None:
+    def _command(self, peer: Peer, command: Command, now: float) -> None:
+        outcome = self._desk.command(peer.id, command, now)
         if isinstance(outcome, Forward) and not self._forward(outcome):
             outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
         if isinstance(outcome, Answer) and not peer.may_be_answered_again():
@@ -346,16 +334,43 @@ class Console:
             case Answer(feedback):
                 peer.send_feedback(encode_console_message(feedback))
             case Refuse(refusal):
-                self._refuse(peer, channel, refusal)
-                if refusal.reason == "out_of_order" and self.clock.feedback is not None:
+                self._refuse(peer, "control", refusal)
+                if refusal.reason in ("out_of_order", "unseen", "late") and self.clock.feedback is not None:
                     peer.send_feedback(encode_console_message(self.clock.feedback))
-            case Forward(Command() as forwarded) if self._desk.moves(forwarded):
+            case Forward(forwarded) if self._desk.moves(forwarded):
                 self.seat.moved(peer)
-            case Forward(Rest() as rest):
-                self._tap.rest(peer.actor, rest, "")
-        if command is not None:
-            self._tap.command(peer.actor, command, outcome)
-            self._metrics.commands.labels(type(outcome).__name__.lower()).inc()
+        self._tap.command(peer.actor, command, outcome)
+        self._metrics.commands.labels(type(outcome).__name__.lower()).inc()
+
+    def _rest(self, peer: Peer, outcome: RestOutcome) -> None:
+        if isinstance(outcome, ForwardRest):
+            if self.robot.send(outcome.rest):
+                self._tap.rest(peer.actor, outcome.rest, "")
+                return
+            outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
+        if isinstance(outcome, Refuse):
+            self._refuse(peer, "control", outcome.refusal)
+
+    def _stop(self, peer: Peer, channel: ChannelName, stop: Stop) -> None:
+        try:
+            self.stops.stop(new_press(peer.actor, channel, stop.reason, stop.press))
+        except Silenced as error:
+            self._metrics.refusals.labels("silenced").inc()
+            refusal = Refusal(event=0, reason="silenced", current=self.clock.event, detail=error.detail)
+            self._tap.refused(peer.actor, refusal, "console")
+            peer.send("stop", refusal)
+
+    def _silence(self, peer: Peer, message: SilenceStops) -> None:
+        reason = self.stops.silence(peer, message.peer, silent=message.silent)
+        if reason is not None:
+            self._refuse_request(peer, reason, "supervisors silence the stops of operators and observers")
+
+    def _joined(self, peer: Peer) -> None:
+        peer.silenced = self.stops.is_silenced(peer.identity.token_id)
+        self.people.joined(peer)
+
+    def _holder(self) -> str:
+        return self.seat.rules.holder
 
     def _refuse_request(self, peer: Peer, reason: RefusalReason, detail: str = "") -> None:
         self._refuse(peer, "session", Refusal(event=0, reason=reason, current=self.clock.event, detail=detail))
@@ -367,13 +382,9 @@ class Console:
         peer.send(channel, refusal)
 
     def _forward(self, outcome: Forward) -> bool:
-        message = outcome.message
-        if isinstance(message, Stop):
-            return self.robot.send_stop(message)
-        if isinstance(message, Command):
-            self._forwarded_at = time.monotonic()
-            self._viewer.command(message)
-        return self.robot.send(message)
+        self._forwarded_at = time.monotonic()
+        self._viewer.command(outcome.command)
+        return self.robot.send(outcome.command)
 
     def _report_speed(self, peer: Peer, report: Report) -> None:
         if not self.seat.rules.holds(peer.id):
@@ -385,16 +396,6 @@ class Console:
         if news is not None:
             self._metrics.speed_share.set(news.share)
             self.peers.tell("session", news)
-
-    def _reset_by(self, peer: Peer, number: int) -> None:
-        refusal = Refusal(event=0, reason="not_allowed", current=self.clock.event, detail="observers do not reset")
-        if peer.role != "observer":
-            try:
-                self.reset(peer.actor, "stop", number)
-                return
-            except LinkDown as error:
-                refusal = Refusal(event=0, reason="link_down", current=self.clock.event, detail=error.detail[:500])
-        self._refuse(peer, "stop", refusal)
 
     # background tasks
 

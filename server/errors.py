@@ -7,7 +7,9 @@ ConsoleError
 │   ├── LinkExpired         our own signature, too old
 │   ├── LinkOtherRobot      our own signature, good for other robots of the fleet
 │   ├── LinkRevoked         our own signature, called back
+│   ├── NoSeat              only the holder of the control seat may
 │   ├── NotAllowed          the role does not permit it
+│   ├── Silenced            a supervisor has silenced the stops of this link
 │   └── OriginRefused       a page of another site
 ├── RequestError            the request is not understood
 │   ├── AlreadyRecording
@@ -19,12 +21,15 @@ ConsoleError
 │   ├── BodyTooLarge
 │   ├── BodyTooSlow
 │   ├── HostRefused         a host name that is not ours
+│   ├── LockedOut           a reset while somebody at the robot keeps it from being driven
 │   ├── NotConnected
 │   ├── NotFound
 │   ├── PreconditionFailed
 │   ├── TooManyInvitations
 │   ├── PreconditionRequired
 │   ├── RecordingUnreadable  what is asked for is damaged, and stays so
+│   ├── ResetTooSoon        a reset right after the stop that it names
+│   ├── StaleReset          a reset that does not name the newest stop
 │   ├── TooManyRequests
 │   └── WrongMediaType
 ├── ChannelError            a data channel message that is not understood
@@ -40,12 +45,14 @@ ConsoleError
 └── Unavailable             right now it cannot be done
     ├── LinkDown
     ├── RecordingFailed     the disk, or what is on it
+    ├── ResetNotKept        the robot's disk does not take it
     ├── RobotFailed         this console's session of the robot, which is started again
     ├── RobotUnreachable
     ├── SceneUnavailable
     ├── ShuttingDown
     ├── StateUnavailable    the state directory cannot be written
-    └── TooManyPeers
+    ├── TooManyPeers
+    └── Unconfirmed         the robot was told, and has not answered
 """
 
 from typing import NamedTuple
@@ -72,7 +79,9 @@ __all__ = [
     "LinkExpired",
     "LinkOtherRobot",
     "LinkRevoked",
+    "LockedOut",
     "MalformedMessage",
+    "NoSeat",
     "MessageTooLarge",
     "NotAllowed",
     "NotConnected",
@@ -83,10 +92,14 @@ __all__ = [
     "RecordingFailed",
     "RecordingUnreadable",
     "RequestError",
+    "ResetNotKept",
+    "ResetTooSoon",
     "RobotFailed",
     "RobotUnreachable",
     "SceneUnavailable",
     "ShuttingDown",
+    "Silenced",
+    "StaleReset",
     "StateUnavailable",
     "TokenInvalid",
     "TokenMissing",
@@ -96,6 +109,7 @@ __all__ = [
     "TooManySections",
     "TransportRefused",
     "Unavailable",
+    "Unconfirmed",
     "UnknownChannel",
     "WrongChannel",
     "WrongMediaType",
@@ -143,7 +157,15 @@ class NotAllowed(AccessError):
     pass
 
 
+class NoSeat(AccessError):
+    pass
+
+
 class OriginRefused(AccessError):
+    pass
+
+
+class Silenced(AccessError):
     pass
 
 
@@ -200,6 +222,18 @@ class PreconditionFailed(RequestError):
 
 
 class PreconditionRequired(RequestError):
+    pass
+
+
+class StaleReset(RequestError):
+    pass
+
+
+class ResetTooSoon(RequestError):
+    pass
+
+
+class LockedOut(RequestError):
     pass
 
 
@@ -277,6 +311,10 @@ class RecordingFailed(Unavailable):
     pass
 
 
+class ResetNotKept(Unavailable):
+    pass
+
+
 class RobotFailed(Unavailable):
     pass
 
@@ -301,6 +339,10 @@ class TooManyPeers(Unavailable):
     pass
 
 
+class Unconfirmed(Unavailable):
+    pass
+
+
 class HttpError(NamedTuple):
     """How an error looks over HTTP."""
 
@@ -315,8 +357,10 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     LinkExpired: HttpError(401, "link_expired", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     LinkRevoked: HttpError(401, "link_revoked", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     LinkOtherRobot: HttpError(403, "link_other_robot"),
+    NoSeat: HttpError(403, "no_seat"),
     NotAllowed: HttpError(403, "not_allowed"),
     OriginRefused: HttpError(403, "origin_refused"),
+    Silenced: HttpError(403, "silenced"),
     AlreadyRecording: HttpError(409, "already_recording"),
     BadJson: HttpError(400, "bad_json"),
     BadParameter: HttpError(422, "bad_parameter"),
@@ -329,6 +373,9 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     WrongMediaType: HttpError(415, "wrong_media_type"),
     BodyTooSlow: HttpError(408, "too_slow", {"Connection": "close"}),
     NotConnected: HttpError(409, "not_connected"),
+    LockedOut: HttpError(409, "locked_out"),
+    ResetTooSoon: HttpError(409, "too_soon", {"Retry-After": "1"}),
+    StaleReset: HttpError(409, "stale_reset"),
     TooManyInvitations: HttpError(409, "too_many_invitations"),
     PreconditionFailed: HttpError(412, "precondition_failed"),
     HostRefused: HttpError(421, "host_refused"),
@@ -337,12 +384,14 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     InternalFault: HttpError(500, "internal_error"),
     LinkDown: HttpError(503, "link_down", {"Retry-After": "1"}),
     RecordingFailed: HttpError(503, "recording_failed", {"Retry-After": "5"}),
+    ResetNotKept: HttpError(503, "not_kept", {"Retry-After": "5"}),
     RobotFailed: HttpError(503, "robot_failed", {"Retry-After": "2"}),
     RobotUnreachable: HttpError(503, "robot_unreachable", {"Retry-After": "1"}),
     SceneUnavailable: HttpError(503, "scene_unavailable", {"Retry-After": "5"}),
     ShuttingDown: HttpError(503, "shutting_down", {"Retry-After": "5"}),
     StateUnavailable: HttpError(503, "state_unavailable", {"Retry-After": "5"}),
     TooManyPeers: HttpError(503, "too_many_peers", {"Retry-After": "5"}),
+    Unconfirmed: HttpError(503, "unconfirmed", {"Retry-After": "1"}),
 }
 
 

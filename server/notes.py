@@ -1,18 +1,18 @@
-"""Notes to everyone: cleaned, numbered, limited in rate, the last ones kept for newcomers. No I/O, no clock."""
+"""Notes to everyone: cleaned, numbered, limited in rate. No I/O, no clock.
+
+Newcomers get the last ones of this run of the console; what earlier sessions wrote is in the audit and the recordings.
+"""
 
 from collections import deque
 from collections.abc import Iterator
 
 from robot_bridge.protocol.console import Role, SharedNote
 from robot_bridge.protocol.messages import RefusalReason
-from robot_bridge.protocol.serial import FIRST_EVENT
-from server.audit import AuditRecord
 from server.names import printable
 from server.token_bucket import TokenBucket
 
 __all__ = ["NoteBoard"]
 
-ROLES: dict[str, Role] = {"observer": "observer", "operator": "operator", "supervisor": "supervisor"}
 KEPT = 100
 BURST = 5.0  # notes of one peer at once
 PEER_RATE = 0.5  # notes a second of one peer
@@ -28,19 +28,6 @@ class NoteBoard:
         self._next_id = 1
         self._all = TokenBucket(BOARD_RATE, BOARD_BURST, now)
         self._peers: dict[str, TokenBucket] = {}
-
-    def remember(self, record: AuditRecord) -> None:
-        """A note of an earlier run, from the audit log."""
-        if record.kind == "note" and record.role in ROLES:
-            self._keep(
-                record.peer,
-                record.who,
-                ROLES[record.role],
-                record.detail,
-                record.epoch,
-                max(record.event, FIRST_EVENT),
-                record.time,
-            )
 
     def __iter__(self) -> Iterator[SharedNote]:
         """The last ones, oldest first."""

@@ -12,7 +12,7 @@ import msgspec
 
 from robot_bridge.protocol.console import RecordingState
 from robot_bridge.protocol.serial import MAX_EVENT
-from server.api import Delivered, Health, ScenePath, SessionInfo, StopRequest
+from server.api import Delivered, Health, Released, ResetRequest, ScenePath, SessionInfo, StopRequest
 from server.api_access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
 from server.api_recordings import FileTicket, RecordingDetails, RecordingList, RecordingRequest
 from server.errors import (
@@ -31,6 +31,8 @@ from server.errors import (
     LinkExpired,
     LinkOtherRobot,
     LinkRevoked,
+    LockedOut,
+    NoSeat,
     NotAllowed,
     NotConnected,
     NotFound,
@@ -39,15 +41,20 @@ from server.errors import (
     PreconditionRequired,
     RecordingFailed,
     RecordingUnreadable,
+    ResetNotKept,
+    ResetTooSoon,
     RobotUnreachable,
     SceneUnavailable,
     ShuttingDown,
+    Silenced,
+    StaleReset,
     StateUnavailable,
     TokenInvalid,
     TokenMissing,
     TooManyInvitations,
     TooManyPeers,
     TooManyRequests,
+    Unconfirmed,
     WrongMediaType,
 )
 from server.ice_servers import IceServers
@@ -160,10 +167,17 @@ OPERATIONS: tuple[Operation, ...] = (
     ),
     Operation(
         *("post", "/api/stop", "Stop the robot, latched. From every role.", 200, Delivered),
-        errors=(LinkDown, *WITH_JSON),
+        errors=(Silenced, LinkDown, Unconfirmed, *WITH_JSON),
         body=StopRequest,
     ),
-    Operation("post", "/api/reset", "Release the latched stop.", 200, Delivered, (NotAllowed, LinkDown)),
+    Operation(
+        *("post", "/api/reset", "Release the latched stop that the body names.", 200, Released),
+        errors=(
+            *(NotAllowed, NoSeat, StaleReset, ResetTooSoon, LockedOut, LinkDown, Unconfirmed, ResetNotKept),
+            *WITH_JSON,
+        ),
+        body=ResetRequest,
+    ),
     Operation("post", "/api/scene", "A ticket for the 3D scene.", 200, ScenePath, (SceneUnavailable,)),
     Operation("get", "/api/invitations", "Whom one has invited.", 200, InvitationList, (NotAllowed,)),
     Operation(

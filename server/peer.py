@@ -34,7 +34,7 @@ __all__ = ["MessageWriter", "Peer", "PeerHost", "PeerLimits", "PeerStreams"]
 
 log = structlog.get_logger(__name__)
 
-ASK_RATE = 2.0  # Hz, of requests that everyone is told of: seat, name, reset
+ASK_RATE = 2.0  # Hz, of requests that everyone is told of: seat, name
 ASK_BURST = 10.0
 CLOSE_TIMEOUT = 5.0  # s; goodbye is said to the remote, which may not answer
 FORGIVEN_RATE = 2.0  # Hz, of bad messages
@@ -125,6 +125,7 @@ class Peer(ABC):
         self._quality: Quality | None = None  # newest
         self.ended = ""  # why; "" while it lives
         self._has_failed = False
+        self.silenced = False  # a supervisor has silenced the stops of its link
         self.thumbnail = False  # a small picture on somebody's overview, not somebody who takes part
         self.relay = ""  # the relay that it watches through; "": media and feedback come from here
         self._media = media
@@ -233,6 +234,7 @@ class Peer(ABC):
             round_trip_ms=self.report.round_trip_ms,
             loss=None if self._media.loss is None else round(self._media.loss, 2),
             tier=self._media.tier,
+            silenced=self.silenced,
         )
 
     def drives(self, holds_seat: bool) -> None:

@@ -217,4 +217,10 @@ class Peers:
 
 
 def _without_values(participant: Participant) -> Participant:
-    return Participant(peer=participant.peer, name=participant.name, role=participant.role, carrier=participant.carrier)
+    return Participant(
+        peer=participant.peer,
+        name=participant.name,
+        role=participant.role,
+        carrier=participant.carrier,
+        silenced=participant.silenced,
+    )

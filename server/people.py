@@ -2,11 +2,10 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from robot_bridge.protocol.console import Participants, SharedNote
 from robot_bridge.protocol.messages import RefusalReason
-from server.audit import AuditRecord
 from server.audit_trail import AuditTrail
 from server.event_clock import EventClock
 from server.notes import NoteBoard
@@ -40,11 +39,6 @@ class People:
         self._renamed = renamed
         self._refuse = refuse
         self._board = NoteBoard(time.monotonic())
-
-    def remember(self, records: Iterable[AuditRecord]) -> None:
-        """The notes of earlier runs, from the audit log."""
-        for record in records:
-            self._board.remember(record)
 
     def joined(self, peer: Peer) -> None:
         if peer.thumbnail:

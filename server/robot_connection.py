@@ -9,7 +9,18 @@ from typing import Protocol
 import structlog
 
 from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Command, Feedback, LinkMessage, LinkRole, Media, Refusal, Reset, Rest, Stop
+from robot_bridge.protocol.messages import (
+    Command,
+    Feedback,
+    LinkMessage,
+    LinkRole,
+    Media,
+    Refusal,
+    Reset,
+    Rest,
+    Stop,
+    StopTaken,
+)
 from server.backoff import Backoff
 from server.console_name import console_name
 from server.link_access import LinkSettings, link_access
@@ -43,6 +54,7 @@ class RobotHost(Protocol):
     def link_down(self, detail: str) -> None: ...
     def feedback_received(self, feedback: Feedback) -> None: ...
     def refusal_received(self, refusal: Refusal) -> None: ...
+    def stop_taken(self, taken: StopTaken) -> None: ...
     def media_received(self, media: Media) -> None: ...
 
 
@@ -134,3 +146,5 @@ class RobotConnection:
             self._host.feedback_received(message)
         elif isinstance(message, Refusal):
             self._host.refusal_received(message)
+        elif isinstance(message, StopTaken):
+            self._host.stop_taken(message)

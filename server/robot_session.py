@@ -26,6 +26,7 @@ from server.scene import SceneView
 from server.services import Services
 from server.settings import Settings
 from server.state_dir import StateDir
+from server.stop_keeper import StopKeeper
 from server.voice import VoiceService
 
 __all__ = ["running_session"]
@@ -33,16 +34,25 @@ __all__ = ["running_session"]
 
 @asynccontextmanager
 async def running_session(
-    settings: Settings, house: House, metrics: Metrics, directory: StateDir, robot: str = ""
+    settings: Settings,
+    house: House,
+    metrics: Metrics,
+    directory: StateDir,
+    robot: str = "",
+    stops: StopKeeper | None = None,
 ) -> AsyncIterator[Services]:
     """While entered, the session runs. A fault in a task of its own ends it, and comes out as an ExceptionGroup.
 
     Args:
         directory: where it keeps what is its own
         robot: its name in a fleet; "" is the only robot of a console
+        stops: what is known of stops, where that outlives the session; whoever has it runs it. None: it has its own
     """
     with open_audit_log(directory, settings, robot, house.state.signer) as audit:
-        async with _session(settings, house, metrics, directory, robot, audit) as made:
+        async with (
+            _running_stops(settings, directory, stops) as keeper,
+            _session(settings, house, metrics, directory, robot, audit, keeper) as made,
+        ):
             house.wardens.append(made.warden)
             try:
                 yield made
@@ -51,8 +61,29 @@ async def running_session(
 
 
 @asynccontextmanager
+async def _running_stops(
+    settings: Settings, directory: StateDir, stops: StopKeeper | None
+) -> AsyncIterator[StopKeeper]:
+    if stops is not None:
+        yield stops
+        return
+    keeper = StopKeeper(directory.path, settings.robot)
+    await keeper.load()
+    async with asyncio.TaskGroup() as tasks:
+        running = tasks.create_task(keeper.run(), name="kept stops")
+        yield keeper
+        running.cancel()
+
+
+@asynccontextmanager
 async def _session(
-    settings: Settings, house: House, metrics: Metrics, directory: StateDir, robot: str, audit: AuditLog
+    settings: Settings,
+    house: House,
+    metrics: Metrics,
+    directory: StateDir,
+    robot: str,
+    audit: AuditLog,
+    stops: StopKeeper,
 ) -> AsyncIterator[Services]:
     access = house.state.access.at(robot)
     media = MediaPlane(settings.media, metrics.registry, settings.sources, on_fault=metrics.faults.caught)
@@ -71,7 +102,7 @@ async def _session(
     )
     engines = relay_engines(settings, media, house.state.signing_key(settings) + robot)
     relays = RelayDesk(settings, engines, lambda: console.peers)
-    console = Console(settings, metrics, RelayedMedia(media, relays), scene, audit, clock, recorder)
+    console = Console(settings, metrics, RelayedMedia(media, relays), scene, audit, clock, recorder, stops=stops)
     console.peers.relays.append(relays)
     console.peers.further_bounds.append(house.check_room)
     console.further_news.append(recorder.state)

@@ -122,7 +122,8 @@ class ControlSeat:
     """The seat's state; peers are known by their ids. `now` is monotonic seconds, handed in.
 
     Call `heard` for every valid message of a peer, `moved` for every moving command of the holder that passed,
-    `neutral` for every neutral one, and `expire` a few times a second.
+    `neutral` for every neutral one that was executed, `neutral_needed` when another one has to come before the robot
+    may move, and `expire` a few times a second.
 
     Attributes:
         holder: "" while the seat is free
@@ -136,7 +137,7 @@ class ControlSeat:
         self._heard_at = 0.0
         self._moved_at = 0.0
         self._counting = False  # everyone was told of the idle countdown
-        self._proven = False  # the holder has sent a neutral command
+        self._proven = False  # a neutral command of the holder was executed since one was needed
         self._claims: dict[str, float] = {}  # peer -> deadline, oldest first
         self._declined: dict[str, float] = {}  # peer -> when it may claim again
 
@@ -151,7 +152,7 @@ class ControlSeat:
         return self.standing(peer) is Standing.HOLDER
 
     def may_move(self, peer: str) -> bool:
-        """Whether `peer` holds the seat and has sent a neutral command since it got it."""
+        """Whether `peer` holds the seat and a neutral command of it was executed since one was last needed."""
         return self.holds(peer) and self._proven
 
     def claims(self, now: float) -> dict[str, float]:
@@ -195,6 +196,10 @@ class ControlSeat:
 
     def neutral(self, peer: str) -> None:
         self._proven = self._proven or self.holds(peer)
+
+    def neutral_needed(self) -> None:
+        """Nobody moves the robot before another neutral command."""
+        self._proven = False
 
     def moved(self, peer: str, now: float) -> SeatOutcome:
         """Ends an idle countdown."""

@@ -11,7 +11,6 @@ from fastapi import Request
 from starlette.requests import HTTPConnection
 
 from server.access import Access, Identity
-from server.audit import Actor
 from server.audit_log import AuditLog
 from server.console import Console
 from server.errors import RobotFailed, SceneUnavailable
@@ -26,6 +25,8 @@ from server.relay.desk import RelayDesk
 from server.scene import SceneView
 from server.settings import Settings
 from server.state import ConsoleState
+from server.stop_presses import Press
+from server.stop_service import StopAnswer
 from server.voice import VoiceService
 
 __all__ = ["Services", "TakesStops", "authorized", "services", "takes_stops"]
@@ -37,8 +38,8 @@ class TakesStops(Protocol):
     @property
     def access(self) -> Access: ...
 
-    def stop(self, by: Actor, where: str, reason: str) -> tuple[bool, int]:
-        """Whether the robot was told, else the stop is kept; and its event."""
+    async def stop(self, press: Press) -> StopAnswer:
+        """Latched at once; returns when the robot has answered, or that it has not. Raises Silenced."""
         ...
 
 
@@ -67,9 +68,11 @@ class Services:
     def guard(self) -> Guard:
         return self.house.guard
 
-    def stop(self, by: Actor, where: str, reason: str) -> tuple[bool, int]:
-        """Whether the robot was told, else the stop is kept; and its event."""
-        return self.console.stop(by, where, reason), self.console.clock.event
+    async def stop(self, press: Press) -> StopAnswer:
+        """Latched at once; returns when the robot has answered, or that it has not. Raises Silenced."""
+        self.console.stops.stop(press)
+        outcome = await self.console.stops.outcome(press.id)
+        return StopAnswer(outcome, self.console.clock.event, self.console.robot.up)
 
     def collect(self) -> None:
         """Bring into the metrics what is counted elsewhere."""

@@ -1,9 +1,9 @@
 """Who listens to a session: all that passes the console, for a recorder. This one does nothing."""
 
 from robot_bridge.protocol.console import Report, ServerMessage
-from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest, StopTaken
 from server.audit import Actor
-from server.command_desk import Outcome
+from server.command_desk import CommandOutcome
 
 __all__ = ["SessionTap"]
 
@@ -14,7 +14,7 @@ class SessionTap:
     def told(self, message: ServerMessage) -> None:
         """What everyone is told: the seat, the participants, notes, the robot link."""
 
-    def command(self, by: Actor, command: Command, outcome: Outcome) -> None:
+    def command(self, by: Actor, command: Command, outcome: CommandOutcome) -> None:
         """What `by` asked for, and what became of it."""
 
     def rest(self, by: Actor, rest: Rest, why: str) -> None:
@@ -25,9 +25,14 @@ class SessionTap:
     def refused(self, to: Actor, refusal: Refusal, by: str) -> None:
         """`by`: "console" or "robot"."""
 
-    def stop_asked(self, by: Actor, where: str, reason: str, *, delivered: bool) -> None: ...
+    def stop_asked(self, by: Actor, where: str, reason: str, press: str, *, delivered: bool) -> None:
+        """A press of STOP. `delivered`: there was a link to send it on."""
 
-    def reset_asked(self, by: Actor, where: str) -> None: ...
+    def stop_taken(self, by: Actor, taken: StopTaken) -> None:
+        """The robot has answered a press of `by`."""
+
+    def reset_done(self, by: Actor, where: str, number: int) -> None:
+        """The robot says that stop `number` is released, as `by` asked."""
 
     def report(self, by: Actor, report: Report) -> None:
         """Of the seat's holder."""

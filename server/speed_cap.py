@@ -2,8 +2,8 @@
 
 v <= v_max * min(1, 0.2 s / delay), the rule of the German ordinance on remote driving (StVFernLV). The delay is the
 longer of what the seat's holder reports (command to picture, on its own clock) and what this side sees for itself: how
-long after a feedback left the command came that answers it. Nobody can answer before the feedback was there, so a
-report cannot make the path look shorter than it is.
+long after a feedback left the command came that answers it. Nobody can answer before the feedback was there, because
+a command names its nonce, so neither a report nor a guess can make the path look shorter than it is.
 
 Doubt is slow: a holder that reports no delay, or has not reported for a while, counts as `UNKNOWN_DELAY` late.
 
@@ -43,7 +43,7 @@ class SpeedCap:
 
     def __init__(self, mode: SpeedCapMode) -> None:
         self._mode: SpeedCapMode = mode
-        self._left_at: dict[tuple[int, int], float] = {}  # (event, issue) -> s
+        self._left_at: dict[tuple[int, int, int], float] = {}  # (event, issue, nonce) -> s
         self._holder = ""  # peer that the following is about
         self._report = Report()
         self._reported_at = float("-inf")
@@ -56,7 +56,7 @@ class SpeedCap:
 
     def fed_back(self, feedback: Feedback, now: float) -> None:
         """A feedback leaves for the operators."""
-        self._left_at[feedback.event, feedback.issue] = now
+        self._left_at[feedback.event, feedback.issue, feedback.nonce] = now
         if len(self._left_at) > REMEMBERED:
             del self._left_at[next(iter(self._left_at))]
 
@@ -68,7 +68,7 @@ class SpeedCap:
     def answered(self, holder: str, event: int, command: Command, now: float) -> None:
         """A command of the seat's holder came, as the answer to feedback `event`."""
         self._about(holder)
-        left_at = self._left_at.get((event, command.issue))
+        left_at = self._left_at.get((event, command.issue, command.nonce))
         if left_at is not None:
             self._answers.append(Answer(now, now - left_at))
 

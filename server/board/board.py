@@ -6,9 +6,10 @@ from typing import Literal, NamedTuple, Protocol
 
 import msgspec
 
-from server.audit import Actor, AuditRecord
+from server.audit import AuditRecord
 from server.board.tile import Tile
 from server.invitations import Invitation
+from server.stop_presses import Press
 
 __all__ = ["Board", "BoardHost", "BoardState", "Conflict", "SharedAudit", "SharedRecord", "StopAnswer"]
 
@@ -37,6 +38,7 @@ class StopAnswer(NamedTuple):
     delivered: bool
     event: int
     detail: str
+    number: int = 0  # of the stop; 0 when it was not delivered
 
 
 class SharedRecord(msgspec.Struct, frozen=True, kw_only=True):
@@ -56,10 +58,10 @@ class SharedAudit(NamedTuple):
 
 
 class BoardHost(Protocol):
-    """What the board asks of this console. Called on the loop; returns at once."""
+    """What the board asks of this console. Called on the loop; returns at once, but for `stop_robot`."""
 
-    def stop_robot(self, name: str, by: Actor, reason: str) -> tuple[bool, int]:
-        """Whether the robot was told, and its event. False for a robot that is not ours."""
+    async def stop_robot(self, name: str, press: Press) -> StopAnswer:
+        """Latched at once; returns within a second or so, when the robot has answered or has not."""
         ...
 
     def links_revoked(self, ended: list[Invitation]) -> None:
@@ -93,6 +95,6 @@ class Board(Protocol):
         """The newest `limit` records that consoles have shared."""
         ...
 
-    async def stop(self, robots: Collection[str], by: Actor, reason: str) -> dict[str, StopAnswer]:
+    async def stop(self, robots: Collection[str], press: Press) -> dict[str, StopAnswer]:
         """STOP for robots of other consoles; every one of `robots` is answered for within a few seconds."""
         ...

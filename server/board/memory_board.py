@@ -3,9 +3,10 @@
 import asyncio
 from collections.abc import Collection, Sequence
 
-from server.audit import Actor, AuditRecord
+from server.audit import AuditRecord
 from server.board.board import BoardState, SharedAudit, StopAnswer
 from server.board.tile import Tile
+from server.stop_presses import Press
 
 __all__ = ["MemoryBoard"]
 
@@ -34,5 +35,5 @@ class MemoryBoard:
     async def audit(self, limit: int) -> SharedAudit:
         return SharedAudit([], True, "")
 
-    async def stop(self, robots: Collection[str], by: Actor, reason: str) -> dict[str, StopAnswer]:
+    async def stop(self, robots: Collection[str], press: Press) -> dict[str, StopAnswer]:
         return dict.fromkeys(robots, ALONE)

@@ -98,6 +98,7 @@ class StopRequest:
     role: Name
     link: Annotated[str, Field(max_length=64)]
     reason: Words
+    press: Annotated[str, Field(max_length=64)] = ""  # "": of a console that does not know of presses
     kind: Literal["stop"] = "stop"
 
 
@@ -106,6 +107,8 @@ class Outcome:
     robot: RobotName
     delivered: bool
     event: Annotated[int, Field(ge=0, lt=2**31)]
+    number: Annotated[int, Field(ge=0, lt=2**53)] = 0  # of the stop; 0 when it was not delivered
+    detail: Words = ""  # why it was not delivered
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,7 @@ from server.board.revocations import KnownLinks, Revocations
 from server.board.seal import Seal
 from server.board.stop_desk import StopDesk
 from server.board.tile import Tile, loud, within_bounds
+from server.stop_presses import Press, new_press
 
 __all__ = ["RedisBoard"]
 
@@ -72,6 +73,7 @@ class RedisBoard:
         self._metrics = metrics
         self._public_url = public_url
         self._store: RedisStore | None = None  # None while there is no session
+        self._tasks: asyncio.TaskGroup | None = None  # of the session
         self._others = OtherConsoles(self.id, self.name)
         self._desk = StopDesk()
         self._tiles: tuple[Tile, ...] = ()
@@ -131,28 +133,23 @@ class RedisBoard:
         records = sorted(found.values(), key=lambda each: each.record.time)
         return SharedAudit(records, not self._unshared, self._unshared)
 
-    async def stop(self, robots: Collection[str], by: Actor, reason: str) -> dict[str, StopAnswer]:
-        wanted = tuple(sorted(set(robots)))
+    async def stop(self, robots: Collection[str], press: Press) -> dict[str, StopAnswer]:
+        wanted, by = tuple(sorted(set(robots))), press.by
         if not wanted:
             return {}
-        asked, ours = self._desk.same(wanted), False
-        if asked is None:
-            if self._desk.waiting >= MAX_STOPS:
-                return dict.fromkeys(wanted, TOO_MANY)
-            request = StopRequest(
-                console=self.id, request=secrets.token_hex(8), robots=wanted, by=by.name[:60], role=by.role[:60],
-                link=by.link[:64], reason=reason[:500],
-            )  # fmt: skip
-            asked, ours = self._desk.ask(request), True
+        if self._desk.waiting >= MAX_STOPS:
+            return dict.fromkeys(wanted, TOO_MANY)
+        request = StopRequest(
+            console=self.id, request=secrets.token_hex(8), robots=wanted, by=by.name[:60], role=by.role[:60],
+            link=by.link[:64], reason=press.reason[:500], press=press.id,
+        )  # fmt: skip
+        asked = self._desk.ask(request)
         try:
             with suppress(TimeoutError):
                 async with asyncio.timeout(STOP_PATIENCE):
-                    if ours:
-                        await self._ask(asked.request, asked.complete)
-                    await asked.complete.wait()
+                    await self._ask(asked.request, asked.complete)
         finally:
-            if ours:
-                self._desk.end(asked)
+            self._desk.end(asked)
         silent = {robot: self._unconfirmed(robot) for robot in wanted if robot not in asked.answers}
         answers = {**asked.answers, **silent}
         for each in answers.values():
@@ -185,11 +182,12 @@ class RedisBoard:
                     self._store = store
                     tasks.create_task(self._listen(store, news), name="board news")
                     tasks.create_task(self._talk(store, backoff), name="board")
+                    self._tasks = tasks
             except asyncio.CancelledError:
                 await self._farewell(store)
                 raise
             finally:
-                self._store = None
+                self._store = self._tasks = None
 
     async def _talk(self, store: RedisStore, backoff: Backoff) -> None:
         while True:
@@ -274,22 +272,34 @@ class RedisBoard:
             case StopReply():
                 self._desk.replied(news)
             case StopRequest():
-                outcomes = self._obey(news)
-                if outcomes:
-                    reply = StopReply(console=self.id, request=news.request, robots=outcomes)
-                    await store.tell(self._pack(reply))
+                await self._hear_stop(store, news)
 
     # stops
 
-    def _obey(self, request: StopRequest) -> tuple[Outcome, ...]:
-        by = Actor(request.by, request.role, "", request.link)
-        own = self._own() & set(request.robots)
+    async def _hear_stop(self, store: RedisStore, request: StopRequest) -> None:
+        """Robots answer in their own time: the news goes on meanwhile."""
+        own = sorted(self._own() & set(request.robots))
+        if not own:
+            return
+        if not self._desk.is_new(request):
+            await self._reply(store, request)
+        elif self._tasks is not None:
+            self._tasks.create_task(self._obey(store, request, own), name="board stop")
 
-        def carry_out() -> tuple[Outcome, ...]:
-            done = {robot: self._host.stop_robot(robot, by, request.reason) for robot in sorted(own)}
-            return tuple(Outcome(robot=robot, delivered=told, event=event) for robot, (told, event) in done.items())
+    async def _obey(self, store: RedisStore, request: StopRequest, own: Sequence[str]) -> None:
+        press = new_press(Actor(request.by, request.role, "", request.link), "board", request.reason, request.press)
+        answers = await asyncio.gather(*(self._host.stop_robot(robot, press) for robot in own))
+        outcomes = tuple(
+            Outcome(robot=robot, delivered=each.delivered, event=each.event, number=each.number, detail=each.detail)
+            for robot, each in zip(own, answers, strict=True)
+        )
+        self._desk.obeyed(request, outcomes)
+        await self._reply(store, request)
 
-        return self._desk.obey(request, carry_out) if own else ()
+    async def _reply(self, store: RedisStore, request: StopRequest) -> None:
+        outcomes = self._desk.outcomes(request)
+        if outcomes:
+            await store.tell(self._pack(StopReply(console=self.id, request=request.request, robots=outcomes)))
 
     async def _ask(self, request: StopRequest, complete: asyncio.Event) -> None:
         """Until all have answered; Redis forgets news that nobody hears, so it is asked more than once."""

@@ -2,7 +2,6 @@
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Callable, Collection
 
 from server.board.board import StopAnswer
 from server.board.messages import Outcome, StopReply, StopRequest
@@ -10,7 +9,7 @@ from server.board.messages import Outcome, StopReply, StopRequest
 __all__ = ["Asked", "StopDesk"]
 
 MAX_REMEMBERED = 256  # requests that were obeyed; a repeat of one is answered, not obeyed again
-KEPT = "no link to the robot; the stop is kept and sent first when the link is back"
+NOT_SAID = "its console could not deliver it, and does not say why"
 
 
 class Asked:
@@ -26,8 +25,8 @@ class Asked:
         for each in reply.robots:
             known = self.answers.get(each.robot)
             if each.robot in self.request.robots and (known is None or known.delivered):
-                detail = "" if each.delivered else KEPT
-                self.answers[each.robot] = StopAnswer(True, each.delivered, each.event, detail)
+                detail = "" if each.delivered else each.detail or NOT_SAID
+                self.answers[each.robot] = StopAnswer(True, each.delivered, each.event, detail, each.number)
         if len(self.answers) == len(self.request.robots):
             self.complete.set()
 
@@ -35,15 +34,11 @@ class Asked:
 class StopDesk:
     def __init__(self) -> None:
         self._asked: dict[str, Asked] = {}
-        self._obeyed: OrderedDict[str, tuple[Outcome, ...]] = OrderedDict()
+        self._obeyed: OrderedDict[str, tuple[Outcome, ...] | None] = OrderedDict()  # None: being carried out
 
     @property
     def waiting(self) -> int:
         return len(self._asked)
-
-    def same(self, robots: Collection[str]) -> Asked | None:
-        """A request for just these robots that is under way."""
-        return next((asked for asked in self._asked.values() if set(asked.request.robots) == set(robots)), None)
 
     def ask(self, request: StopRequest) -> Asked:
         asked = self._asked[request.request] = Asked(request)
@@ -57,10 +52,19 @@ class StopDesk:
         if asked is not None:
             asked.answered(reply)
 
-    def obey(self, request: StopRequest, carry_out: Callable[[], tuple[Outcome, ...]]) -> tuple[Outcome, ...]:
-        """What became of it; a request that is repeated is carried out once."""
-        if request.request not in self._obeyed:
-            self._obeyed[request.request] = carry_out()
-            while len(self._obeyed) > MAX_REMEMBERED:
-                self._obeyed.popitem(last=False)
-        return self._obeyed[request.request]
+    def is_new(self, request: StopRequest) -> bool:
+        """Whether to carry it out: a request that is repeated is carried out once. Then call `obeyed`."""
+        if request.request in self._obeyed:
+            return False
+        self._obeyed[request.request] = None
+        while len(self._obeyed) > MAX_REMEMBERED:
+            self._obeyed.popitem(last=False)
+        return True
+
+    def obeyed(self, request: StopRequest, outcomes: tuple[Outcome, ...]) -> None:
+        if request.request in self._obeyed:
+            self._obeyed[request.request] = outcomes
+
+    def outcomes(self, request: StopRequest) -> tuple[Outcome, ...]:
+        """What became of it; empty while it is being carried out."""
+        return self._obeyed.get(request.request) or ()

@@ -16,6 +16,7 @@ from server.body import read_json
 from server.errors import LinkOtherRobot
 from server.fleet.fleet import Fleet, Stopped, fleet_caller, fleet_of
 from server.json_answer import json_answer
+from server.stop_presses import new_press
 
 __all__ = ["FleetHealth", "FleetInfo", "FleetReadiness", "FleetStop", "RobotTile", "router"]
 
@@ -59,12 +60,14 @@ class StoppedRobot(msgspec.Struct, frozen=True, kw_only=True):
     delivered: bool
     event: int
     detail: str  # why it was not delivered
+    number: int  # of the stop at that robot; 0 when it was not delivered
     console: str  # that has the robot; "" is this one
 
 
 class FleetStop(msgspec.Struct, frozen=True, kw_only=True):
     """Answer of POST /api/fleet/stop."""
 
+    press: str
     robots: list[StoppedRobot]
 
 
@@ -107,10 +110,11 @@ async def stop(request: Request, caller: Caller) -> Response:
     """Anyone with a token, for every robot that it is good for."""
     here = fleet_of(request)
     wanted = await read_json(request, StopRequest)
-    stopped = await here.stop_all(caller, caller.actor, wanted.reason)
+    press = new_press(caller.actor, "http", wanted.reason, wanted.press)
+    stopped = await here.stop_all(caller, press)
     if not stopped:
         raise LinkOtherRobot("this link is good for none of the robots here")
-    return json_answer(FleetStop(robots=[_stopped(each) for each in stopped]))
+    return json_answer(FleetStop(press=press.id, robots=[_stopped(each) for each in stopped]))
 
 
 @router.get("/healthz")

@@ -12,9 +12,10 @@ from starlette.requests import HTTPConnection, Request
 
 from server.access import Access, Identity
 from server.audit import Actor, AuditRecord
-from server.board.board import Board
+from server.board.board import Board, StopAnswer
 from server.board.memory_board import MemoryBoard
 from server.board.tile import Tile
+from server.errors import Silenced
 from server.fleet.fleet_metrics import FleetMetrics
 from server.fleet.session import FleetSession
 from server.fleet.tiles import UNREADABLE, absent_tile, tile_of
@@ -22,6 +23,7 @@ from server.house import House
 from server.invitations import Invitation
 from server.settings import Settings
 from server.state import robot_place
+from server.stop_presses import Press
 from server.sweeper import sweep_forever
 
 __all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
@@ -32,7 +34,6 @@ LOOK_SECONDS = 1.0  # between two looks at every robot
 START_SECONDS = 20.0  # that the console waits for its sessions before it answers
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 ELSEWHERE = Actor("another console")
-KEPT = "It could not be told; the stop is kept and sent first when the link is back."
 
 
 class Stopped(NamedTuple):
@@ -42,6 +43,7 @@ class Stopped(NamedTuple):
     delivered: bool
     event: int
     detail: str  # why it was not delivered; "" when it was
+    number: int = 0  # of the stop at that robot; 0 when it was not delivered
     console: str = ""  # that has the robot; "" is this one
 
 
@@ -119,40 +121,46 @@ class Fleet:
 
     # STOP
 
-    async def stop_all(self, identity: Identity, by: Actor, reason: str) -> list[Stopped]:
-        """Every robot that this link may see: our own at once, then those of other consoles."""
+    async def stop_all(self, identity: Identity, press: Press) -> list[Stopped]:
+        """Every robot that this link may see, all at once: our own, and those of other consoles."""
         self.metrics.stops.inc()
-        found = [
-            self._stop(session, by, "http", reason) for name, session in self.sessions.items() if identity.may_see(name)
-        ]
+        elsewhere = {tile.name: tile.console for tile in self.board.others() if identity.may_see(tile.name)}
+        stopping = [self._stop(session, press) for name, session in self.sessions.items() if identity.may_see(name)]
+        own, others = await asyncio.gather(asyncio.gather(*stopping), self._stop_elsewhere(elsewhere, press))
         self.board.publish(self.own_tiles())
-        elsewhere = {tile.name: tile for tile in self.board.others() if identity.may_see(tile.name)}
-        if elsewhere:
-            answers = await self.board.stop(elsewhere.keys(), by, reason)
-            found += [
-                Stopped(name, answer.delivered, answer.event, answer.detail, elsewhere[name].console)
-                for name, answer in answers.items()
-            ]
-        return sorted(found)
+        return sorted([*own, *others])
 
-    def _stop(self, session: FleetSession, by: Actor, where: str, reason: str) -> Stopped:
+    async def _stop_elsewhere(self, robots: Mapping[str, str], press: Press) -> list[Stopped]:
+        """`robots`: with the consoles that have them."""
+        if not robots:
+            return []
+        answers = await self.board.stop(robots.keys(), press)
+        return [
+            Stopped(name, answer.delivered, answer.event, answer.detail, answer.number, robots[name])
+            for name, answer in answers.items()
+        ]
+
+    async def _stop(self, session: FleetSession, press: Press) -> Stopped:
         """A fault with one robot must not keep the stop from the others."""
         try:
-            delivered, event = session.stop(by, where, reason)
+            answer = await session.stop(press)
+        except Silenced as error:
+            return Stopped(session.name, False, 0, error.detail)
         except Exception as error:
             self.metrics.faults.caught("stop", error, robot=session.name)
             return Stopped(session.name, False, 0, UNREADABLE)
-        return Stopped(session.name, delivered, event, "" if delivered else KEPT)
+        outcome = answer.outcome
+        return Stopped(session.name, outcome.delivered, answer.event, outcome.detail, outcome.number)
 
     # BoardHost
 
-    def stop_robot(self, name: str, by: Actor, reason: str) -> tuple[bool, int]:
+    async def stop_robot(self, name: str, press: Press) -> StopAnswer:
         """Somebody stops it at another console."""
         session = self.sessions.get(name)
         if session is None:
-            return False, 0
-        stopped = self._stop(session, by, "board", reason)
-        return stopped.delivered, stopped.event
+            return StopAnswer(True, False, 0, "that console does not have this robot")
+        stopped = await self._stop(session, press)
+        return StopAnswer(True, stopped.delivered, stopped.event, stopped.detail, stopped.number)
 
     def links_revoked(self, ended: list[Invitation]) -> None:
         if self._house is not None:

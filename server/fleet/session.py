@@ -8,9 +8,8 @@ import structlog
 
 from server.access import Access
 from server.app import attach_session, session_app
-from server.audit import Actor, AuditRecord
+from server.audit import AuditRecord
 from server.backoff import Backoff
-from server.console import Console
 from server.fleet.fleet_metrics import FleetMetrics
 from server.fleet.pulse import Pulse
 from server.house import House
@@ -21,12 +20,14 @@ from server.robot_session import running_session
 from server.services import Services
 from server.settings import Settings
 from server.state_dir import StateDir
+from server.stop_keeper import StopKeeper
+from server.stop_presses import AlreadyTaken, Press
+from server.stop_service import KEPT, StopAnswer, StopOutcome
 
 __all__ = ["FleetSession"]
 
 log = structlog.get_logger(__name__)
 
-RESTARTED = "restart"  # where a stop comes from that an earlier session has left
 HEALTHY_AFTER = 30.0  # s that a session lives, then its next failure is answered soon again
 FIRST_WAIT, LONGEST_WAIT = 0.5, 10.0  # s before a session that failed is started again
 
@@ -48,8 +49,7 @@ class FleetSession:
         self.app.include_router(page_router())
         attach_session(self.app, None)
         self._backoff = Backoff(FIRST_WAIT, LONGEST_WAIT)
-        self._kept_stop: tuple[Actor, str, str] | None = None  # that the next session begins with
-        self._last: Console | None = None  # that of the session which runs, or ran last
+        self._stops: StopKeeper | None = None  # None before `run`
         self._access: Access | None = None
         self._ended_before = 0  # connections of earlier sessions
 
@@ -77,14 +77,24 @@ class FleetSession:
             raise TypeError("the fleet is not running")
         return self._access
 
-    def stop(self, by: Actor, where: str, reason: str) -> tuple[bool, int]:
-        """Whether the robot was told, and its event. Without a session the stop is the first that the next one does."""
+    async def stop(self, press: Press) -> StopAnswer:
+        """What became of it. Without a session the stop is the first that the next one does. Raises Silenced."""
         here = self.services
-        if here is None:
-            self._kept_stop = (by, where, reason)
-            log.warning("stop kept", by=by.name, where=where, reason=reason, robot=self.name)
-            return False, 0
-        return here.stop(by, where, reason)
+        if here is not None:
+            return await here.stop(press)
+        stops = self._stops
+        if stops is None:
+            raise TypeError("the fleet is not running")
+        pressed = stops.presses.press(press)
+        log.warning("stop kept", by=press.by.name, where=press.where, reason=press.reason, robot=self.name)
+        if isinstance(pressed, AlreadyTaken):
+            return StopAnswer(StopOutcome(press.id, pressed.taken), 0, up=False)
+        stops.keep(press)
+        unwritten = await stops.written(press.id)
+        detail = f"the session of this robot has failed; {KEPT}"
+        if unwritten:
+            detail += f"; it is not on the console's disk ({unwritten})"
+        return StopAnswer(StopOutcome(press.id, None, detail), 0, up=False)
 
     async def run(
         self, house: House, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
@@ -92,35 +102,53 @@ class FleetSession:
         """Until cancelled. `told` hears every record of its audit."""
         self.app.state.house = house
         self._access = house.state.access.at(self.name)
+        stops = self._stops = StopKeeper(directory, self.settings.robot)
         self.app.state.stop_keeper = self
         name_robot(self.name)
+        await stops.load()
+        async with asyncio.TaskGroup() as tasks:
+            keeping = tasks.create_task(stops.run(), name=f"kept stops {self.name}")
+            try:
+                await self._live_on(house, directory, metrics, told, stops)
+            finally:
+                keeping.cancel()
+
+    async def _live_on(
+        self,
+        house: House,
+        directory: Path,
+        metrics: FleetMetrics,
+        told: Callable[[str, AuditRecord], None],
+        stops: StopKeeper,
+    ) -> None:
+        """Sessions, one after the other."""
         loop = asyncio.get_running_loop()
         while True:
             since = loop.time()
             try:
-                await self._live(house, directory, metrics, told)
+                await self._live(house, directory, metrics, told, stops)
             except Exception:
                 metrics.session_failures.labels(self.name).inc()
                 log.exception("the session of this robot has failed")
                 if _ending():
                     return
-            self._inherit_stop()
             self.settled.set()
             if loop.time() - since > HEALTHY_AFTER:
                 self._backoff.healthy()
             await asyncio.sleep(self._backoff.next())
 
     async def _live(
-        self, house: House, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
+        self,
+        house: House,
+        directory: Path,
+        metrics: FleetMetrics,
+        told: Callable[[str, AuditRecord], None],
+        stops: StopKeeper,
     ) -> None:
         own = Metrics(process=False)
-        async with running_session(self.settings, house, own, StateDir(directory), self.name) as made:
+        async with running_session(self.settings, house, own, StateDir(directory), self.name, stops) as made:
             made.audit.on_record = lambda record: told(self.name, record)
             attach_session(self.app, made)
-            self._last = made.console
-            if self._kept_stop is not None:
-                made.console.stop(*self._kept_stop)
-                self._kept_stop = None
             metrics.watch(self.name, made)
             self.settled.set()
             try:
@@ -129,13 +157,6 @@ class FleetSession:
                 self._ended_before = self.ended
                 attach_session(self.app, None)
                 metrics.forget(self.name)
-
-    def _inherit_stop(self) -> None:
-        """A stop that nobody has reset outlives a fault of ours, also where the robot has not heard of it yet."""
-        stop = None if self._last is None else self._last.latched_stop
-        if stop is not None and self._kept_stop is None:
-            self._kept_stop = (Actor(stop.by), RESTARTED, stop.reason)
-        self._last = None
 
     def look(self, now: float) -> None:
         """Once a second: how it does."""

@@ -18,9 +18,10 @@ from robot_bridge.protocol.console import (
     ServerMessage,
     SharedNote,
 )
-from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest, StopTaken
 from server.audit import Actor
-from server.command_desk import Forward, Outcome, Refuse
+from server.command_desk import CommandOutcome as DeskOutcome
+from server.command_desk import Forward, Refuse
 from server.errors import AlreadyRecording, RecordingFailed
 from server.event_clock import EventClock
 from server.media.frame import EncodedFrame
@@ -280,13 +281,13 @@ class Recorder(SessionTap):
             case SharedNote(peer=peer, name=name, role=role, text=text):
                 self._put_own(NoteRecord(**self._now(), peer=peer, name=name, role=role, text=text))
 
-    def command(self, by: Actor, command: Command, outcome: Outcome) -> None:
+    def command(self, by: Actor, command: Command, outcome: DeskOutcome) -> None:
         if self._thread is None:
             return
         said: CommandOutcome = "repeated"
         reason = ""
-        if isinstance(outcome, Forward) and isinstance(outcome.message, Command):
-            said, command = "forwarded", outcome.message
+        if isinstance(outcome, Forward):
+            said, command = "forwarded", outcome.command
         elif isinstance(outcome, Refuse):
             reason = outcome.refusal.reason
             said = "undelivered" if reason == "link_down" else "refused"
@@ -328,13 +329,28 @@ class Recorder(SessionTap):
             )
         )
 
-    def stop_asked(self, by: Actor, where: str, reason: str, *, delivered: bool) -> None:
+    def stop_asked(self, by: Actor, where: str, reason: str, press: str, *, delivered: bool) -> None:
         self._put_own(
-            StopRecord(**self._now(), kind="stop", by=by.name, where=where, reason=reason, delivered=delivered)
+            StopRecord(
+                **self._now(), kind="stop", by=by.name, where=where, reason=reason, press=press, delivered=delivered
+            )
         )
 
-    def reset_asked(self, by: Actor, where: str) -> None:
-        self._put_own(StopRecord(**self._now(), kind="reset", by=by.name, where=where))
+    def stop_taken(self, by: Actor, taken: StopTaken) -> None:
+        self._put_own(
+            StopRecord(
+                **self._now(),
+                kind="taken",
+                by=by.name,
+                where="robot",
+                press=taken.press,
+                number=taken.number,
+                kept=taken.kept,
+            )  # fmt: skip
+        )
+
+    def reset_done(self, by: Actor, where: str, number: int) -> None:
+        self._put_own(StopRecord(**self._now(), kind="reset", by=by.name, where=where, number=number))
 
     def report(self, by: Actor, report: Report) -> None:
         self._put_own(ReportRecord(**self._now(), peer=by.peer, name=by.name, report=report))

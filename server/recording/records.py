@@ -111,13 +111,16 @@ class SeatRecord(OwnRecord, frozen=True, kw_only=True):
 
 
 class StopRecord(OwnRecord, frozen=True, kw_only=True):
-    """Somebody asked for a stop, or for its reset. When it took effect is in the feedback."""
+    """Somebody pressed STOP, the robot took that press, or a stop was released. What held when is in the feedback."""
 
-    kind: Literal["stop", "reset"]
+    kind: Literal["stop", "taken", "reset"]
     by: str
-    where: str  # the channel, or "http"
+    where: str  # the channel, "http", "board", or "robot"
     reason: str = ""
     delivered: bool = True  # False: there was no robot link
+    press: str = ""  # id of the press; "" of a reset
+    number: int = 0  # of the stop that was taken or released; 0 where nobody knows it yet
+    kept: bool = True  # whether the stop that was taken is on the robot's disk
 
 
 class ParticipantsRecord(OwnRecord, frozen=True, kw_only=True):

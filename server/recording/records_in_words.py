@@ -30,8 +30,12 @@ def in_words(record: OwnRecord) -> Words | None:
             return Words(f"nobody drives ({why})" if why else "nobody drives")
         case SeatRecord(name=name, why=why):
             return Words(f"{name} drives ({why})")
-        case StopRecord(kind=kind, by=by, where=where, reason=reason):
-            words = f"{kind} by {by or 'somebody'} ({where}){': ' + reason if reason else ''}"
+        case StopRecord(kind="taken", by=by, number=number, kept=kept):
+            words = f"stop {number} of {by or 'somebody'} is latched{'' if kept else ', not on the disk of the robot'}"
+            return Words(words, not kept)
+        case StopRecord(kind=kind, by=by, where=where, reason=reason, number=number):
+            named = f" of stop {number}" if number else ""
+            words = f"{kind}{named} by {by or 'somebody'} ({where}){': ' + reason if reason else ''}"
             return Words(words, kind == "stop")
         case RefusalRecord(refused=event, reason=reason, by=by):
             return Words(f"{by} refused {'event ' + str(event) if event else 'a request'}: {reason}", True)

@@ -1,0 +1,122 @@
+"""What one robot's stops need to outlive: the link, the session, the console. Owns the presses and their files."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+import structlog
+
+from server.kept_stops import KeptStops, kept_stops_place
+from server.stop_presses import Press, StopPresses
+
+__all__ = ["StopKeeper"]
+
+log = structlog.get_logger(__name__)
+
+RETRY_SECONDS = 2.0  # after a write that failed
+WRITE_PATIENCE = 0.5  # s that whoever pressed waits for the disk
+
+
+class StopKeeper:
+    """Call `load`, then run `run` as a task. All else is called on the loop and returns at once, but for `written`.
+
+    Attributes:
+        trouble: why stops cannot be written at present; "" when they can
+        on_trouble: called with `trouble` whenever it changes
+    """
+
+    def __init__(self, directory: Path, robot: str) -> None:
+        """`directory`: of the robot, within the state directory. `robot`: the bridge's address."""
+        self.presses = StopPresses()
+        self.trouble = ""
+        self.on_trouble: Callable[[str], None] = _ignore
+        self._files = KeptStops(kept_stops_place(directory, robot))
+        self._wanted: dict[str, Press] = {}  # that belong on the disk
+        self._written: set[str] = set()
+        self._wake = asyncio.Event()
+        self._news = asyncio.Event()  # something was written, or could not be; replaced each time
+
+    async def load(self) -> None:
+        """Presses that an earlier run has kept are pending again."""
+        try:
+            found = await asyncio.to_thread(self._files.load)
+        except OSError as error:
+            self._tell(error.strerror or str(error))
+            return
+        for press in found:
+            self.presses.again(press)
+            self._wanted[press.id] = press
+            self._written.add(press.id)
+        if found:
+            log.warning("kept stops", count=len(found))
+
+    def keep(self, *presses: Press) -> None:
+        """Write those to disk: the robot cannot be told now."""
+        self._wanted.update((press.id, press) for press in presses if self.presses.is_pending(press.id))
+        self._wake.set()
+
+    def settled(self, press: str) -> None:
+        """The robot has answered it, or another press has taken its place."""
+        if self._wanted.pop(press, None) is not None or press in self._written:
+            self._wake.set()
+
+    async def written(self, press: str) -> str:
+        """Returns when a press that is kept is on the disk, or soon: why it is not; "" when it is."""
+        try:
+            async with asyncio.timeout(WRITE_PATIENCE):
+                while press in self._wanted and press not in self._written and not self.trouble:
+                    await self._news.wait()
+        except TimeoutError:
+            return "the disk has not answered"
+        return "" if press not in self._wanted or press in self._written else self.trouble
+
+    async def run(self) -> None:
+        """Until cancelled; then what no answer has come to is written, whatever the link did."""
+        try:
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                while not await self._settle():  # noqa: ASYNC110 - a disk has no event
+                    await asyncio.sleep(RETRY_SECONDS)
+        finally:
+            self._write_last()
+
+    async def _settle(self) -> bool:
+        """Make the disk what it should be. False: try again later."""
+        missing = [press for press in self._wanted.values() if press.id not in self._written]
+        over = [press for press in self._written if press not in self._wanted]
+        try:
+            for press in missing:
+                await asyncio.to_thread(self._files.keep, press)
+                self._written.add(press.id)
+                self._tell("")
+            for id_ in over:
+                await asyncio.to_thread(self._files.drop, id_)
+                self._written.discard(id_)
+        except OSError as error:
+            self._tell(error.strerror or str(error))
+            return False
+        self._tell("")
+        return True
+
+    def _write_last(self) -> None:
+        """Nothing else runs any more that a slow disk could hold up."""
+        try:
+            for press in self.presses.pending:
+                if press.id not in self._written:
+                    self._files.keep(press)
+        except OSError as error:
+            log.error("stops cannot be kept on disk", error="stops_unwritable", detail=str(error))
+
+    def _tell(self, trouble: str) -> None:
+        changed, self.trouble = trouble != self.trouble, trouble
+        self._news.set()
+        self._news = asyncio.Event()
+        if changed:
+            if trouble:
+                log.error("stops cannot be kept on disk", error="stops_unwritable", detail=trouble)
+            self.on_trouble(trouble)
+
+
+def _ignore(trouble: str) -> None:
+    pass

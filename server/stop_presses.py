@@ -1,0 +1,143 @@
+"""Presses of STOP: those that the robot has not answered yet, and the outcomes of those that it has. No I/O.
+
+A press is *pending* from when it is made until the bridge answers it (`StopTaken`). Neither the end of the link nor
+another epoch of the bridge ends that: whoever owns the link sends all that is pending, in order, whenever a link is
+up, before anything else. The bridge knows a press by its id, so sending it again makes no second stop.
+
+At most `MAX_PENDING` are kept. One more takes the place of the newest, which from then on has the outcome of the
+press that took its place: that one was made later, so its stop is the newer one.
+"""
+
+import secrets
+import time
+from collections import OrderedDict
+from typing import NamedTuple
+
+import msgspec
+
+from robot_bridge.protocol.messages import Stop, StopTaken
+from server.audit import Actor
+
+__all__ = ["AlreadyTaken", "NewPress", "Press", "PressOutcome", "Settled", "StopPresses", "UnderWay", "new_press"]
+
+MAX_PENDING = 64
+MAX_SAME = 256  # presses that share the outcome of another one; what is more gets no answer of its own
+MAX_REMEMBERED = 512  # outcomes
+
+
+class Press(msgspec.Struct, frozen=True, kw_only=True):
+    """One press: who, where, why."""
+
+    id: str  # "5f0c…", 32 hex digits; of older clients any text
+    by: Actor = Actor()
+    where: str = ""  # "http", "board", a channel
+    reason: str = ""
+    time: float = 0.0  # s since 1970, the console's clock: for people, and for the order of presses of earlier runs
+
+    def message(self) -> Stop:
+        return Stop(by=self.by.name[:500], reason=self.reason[:500], press=self.id)
+
+
+def new_press(by: Actor, where: str, reason: str, id_: str = "") -> Press:
+    """A press of now; without an id it gets one."""
+    return Press(id=id_ or secrets.token_hex(16), by=by, where=where, reason=reason, time=time.time())
+
+
+class NewPress(NamedTuple):
+    """Send it. `replaced`: the press that it took the place of; None when there was room."""
+
+    press: Press
+    replaced: Press | None
+
+
+class UnderWay(NamedTuple):
+    """The same press is pending: it has the outcome of its first."""
+
+    press: Press
+
+
+class AlreadyTaken(NamedTuple):
+    """The robot has answered this press."""
+
+    taken: StopTaken
+
+
+PressOutcome = NewPress | UnderWay | AlreadyTaken
+
+
+class Settled(NamedTuple):
+    """A press that the robot has answered now; `taken` names it."""
+
+    press: Press
+    taken: StopTaken
+
+
+class StopPresses:
+    """Show it every press with `press` and every answer with `taken`; send `pending` when a link comes up."""
+
+    def __init__(self) -> None:
+        self._pending: dict[str, Press] = {}  # by id, oldest first
+        self._same: dict[str, list[Press]] = {}  # id of a pending press -> those that have its outcome
+        self._leader: dict[str, str] = {}  # id of a press -> id of the pending one whose outcome it has
+        self._taken: OrderedDict[str, StopTaken] = OrderedDict()
+
+    @property
+    def pending(self) -> list[Press]:
+        """Those that no answer came to, in the order in which they were made."""
+        return list(self._pending.values())
+
+    def is_pending(self, press: str) -> bool:
+        return press in self._pending or press in self._leader
+
+    def outcome(self, press: str) -> StopTaken | None:
+        """The bridge's answer; None: there was none, or it was long ago."""
+        return self._taken.get(press)
+
+    def press(self, press: Press) -> PressOutcome:
+        """Somebody pressed, or what somebody pressed came once more."""
+        known = self._taken.get(press.id)
+        if known is not None:
+            return AlreadyTaken(known)
+        if self.is_pending(press.id):
+            return UnderWay(self._pending[self._leader.get(press.id, press.id)])
+        return NewPress(press, self._add(press))
+
+    def again(self, press: Press) -> bool:
+        """A press that was answered and has to be said to another epoch of the bridge; whether that is news."""
+        self._taken.pop(press.id, None)
+        if self.is_pending(press.id):
+            return False
+        self._add(press)
+        return True
+
+    def taken(self, taken: StopTaken) -> list[Settled]:
+        """The bridge's answer; what is settled by it, the press itself first."""
+        self._remember(taken)
+        press = self._pending.pop(taken.press, None)
+        if press is None:
+            return []
+        settled = [Settled(press, taken)]
+        for same in self._same.pop(taken.press, []):
+            self._leader.pop(same.id, None)
+            answer = msgspec.structs.replace(taken, press=same.id)
+            self._remember(answer)
+            settled.append(Settled(same, answer))
+        return settled
+
+    def _add(self, press: Press) -> Press | None:
+        replaced = None
+        if len(self._pending) >= MAX_PENDING:
+            newest, replaced = self._pending.popitem()
+            same = [replaced, *self._same.pop(newest, [])]
+            for forgotten in same[MAX_SAME:]:
+                self._leader.pop(forgotten.id, None)
+            self._same[press.id] = same[:MAX_SAME]
+            self._leader.update((each.id, press.id) for each in same[:MAX_SAME])
+        self._pending[press.id] = press
+        return replaced
+
+    def _remember(self, taken: StopTaken) -> None:
+        self._taken[taken.press] = taken
+        self._taken.move_to_end(taken.press)
+        while len(self._taken) > MAX_REMEMBERED:
+            self._taken.popitem(last=False)

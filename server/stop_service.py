@@ -1,0 +1,460 @@
+"""The life of a STOP at the console: taken from everybody, sent, confirmed by the bridge, kept while it is away, reset.
+
+The rules stand in `stop_presses.py`, `reset_attempts.py` and `silenced_links.py`; this is the shell around them.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import structlog
+
+from robot_bridge.protocol.console import Notice
+from robot_bridge.protocol.messages import Refusal, RefusalReason, Reset, Stop, StopState, StopTaken
+from server.audit import Actor
+from server.audit_trail import AuditTrail
+from server.errors import (
+    LinkDown,
+    LockedOut,
+    NoSeat,
+    NotAllowed,
+    ResetNotKept,
+    ResetTooSoon,
+    Silenced,
+    StaleReset,
+    TooManyRequests,
+    Unavailable,
+    Unconfirmed,
+)
+from server.event_clock import EventClock
+from server.metrics import Metrics
+from server.peer import Peer
+from server.peers import Peers
+from server.rate_limits import RateLimits
+from server.reset_attempts import RESET_REASONS, ResetAttempts, ResetOutcome
+from server.session_tap import SessionTap
+from server.silenced_links import SilencedLinks
+from server.stop_keeper import StopKeeper
+from server.stop_presses import AlreadyTaken, NewPress, Press
+
+__all__ = ["KEPT", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
+
+log = structlog.get_logger(__name__)
+
+CONFIRM_SECONDS = 1.0  # that whoever pressed waits for the bridge's answer
+AGAIN_SECONDS = 0.5  # until what has no answer is sent again, on a link that lives
+WATCH_SECONDS = 0.1  # between two looks, while something has no answer
+MAX_LISTENERS = 16  # connections that are told of one press
+RECORDS, RECORD_RATE = 5, 0.2  # of stops of one link in full; what is more becomes one record a second
+RESETS, RESET_RATE = 5, 1.0  # Hz, of one link
+ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
+
+UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
+UNWRITTEN = "Stops cannot be kept on this console's disk ({}). They are kept in memory, until this console ends."
+WRITTEN = "Stops can be kept on this console's disk again."
+KEPT = "the stop is kept and sent first when the link is back"
+SILENCED = "A supervisor has silenced the STOP of your link for ten minutes. What you stopped stays stopped."
+HEARD = "The STOP of your link works again."
+
+
+class StopsLink(Protocol):
+    """What the service needs of the connection to the robot."""
+
+    @property
+    def up(self) -> bool: ...
+    @property
+    def detail(self) -> str: ...
+    def send(self, message: Reset) -> bool: ...
+    def send_stop(self, stop: Stop) -> bool: ...
+
+
+class StopOutcome(NamedTuple):
+    """What became of a press, as far as is known now."""
+
+    press: str
+    taken: StopTaken | None  # the bridge's answer; None: it has not answered
+    detail: str = ""  # why it is not delivered; "" when it is
+
+    @property
+    def delivered(self) -> bool:
+        return self.taken is not None
+
+    @property
+    def number(self) -> int:
+        return 0 if self.taken is None else self.taken.number
+
+
+class StopAnswer(NamedTuple):
+    """What whoever said STOP over HTTP is told."""
+
+    outcome: StopOutcome
+    event: int
+    up: bool  # the link to the robot
+
+    def error(self) -> Unavailable:
+        """Of a stop that is not delivered."""
+        return Unconfirmed(self.outcome.detail) if self.up else LinkDown(self.outcome.detail)
+
+
+class _Asker(NamedTuple):
+    """Who asked for a reset, and how the outcome is told."""
+
+    by: Actor
+    where: str
+    tell: "Callable[[ResetOutcome[_Asker]], None]"
+
+
+class StopService:
+    """Run `run` as a task. All else is called on the loop and returns at once, but for `outcome` and `reset`."""
+
+    def __init__(
+        self,
+        robot: StopsLink,
+        keeper: StopKeeper,
+        peers: Peers,
+        clock: EventClock,
+        holder: Callable[[], str],
+        audit: AuditTrail,
+        metrics: Metrics,
+        tap: SessionTap,
+    ) -> None:
+        """`holder`: the peer that holds the control seat, or ""."""
+        self._robot = robot
+        self._keeper = keeper
+        self._presses = keeper.presses
+        self._peers = peers
+        self._clock = clock
+        self._holder = holder
+        self._audit = audit
+        self._metrics = metrics
+        self._tap = tap
+        self._silenced = SilencedLinks()
+        self._resets: ResetAttempts[_Asker] = ResetAttempts()
+        self._link_resets = RateLimits(RESET_RATE, RESETS)
+        self._robot_resets = RateLimits(ROBOT_RESET_RATE, ROBOT_RESETS)
+        self._records = RateLimits(RECORD_RATE, RECORDS)
+        self._listeners: dict[str, list[str]] = {}  # press -> peers that wait for its outcome
+        self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
+        self._deadlines: dict[str, float] = {}  # press -> until when its answer is waited for
+        self._sent_at = 0.0  # when all that is pending was sent last
+        self._wake = asyncio.Event()
+        self._news = asyncio.Event()  # replaced at every answer
+        keeper.on_trouble = self._trouble_changed
+
+    @property
+    def unconfirmed(self) -> bool:
+        """Whether a stop is on its way that the robot has not answered."""
+        return bool(self._presses.pending)
+
+    @property
+    def trouble(self) -> str:
+        """What newcomers are told of the disk; "" when nothing is wrong."""
+        return UNWRITTEN.format(self._keeper.trouble) if self._keeper.trouble else ""
+
+    # STOP
+
+    def stop(self, press: Press) -> None:
+        """Latch the stop. The outcome is that of the first press with this id.
+
+        Raises:
+            Silenced: a supervisor has silenced the stops of this link.
+        """
+        by, where = press.by, press.where
+        self._metrics.stops.labels(where).inc()
+        if by.link and self._silenced.holds(by.link, time.monotonic()):
+            self._audit.refused(by, "silenced")
+            raise Silenced(SILENCED)
+        self._listen(by.peer, press.id)
+        match self._presses.press(press):
+            case AlreadyTaken(taken):
+                self._audit.again("stop", by, f"{where}, again")
+                self._answer(press.id, taken)
+            case NewPress(_, replaced):
+                self._send_new(press, replaced)
+            case _:
+                self._audit.again("stop", by, f"{where}, again")
+
+    def _send_new(self, press: Press, replaced: Press | None) -> None:
+        sent = self._robot.send_stop(press.message())
+        self._deadlines[press.id] = time.monotonic() + CONFIRM_SECONDS
+        self._wake.set()
+        self._tap.stop_asked(press.by, press.where, press.reason, press.id, delivered=sent)
+        log.warning("stop", by=press.by.name, where=press.where, reason=press.reason, sent=sent)
+        if not sent:
+            if len(self._presses.pending) == 1:
+                self._peers.tell("session", Notice(level="error", text=UNDELIVERED))
+            self._not_delivered(press)
+        if replaced is not None:
+            self._keeper.settled(replaced.id)
+            self._forget_settled()
+
+    def _forget_settled(self) -> None:
+        """So many presses that some share an outcome: what is known of those that nobody waits for goes."""
+        pending = self._presses.is_pending
+        self._late = {press for press in self._late if pending(press)}
+        self._deadlines = {press: until for press, until in self._deadlines.items() if pending(press)}
+        self._listeners = {press: peers for press, peers in self._listeners.items() if pending(press)}
+
+    def _not_delivered(self, press: Press) -> None:
+        self._keeper.keep(press)
+        self._deadlines.pop(press.id, None)
+        if press.id not in self._late:
+            self._late.add(press.id)
+            self._record(press, f"{press.where}, not delivered yet")
+
+    async def outcome(self, press: str) -> StopOutcome:
+        """What became of a press: waits for the bridge for a second, and for the disk where the robot is away."""
+        try:
+            async with asyncio.timeout(CONFIRM_SECONDS):
+                while (taken := self._presses.outcome(press)) is None and self._robot_may_answer(press):
+                    await self._news.wait()
+        except TimeoutError:
+            taken = None
+        if taken is not None:
+            return StopOutcome(press, taken)
+        self._keeper.keep(*(each for each in self._presses.pending if each.id == press))
+        unwritten = await self._keeper.written(press)
+        why = "the robot has not confirmed it" if self._robot.up else "the robot cannot be told now"
+        where = f"; it is not on the console's disk ({unwritten})" if unwritten else ""
+        return StopOutcome(press, self._presses.outcome(press), f"{why}; {KEPT}{where}")
+
+    def _robot_may_answer(self, press: str) -> bool:
+        return self._robot.up or press not in self._late
+
+    def _listen(self, peer: str, press: str) -> None:
+        """The connection is told when the robot answers."""
+        if not peer:
+            return
+        listeners = self._listeners.setdefault(press, [])
+        if peer not in listeners and len(listeners) < MAX_LISTENERS:
+            listeners.append(peer)
+
+    def _answer(self, press: str, taken: StopTaken) -> None:
+        for listener in self._listeners.pop(press, []):
+            peer = self._peers.by_id(listener)
+            if peer is not None:
+                peer.send("stop", taken)
+
+    # what the link says
+
+    def link_up(self) -> None:
+        """Some link is up: all that is pending goes first, in order."""
+        for press in self._presses.pending:
+            self._robot.send_stop(press.message())
+        self._sent_at = time.monotonic()
+        self._wake.set()
+
+    def link_down(self, detail: str) -> None:
+        """The link for commands is down. What has no answer goes by the other, or has to outlive this console."""
+        for press in self._presses.pending:
+            if not self._robot.send_stop(press.message()):
+                self._not_delivered(press)
+        self._settle(self._resets.link_down(detail))
+        self._spread()
+
+    def epoch_ends(self, held: StopState) -> None:
+        """Another bridge: it is told of a stop that held at the last one, in case it does not remember."""
+        if held.stopped and held.press:
+            press = Press(id=held.press, by=Actor(held.by), where="epoch", reason=held.reason, time=time.time())
+            if self._presses.again(press):
+                self._late.add(press.id)
+                self._keeper.keep(press)
+        self._settle(self._resets.link_down("the robot bridge was started anew"))
+
+    def taken(self, taken: StopTaken) -> None:
+        """The bridge's answer to a stop."""
+        for press, answer in self._presses.taken(taken):
+            self._keeper.settled(press.id)
+            self._deadlines.pop(press.id, None)
+            late = press.id in self._late
+            self._late.discard(press.id)
+            on_disk = "" if answer.kept else ", not on the robot's disk"
+            self._record(press, f"{press.where}{', sent again' if late else ''}, stop {answer.number}{on_disk}")
+            self._tap.stop_taken(press.by, answer)
+            self._answer(press.id, answer)
+        self._spread()
+
+    def feedback(self, stop: StopState) -> None:
+        if self._resets:
+            self._settle(self._resets.feedback(stop))
+
+    def refused(self, refusal: Refusal) -> bool:
+        """Whether it was a reset that the bridge refused."""
+        outcomes = self._resets.refused(refusal)
+        self._settle(outcomes)
+        return bool(outcomes) or (not refusal.event and refusal.reason in RESET_REASONS)
+
+    # reset
+
+    async def reset(self, by: Actor, where: str, number: int) -> None:
+        """Release stop `number`; returns when the robot says that it is released.
+
+        Raises:
+            NotAllowed, NoSeat: neither the holder of the seat nor a supervisor.
+            TooManyRequests: of this link, or for this robot.
+            StaleReset: another stop is the newest.
+            ResetTooSoon, LockedOut, ResetNotKept: as the bridge says.
+            LinkDown, Unconfirmed: the robot cannot be told, or has not answered.
+        """
+        done: asyncio.Future[ResetOutcome[_Asker]] = asyncio.get_running_loop().create_future()
+
+        def tell(outcome: ResetOutcome[_Asker]) -> None:
+            if not done.done():
+                done.set_result(outcome)
+
+        self._ask_reset(_Asker(by, where, tell), number)
+        outcome = await done
+        if outcome.reason is not None:
+            raise self._reset_error(outcome.reason, outcome.detail)
+
+    def reset_by_peer(self, peer: Peer, number: int) -> None:
+        """As `reset`; a refusal is sent to the peer."""
+
+        def tell(outcome: ResetOutcome[_Asker]) -> None:
+            if outcome.reason is not None:
+                self._metrics.refusals.labels(outcome.reason).inc()
+                event = self._clock.event
+                refusal = Refusal(
+                    event=0, reason=outcome.reason, current=event, detail=outcome.detail[:500], stop=outcome.number
+                )
+                self._tap.refused(peer.actor, refusal, "console")
+                peer.send("stop", refusal)
+
+        self._ask_reset(_Asker(peer.actor, "stop", tell), number)
+
+    def _ask_reset(self, asker: _Asker, number: int) -> None:
+        refused = self._refusal_of_reset(asker.by, number)
+        if refused is not None:
+            self._settle([ResetOutcome(asker, number, *refused)])
+            return
+        stop = self._clock.stop
+        if stop.number == number and not stop.stopped and self._clock.feedback is not None:
+            self._settle([ResetOutcome(asker, number, None)])
+        elif self._resets.ask(number, asker, time.monotonic()):
+            self._wake.set()
+            if not self._robot.send(Reset(by=asker.by.name[:500], number=number)):
+                self._settle(self._resets.link_down(self._robot.detail))
+
+    def _refusal_of_reset(self, by: Actor, number: int) -> tuple[RefusalReason, str] | None:
+        """Why this one may not reset now; None: it may."""
+        if by.role != "supervisor":
+            if by.role == "observer":
+                return "not_allowed", "observers do not reset"
+            if not self._holds_seat(by):
+                return "no_seat", "the holder of the control seat resets, or a supervisor"
+        now = time.monotonic()
+        if not (self._link_resets.spend(by.link or by.peer, now) and self._robot_resets.spend("", now)):
+            return "too_often", "resets of this link, or for this robot, come too often"
+        if not self._robot.up:
+            return "link_down", self._robot.detail
+        if self._presses.pending:
+            return "stale_reset", "a stop is on its way to the robot"
+        if number < self._clock.stop.number:
+            return "stale_reset", f"the newest stop is number {self._clock.stop.number}"
+        return None
+
+    def _holds_seat(self, by: Actor) -> bool:
+        holder = self._peers.by_id(self._holder()) if self._holder() else None
+        if holder is None:
+            return False
+        return by.peer == holder.id if by.peer else bool(by.link) and by.link == holder.identity.token_id
+
+    def _settle(self, outcomes: list[ResetOutcome[_Asker]]) -> None:
+        for outcome in outcomes:
+            by, where = outcome.asker.by, outcome.asker.where
+            if outcome.reason is None:
+                self._metrics.resets.inc()
+                self._audit.record("reset", by, where, f"stop {outcome.number}")
+                self._tap.reset_done(by, where, outcome.number)
+                log.warning("reset", by=by.name, where=where, stop=outcome.number)
+            else:
+                self._audit.again("reset", by, f"{where}, refused {outcome.reason}")
+            outcome.asker.tell(outcome)
+
+    def _reset_error(self, reason: str, detail: str) -> Exception:
+        match reason:
+            case "not_allowed":
+                return NotAllowed(detail)
+            case "no_seat":
+                return NoSeat(detail)
+            case "too_often":
+                return TooManyRequests(detail)
+            case "too_soon":
+                return ResetTooSoon(detail)
+            case "locked_out":
+                return LockedOut(detail)
+            case "stale_reset":
+                return StaleReset(detail)
+            case "not_kept":
+                return ResetNotKept(detail)
+            case _:
+                return Unconfirmed(detail) if self._robot.up else LinkDown(detail)
+
+    # silence
+
+    def silence(self, by: Peer, peer: str, *, silent: bool) -> RefusalReason | None:
+        """A supervisor silences the stops of the link of `peer`, or ends that; why not, or None."""
+        found = self._peers.by_id(peer)
+        if by.role != "supervisor" or found is None or found.role == "supervisor":
+            return "not_allowed"
+        link, now = found.identity.token_id, time.monotonic()
+        if silent:
+            self._silenced.silence(link, now)
+            self._audit.record("silence", by.actor, "silenced", f"{found.name} ({link})")
+            self._wake.set()
+        elif self._silenced.hear(link):
+            self._audit.record("silence", by.actor, "heard again", f"{found.name} ({link})")
+        self._tell_silence(link, silent=silent)
+        return None
+
+    def _tell_silence(self, link: str, *, silent: bool) -> None:
+        notice = Notice(level="warning", text=SILENCED) if silent else Notice(level="info", text=HEARD)
+        for peer in self._peers:
+            if peer.identity.token_id == link:
+                peer.silenced = silent
+                peer.send("session", notice)
+
+    def is_silenced(self, link: str) -> bool:
+        return self._silenced.holds(link, time.monotonic())
+
+    # background
+
+    async def run(self) -> None:
+        """Until cancelled: what has no answer in time."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            while self._look(time.monotonic()):  # noqa: ASYNC110 - deadlines, not a state
+                await asyncio.sleep(WATCH_SECONDS)
+
+    def _look(self, now: float) -> bool:
+        """Whether anything is left to wait for."""
+        for link in self._silenced.ended(now):
+            self._audit.record("silence", what="ended", detail=link)
+            self._tell_silence(link, silent=False)
+        late = [press for press in self._presses.pending if now >= self._deadlines.get(press.id, now + 1)]
+        for press in late:
+            self._not_delivered(press)
+        if late:
+            self._spread()
+        if now - self._sent_at >= AGAIN_SECONDS and self._presses.pending:
+            self.link_up()
+        self._settle(self._resets.expire(now))
+        return bool(self._presses.pending or self._resets or self._silenced)
+
+    def _record(self, press: Press, what: str) -> None:
+        """In full for the first of each link; a flood becomes one record a second."""
+        if self._records.spend(press.by.link or press.by.name, time.monotonic()):
+            self._audit.record("stop", press.by, what, press.reason)
+        else:
+            self._audit.again("stop", press.by, f"{press.where}, more")
+
+    def _trouble_changed(self, trouble: str) -> None:
+        self._audit.record("stop", what="kept in memory only" if trouble else "kept on disk again", detail=trouble)
+        notice = Notice(level="warning", text=self.trouble) if trouble else Notice(level="info", text=WRITTEN)
+        self._peers.tell("session", notice)
+
+    def _spread(self) -> None:
+        self._news.set()
+        self._news = asyncio.Event()
