@@ -176,8 +176,10 @@ class StopService:
                 self._audit.again("stop", by, f"{where}, again")
 
     def _send_new(self, press: Press, replaced: Press | None) -> None:
-        sent = self._robot.send_stop(press.message())
-        self._deadlines[press.id] = time.monotonic() + CONFIRM_SECONDS
+        sent, now = self._robot.send_stop(press.message()), time.monotonic()
+        self._deadlines[press.id] = now + CONFIRM_SECONDS
+        if len(self._presses.pending) == 1:
+            self._sent_at = now
         self._wake.set()
         self._tap.stop_asked(press.by, press.where, press.reason, press.id, delivered=sent)
         log.warning("stop", by=press.by.name, where=press.where, reason=press.reason, sent=sent)

@@ -297,6 +297,7 @@ class Recorder(SessionTap):
                 event=command.event,
                 issue=command.issue,
                 values=command.values,
+                nonce=command.nonce,
                 peer=by.peer,
                 name=by.name,
                 outcome=said,

@@ -62,6 +62,7 @@ class CommandRecord(OwnRecord, frozen=True, kw_only=True):
     name: str
     outcome: CommandOutcome
     reason: RefusalReason | Literal[""] = ""  # why it was refused
+    nonce: int = 0  # that the sender named; 0 in recordings of before there were any
 
 
 class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
@@ -78,9 +79,9 @@ class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
     faults: list[str] = []
     limits: list[str] = []
     unknown: list[str] = []
-    nonce: Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)] = 0
-    neutral_needed: bool = False
-    warning: float = 0.0  # s
+    nonce: int = 0  # of this issue; 0 in recordings of before there were any
+    neutral_needed: bool = False  # no moving command executes before a neutral one
+    warning: float = 0.0  # s that the robot still warns before it may move
 
 
 class RefusalRecord(OwnRecord, frozen=True, kw_only=True):

@@ -7,11 +7,21 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from robot_bridge.protocol.description import Axis, RobotDescription
-from robot_bridge.protocol.messages import Command, Feedback, Refusal, Reset, Rest, Stop, StopState
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest, StopState, StopTaken
 from robot_bridge.protocol.serial import MAX_EVENT, event_after
-from server.command_desk import STOP_REPEAT, Absorbed, Answer, CommandDesk, Forward, Outcome, Refuse
+from server.command_desk import (
+    Absorbed,
+    Answer,
+    CommandDesk,
+    CommandOutcome,
+    Forward,
+    ForwardRest,
+    Refuse,
+    RestOutcome,
+)
 from server.event_clock import EventClock
 from server.seat import ControlSeat, SeatTimes
+from server.stop_presses import Press, StopPresses
 
 ROBOT = RobotDescription(
     name="r",
@@ -20,34 +30,49 @@ ROBOT = RobotDescription(
 )
 
 
-def _feedback(event: int, issue: int = 1, *, stopped: bool = False) -> Feedback:
-    return Feedback(event=event, issue=issue, time=0.0, axes=[0, 0], stop=StopState(stopped=stopped))
+def _feedback(event: int, issue: int = 1, *, stopped: bool = False, number: int = 0, neutral: bool = False) -> Feedback:
+    return Feedback(
+        event=event,
+        issue=issue,
+        time=0.0,
+        axes=[0, 0],
+        stop=StopState(stopped=stopped, number=number),
+        nonce=1000 * event + issue,
+        neutral_needed=neutral,
+    )
 
 
-def _command(event: int, values: list[float] | None = None) -> Command:
-    return Command(event=event, issue=1, values=[0.5, 0.5] if values is None else values)
+def _command(event: int, values: list[float] | None = None, *, issue: int = 1, nonce: int | None = None) -> Command:
+    """As an answer to the feedback before it, unless `nonce` is another one's."""
+    before = event - 1 or MAX_EVENT
+    return Command(
+        event=event,
+        issue=issue,
+        values=[0.5, 0.5] if values is None else values,
+        nonce=1000 * before + issue if nonce is None else nonce,
+    )
 
 
 class Bench:
     """A desk whose seat "me" holds, with the link up and feedback 7 at hand."""
 
     def __init__(self, *, held: bool = True, up: bool = True, stopped: bool = False) -> None:
-        self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
-        self.desk = CommandDesk(self.clock, self.seat)
+        self.clock, self.seat, self.presses = EventClock(), ControlSeat(SeatTimes()), StopPresses()
+        self.desk = CommandDesk(self.clock, self.seat, self.presses)
         self.clock.begin("e")
         if held:
             self.seat.request("me", "operator", 0.0)
-            self.seat.neutral("me")
         if up:
             self.desk.link_up(ROBOT)
             self.hear(_feedback(7, stopped=stopped))
+        self.seat.neutral("me")
 
     def hear(self, feedback: Feedback) -> None:
         if self.clock.observe(feedback, 0.0):
             self.desk.feedback(feedback)
 
 
-def _reason(outcome: Outcome) -> str:
+def _reason(outcome: CommandOutcome | RestOutcome) -> str:
     assert isinstance(outcome, Refuse)
     return outcome.refusal.reason
 
@@ -72,6 +97,7 @@ def test_a_new_holder_sends_a_neutral_command_before_a_moving_one() -> None:
     assert bench.desk.in_flight is None
     assert bench.desk.command("next", _command(8, NEUTRAL)) == Forward(_command(8, NEUTRAL))
     assert bench.desk.command("next", _command(8)) == Absorbed(), "a repeat with a newer intention under the same event"
+    assert not bench.seat.may_move("next"), "it counts when it was executed"
     bench.hear(_feedback(8))
     assert bench.desk.command("next", _command(9)) == Forward(_command(9))
     bench.seat.take("last", "supervisor", 0.0)
@@ -151,7 +177,7 @@ def test_the_successor_wraps() -> None:
     bench = Bench(up=False)
     bench.desk.link_up(ROBOT)
     bench.hear(_feedback(MAX_EVENT))
-    assert bench.desk.command("me", _command(1)) == Forward(_command(1))
+    assert bench.desk.command("me", _command(1, NEUTRAL)) == Forward(_command(1, NEUTRAL))
     bench.hear(_feedback(1))
     assert bench.desk.in_flight is None
 
@@ -178,28 +204,28 @@ def test_what_was_in_flight_is_forgotten_with_the_link() -> None:
     bench.desk.link_down()
     assert _reason(bench.desk.command("me", _command(8))) == "link_down"
     bench.desk.link_up(ROBOT)
-    assert bench.desk.command("me", _command(8)) == Forward(_command(8))
+    assert bench.desk.command("me", _command(8, NEUTRAL)) == Forward(_command(8, NEUTRAL))
 
 
 def test_a_rest_of_the_holder_passes_and_repeats_wait_for_an_answer() -> None:
     bench = Bench()
-    assert bench.desk.rest("me", Rest(event=8)) == Forward(Rest(event=8))
+    assert bench.desk.rest("me", Rest(event=8)) == ForwardRest(Rest(event=8))
     assert bench.desk.rest("me", Rest(event=8)) == Absorbed()
-    assert bench.desk.rest("me", Rest(event=7)) == Forward(Rest(event=7))
+    assert bench.desk.rest("me", Rest(event=7)) == ForwardRest(Rest(event=7))
     bench.hear(_feedback(7, 2))
-    assert bench.desk.rest("me", Rest(event=7)) == Forward(Rest(event=7))
+    assert bench.desk.rest("me", Rest(event=7)) == ForwardRest(Rest(event=7))
 
 
 def test_a_rest_passes_while_a_command_is_in_flight_and_while_stopped() -> None:
     bench = Bench(stopped=True)
-    assert bench.desk.rest("me", Rest(event=8)) == Forward(Rest(event=8))
+    assert bench.desk.rest("me", Rest(event=8)) == ForwardRest(Rest(event=8))
     bench = Bench()
     bench.desk.command("me", _command(8))
-    assert bench.desk.rest("me", Rest(event=8)) == Forward(Rest(event=8))
+    assert bench.desk.rest("me", Rest(event=8)) == ForwardRest(Rest(event=8))
 
 
 def test_a_rest_that_names_a_far_event_names_the_next_instead() -> None:
-    assert Bench().desk.rest("me", Rest(event=1000)) == Forward(Rest(event=8))
+    assert Bench().desk.rest("me", Rest(event=1000)) == ForwardRest(Rest(event=8))
 
 
 def test_others_cannot_rest_the_robot() -> None:
@@ -211,86 +237,95 @@ def test_when_the_holder_is_gone_the_next_event_is_void_too() -> None:
     bench = Bench()
     bench.desk.command("me", _command(8))
     bench.seat.gone("me", 0.0)
-    assert bench.desk.abandon() == Forward(Rest(event=8))
+    assert bench.desk.abandon() == ForwardRest(Rest(event=8))
 
 
-def test_a_stop_passes_always_and_refuses_commands_before_the_bridge_says_so() -> None:
-    bench = Bench(held=False, up=False)
-    assert bench.desk.stop("any", "why", 0.0) == Forward(Stop(by="any", reason="why"))
+def test_a_stop_on_its_way_refuses_commands_until_a_feedback_has_shown_it_and_its_reset() -> None:
     bench = Bench()
-    assert bench.desk.stop("any", "", 0.0) == Forward(Stop(by="any", reason=""))
+    bench.presses.press(Press(id="p"))
     assert _reason(bench.desk.command("me", _command(8))) == "stopped"
     bench.hear(_feedback(7, 2))  # issued before the stop arrived
-    assert _reason(bench.desk.command("me", _command(8))) == "stopped"
-    bench.hear(_feedback(7, 3, stopped=True))
-    bench.hear(_feedback(7, 4))  # and reset
-    assert bench.desk.command("me", _command(8)) == Forward(_command(8))
+    assert _reason(bench.desk.command("me", _command(8, issue=2))) == "stopped"
+    taken = StopTaken(press="p", number=1)
+    bench.presses.taken(taken)
+    bench.desk.stop_taken(taken)
+    assert _reason(bench.desk.command("me", _command(8, issue=2))) == "stopped", "taken, and not shown yet"
+    bench.hear(_feedback(7, 3, stopped=True, number=1))
+    bench.hear(_feedback(7, 4, number=1))  # and reset
+    assert _reason(bench.desk.command("me", _command(8, issue=4))) == "not_neutral"
+    assert isinstance(bench.desk.command("me", _command(8, NEUTRAL, issue=4)), Forward)
 
 
-def test_a_flood_of_stops_is_absorbed_but_never_across_a_reset() -> None:
-    desk = Bench().desk
-    desk.stop("any", "", 0.0)
-    assert desk.stop("any", "", STOP_REPEAT / 2) == Absorbed()
-    assert desk.reset("me", 1) == Forward(Reset(by="me", number=1))
-    assert desk.stop("any", "", STOP_REPEAT / 2) == Forward(Stop(by="any"))
-    assert desk.stop("any", "", STOP_REPEAT * 2) == Forward(Stop(by="any"))
-
-
-def test_a_stop_that_nobody_confirmed_is_said_first_on_the_next_link() -> None:
+def test_a_stop_and_its_reset_that_no_feedback_showed_apart_ask_for_a_neutral_command_too() -> None:
     bench = Bench()
-    bench.desk.stop("first", "", 0.0)
-    bench.desk.link_down()
-    bench.desk.stop("second", "", 0.0)
-    assert bench.desk.link_up(ROBOT) == Stop(by="first")
-    assert _reason(bench.desk.command("me", _command(8))) == "stopped"
-    bench.hear(_feedback(7, 2, stopped=True))
-    bench.desk.link_down()
-    assert bench.desk.link_up(ROBOT) is None
+    bench.hear(_feedback(7, 2, number=1))
+    assert _reason(bench.desk.command("me", _command(8, issue=2))) == "not_neutral"
 
 
-def test_a_stop_without_a_link_is_kept_even_if_the_robot_was_stopped_when_last_seen() -> None:
-    bench = Bench(stopped=True)
-    bench.desk.link_down()
-    bench.desk.stop("any", "", 0.0)
-    assert bench.desk.link_up(ROBOT) == Stop(by="any")
-
-
-def test_a_bridge_that_starts_anew_is_stopped_again_if_the_last_one_was() -> None:
-    bench = Bench(stopped=True)
-    bench.desk.link_down()
-    bench.desk.epoch_ends()
-    bench.clock.begin("another")
-    assert isinstance(bench.desk.link_up(ROBOT), Stop)
-    bench.hear(_feedback(1, 1))
-    assert _reason(bench.desk.command("me", _command(2))) == "stopped"
-    bench.desk.reset("me", 1)
-    assert bench.desk.command("me", _command(2)) == Forward(_command(2))
-
-
-def test_what_is_latched_is_the_stop_that_holds_or_is_still_to_arrive() -> None:
+@pytest.mark.parametrize("what", ["stop", "link", "epoch", "robot"])
+def test_after_a_stop_a_new_link_a_new_epoch_and_when_the_robot_says_so_a_neutral_command_comes_first(
+    what: str,
+) -> None:
     bench = Bench()
-    latched = [bench.desk.latched]
-    bench.desk.stop("any", "smoke", 0.0)
-    latched.append(bench.desk.latched)
-    bench.hear(_feedback(7, 2, stopped=True))
-    latched.append(bench.desk.latched)
-    bench.desk.reset("me", 1)
-    bench.hear(_feedback(7, 3))
-    latched.append(bench.desk.latched)
-    as_the_robot_says = Stop(by="", reason="")
-    assert latched == [None, Stop(by="any", reason="smoke"), as_the_robot_says, None]
+    bench.desk.command("me", _command(8))
+    bench.hear(_feedback(8))
+    if what == "stop":
+        bench.hear(_feedback(8, 2, stopped=True, number=1))
+        bench.hear(_feedback(8, 3, number=1))
+    elif what == "link":
+        bench.desk.link_down()
+        bench.desk.link_up(ROBOT)
+        bench.hear(_feedback(8, 3))
+    elif what == "epoch":
+        bench.desk.link_down()
+        bench.desk.epoch_ends()
+        bench.clock.begin("another")
+        bench.desk.link_up(ROBOT)
+        bench.hear(_feedback(8, 3))
+    else:
+        bench.hear(_feedback(8, 3, neutral=True))
+    assert _reason(bench.desk.command("me", _command(9, issue=3))) == "not_neutral"
+    assert isinstance(bench.desk.command("me", _command(9, NEUTRAL, issue=3)), Forward)
+    bench.hear(_feedback(9))
+    assert bench.desk.command("me", _command(10)) == Forward(_command(10))
 
 
-def test_a_stop_that_was_reset_before_any_feedback_showed_it_is_over() -> None:
+def test_a_neutral_command_proves_nothing_while_the_robot_still_asks_for_one() -> None:
     bench = Bench()
-    bench.desk.stop("any", "", 0.0)
-    bench.desk.reset("me", 1)
+    bench.hear(_feedback(7, 2, neutral=True))
+    bench.desk.command("me", _command(8, NEUTRAL, issue=2))
+    bench.hear(_feedback(7, 3, neutral=True))  # issued before the command arrived
+    bench.hear(_feedback(8, neutral=True))
+    assert _reason(bench.desk.command("me", _command(9))) == "not_neutral"
+
+
+def test_a_neutral_command_of_before_the_seat_was_given_up_proves_nothing_after_it() -> None:
+    bench = Bench()
+    bench.seat.neutral_needed()
+    bench.desk.command("me", _command(8, NEUTRAL))
+    bench.seat.release("me", 0.0)
+    bench.desk.abandon()
+    bench.seat.request("me", "operator", 0.0)
+    bench.hear(_feedback(8))
+    assert _reason(bench.desk.command("me", _command(9))) == "not_neutral"
+
+
+def test_a_command_that_does_not_name_the_nonce_of_the_issue_it_answers_is_unseen() -> None:
+    bench = Bench()
+    assert _reason(bench.desk.command("me", _command(8, nonce=7002))) == "unseen"
+    assert _reason(bench.desk.command("me", _command(8, nonce=0))) == "unseen"
     bench.hear(_feedback(7, 2))
-    assert bench.desk.command("me", _command(8)) == Forward(_command(8))
+    assert _reason(bench.desk.command("me", _command(8, issue=2, nonce=7001))) == "unseen", "that of another issue"
+    assert isinstance(bench.desk.command("me", _command(8)), Forward), "an earlier issue, with its own"
 
 
-def test_a_reset_needs_the_link() -> None:
-    assert _reason(Bench(up=False).desk.reset("me", 1)) == "link_down"
+def test_an_issue_that_nobody_knows_is_late() -> None:
+    bench = Bench()
+    for issue in range(2, 100):
+        bench.hear(_feedback(7, issue))
+    assert _reason(bench.desk.command("me", _command(8, issue=2))) == "late"
+    assert _reason(bench.desk.command("me", _command(8, issue=500))) == "late"
+    assert isinstance(bench.desk.command("me", _command(8, issue=99)), Forward)
 
 
 class DeskMachine(RuleBasedStateMachine):
@@ -301,15 +336,17 @@ class DeskMachine(RuleBasedStateMachine):
     @initialize(event=st.sampled_from([1, 2, MAX_EVENT - 2, MAX_EVENT]))
     def start(self, event: int) -> None:
         self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
-        self.desk = CommandDesk(self.clock, self.seat)
-        self.up = self.stopped = self.stop_sent = False
-        self.event, self.issue = event, 1
+        self.presses = StopPresses()
+        self.desk = CommandDesk(self.clock, self.seat, self.presses)
+        self.up = self.stopped = False
+        self.event, self.issue, self.number, self.pressed = event, 1, 0, 0
+        self.proven = ""  # the peer whose neutral command the bridge has executed since the newest reason for one
         self.on_the_way: list[Command] = []  # forwarded, not yet seen by the bridge
 
     @rule()
     def link_up(self) -> None:
-        self.stop_sent = self.desk.link_up(ROBOT) is not None
-        self.up = True
+        self.desk.link_up(ROBOT)
+        self.up, self.proven = True, ""
         self.on_the_way = []
         self.bridge_issues()
 
@@ -326,42 +363,56 @@ class DeskMachine(RuleBasedStateMachine):
     def leave(self, peer: str) -> None:
         if self.seat.gone(peer, 0.0).rest:
             self.desk.abandon()
+            self.proven = ""
 
-    @rule(peer=peers, offset=st.integers(-1, 2), values=st.lists(st.floats(), min_size=1, max_size=3))
-    def command(self, peer: str, offset: int, values: list[float]) -> None:
+    @rule(
+        peer=peers,
+        offset=st.integers(-1, 2),
+        values=st.lists(st.floats() | st.just(0.0), min_size=1, max_size=3),
+        seen=st.booleans(),
+    )
+    def command(self, peer: str, offset: int, values: list[float], seen: bool) -> None:
         named = (self.event + offset - 1) % MAX_EVENT + 1
-        known_stop = self.clock.stop.stopped or self.stop_sent
-        outcome = self.desk.command(peer, Command(event=named, issue=self.issue, values=values))
+        known_stop = self.clock.stop.stopped or bool(self.presses.pending)
+        nonce = 1000 * self.event + self.issue + (not seen)
+        command = Command(event=named, issue=self.issue, values=values, nonce=nonce)
+        outcome = self.desk.command(peer, command)
         if isinstance(outcome, Forward):
-            assert isinstance(outcome.message, Command)
             assert self.seat.holder == peer
             assert self.up
+            assert seen
             assert not known_stop
             assert not self.on_the_way
-            assert outcome.message.event == event_after(self.clock.event)
-            assert all(-1 <= value <= 2 for value in outcome.message.values)
-            self.on_the_way.append(outcome.message)
+            assert outcome.command.event == event_after(self.clock.event)
+            assert all(-1 <= value <= 2 for value in outcome.command.values)
+            assert outcome.command.values == NEUTRAL or self.proven == peer
+            self.on_the_way.append(outcome.command)
 
     @rule(peer=peers)
     def rest(self, peer: str) -> None:
-        outcome = self.desk.rest(peer, Rest(event=self.event))
-        if isinstance(outcome, Forward):
+        if isinstance(self.desk.rest(peer, Rest(event=self.event)), ForwardRest):
             assert self.seat.holder == peer
 
     @rule()
     def stop(self) -> None:
-        self.desk.stop("x", "", 0.0)
-        self.stop_sent = not self.clock.stop.stopped or not self.up or self.stop_sent
+        self.pressed += 1
+        self.presses.press(Press(id=str(self.pressed)))
 
-    @rule()
-    def bridge_stops(self) -> None:
-        if self.stop_sent and self.up:
-            self.stopped, self.stop_sent = True, False
-            self.bridge_issues()
+    @rule(answers=st.integers(0, 3))
+    def bridge_stops(self, answers: int) -> None:
+        if self.up and self.presses.pending:
+            for press in self.presses.pending[: answers + 1]:
+                self.number += 1
+                taken = StopTaken(press=press.id, number=self.number)
+                self.presses.taken(taken)
+                self.desk.stop_taken(taken)
+            self.stopped, self.proven = True, ""
+            if answers:  # else the feedback comes later
+                self.bridge_issues()
 
     @rule()
     def bridge_resets(self) -> None:
-        self.stopped = False
+        self.stopped, self.proven = False, ""
         self.bridge_issues()
 
     @rule(refuse=st.booleans())
@@ -373,13 +424,15 @@ class DeskMachine(RuleBasedStateMachine):
             self.desk.refused(Refusal(event=command.event, reason="late", current=self.event))
         else:
             self.event = command.event
+            if command.values == NEUTRAL:
+                self.proven = self.seat.holder
         self.bridge_issues()
 
     @rule()
     def bridge_issues(self) -> None:
         self.issue += 1
         if self.up:
-            feedback = _feedback(self.event, self.issue, stopped=self.stopped)
+            feedback = _feedback(self.event, self.issue, stopped=self.stopped, number=self.number)
             assert self.clock.observe(feedback, 0.0)
             self.desk.feedback(feedback)
 

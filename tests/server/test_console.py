@@ -1,18 +1,20 @@
 """What cannot be brought about from outside: faults of our own, a robot that contradicts itself."""
 
 import asyncio
+from pathlib import Path
 from typing import cast
 
 import pytest
 
 from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Feedback, LinkMessage, Media, Refusal, Rest, Stop
+from robot_bridge.protocol.messages import Feedback, LinkMessage, Media, Refusal, Rest, Stop, StopTaken
 from server.audit_tail import AuditTail
 from server.console import Console
 from server.metrics import Metrics
 from server.robot_connection import RobotConnection, RobotHost
 from server.seat import SeatOutcome
 from server.settings import Settings
+from server.stop_keeper import StopKeeper
 from tests.server.rig import PATIENCE
 
 ROBOT = RobotDescription(name="r", label="R", axes=())
@@ -34,10 +36,14 @@ def _feedback(event: int) -> Feedback:
     return Feedback(event=event, issue=1, time=0.0, axes=[])
 
 
-async def test_a_background_task_that_fails_is_counted_and_runs_again(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_background_task_that_fails_is_counted_and_runs_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr("server.console.RESTART_AFTER", 0.0)
     metrics = Metrics()
-    console = Console(Settings(robot="tcp://127.0.0.1:1", seat_timeout=0.01), metrics, FakePlane(), None, AuditTail())
+    wanted = Settings(robot="tcp://127.0.0.1:1", seat_timeout=0.01)
+    stops = StopKeeper(tmp_path, wanted.robot)
+    console = Console(wanted, metrics, FakePlane(), None, AuditTail(), stops=stops)
     failed: list[float] = []
     again = asyncio.Event()
 
@@ -75,6 +81,9 @@ class FakeHost:
 
     def refusal_received(self, refusal: Refusal) -> None:
         self.calls.append("refusal")
+
+    def stop_taken(self, taken: StopTaken) -> None:
+        self.calls.append(f"taken {taken.press}")
 
     def media_received(self, media: Media) -> None:
         self.calls.append("media")
@@ -125,7 +134,8 @@ def test_each_kind_of_message_goes_its_way() -> None:
     ]
     for message in messages:
         connection.link_received("operator", message)
-    assert host.calls[2:] == ["feedback 1", "refusal", "media"]
+    connection.link_received("media", StopTaken(press="p", number=1))
+    assert host.calls[2:] == ["feedback 1", "refusal", "media", "taken p"]
 
 
 def test_without_a_link_nothing_is_sent() -> None:

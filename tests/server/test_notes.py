@@ -3,7 +3,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_bridge.protocol.console import SharedNote
-from server.audit import AuditRecord
 from server.names import MAX_NAME, clean_name, printable, unique_names
 from server.notes import BOARD_BURST, BURST, KEPT, PEER_RATE, NoteBoard
 from server.token_bucket import TokenBucket
@@ -57,16 +56,6 @@ def test_who_left_is_forgotten_and_the_notes_stay() -> None:
     board.forget("never here")
     assert isinstance(_write(board), SharedNote)
     assert len(list(board)) == BURST + 1
-
-
-def test_notes_come_back_from_the_audit_log() -> None:
-    board = NoteBoard(0.0)
-    board.remember(AuditRecord(n=1, time=5.0, kind="stop", who="Ada", role="observer"))
-    board.remember(AuditRecord(n=2, time=5.0, kind="note", who="Ada", role="nobody", detail="?"))
-    board.remember(AuditRecord(n=3, time=5.0, kind="note", who="Ada", role="observer", peer="a", detail="hi"))
-    assert [(note.id, note.name, note.text, note.event, note.time) for note in board] == [(1, "Ada", "hi", 1, 5.0)]
-    assert isinstance(note := _write(board), SharedNote)
-    assert note.id == 2
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from robot_bridge.protocol.description import Axis, RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback, Rest
 from robot_bridge.protocol.serial import event_after
-from server.command_desk import CommandDesk, Forward
+from server.command_desk import CommandDesk, Forward, ForwardRest
 from server.event_clock import EventClock
 from server.seat import MAX_CLAIMS, ControlSeat, SeatOutcome, SeatTimes
-from server.speed_cap import SpeedCap
 
 TIMES = SeatTimes(heartbeat=3.0, idle=5.0, claim=6.0)
 ROBOT = RobotDescription(
@@ -28,7 +27,7 @@ class SeatMachine(RuleBasedStateMachine):
         self.now = 0.0
         self.clock = EventClock()
         self.seat = ControlSeat(TIMES)
-        self.desk = CommandDesk(self.clock, self.seat, SpeedCap("off"))
+        self.desk = CommandDesk(self.clock, self.seat)
         self.clock.begin("epoch")
         self.desk.link_up(ROBOT)
         self.sent: list[tuple[str | None, Command | Rest]] = []
@@ -42,9 +41,8 @@ class SeatMachine(RuleBasedStateMachine):
         """As the keeper does."""
         if outcome.rest:
             rest = self.desk.abandon()
-            if isinstance(rest, Forward):
-                assert isinstance(rest.message, Rest)
-                self.sent.append((None, rest.message))
+            if isinstance(rest, ForwardRest):
+                self.sent.append((None, rest.rest))
 
     def watched(self, before: str) -> None:
         """Whenever the holder changed, and somebody held it, the robot was told to rest since."""
@@ -116,7 +114,6 @@ class SeatMachine(RuleBasedStateMachine):
     def command(self, peer: str, value: float, answered: bool) -> None:
         outcome = self.desk.command(peer, Command(event=event_after(self.event), issue=1, values=[value]), self.now)
         if isinstance(outcome, Forward):
-            assert isinstance(outcome.message, Command)
             assert self.seat.holder == peer
             before = next((each for each in reversed(self.sent) if each[0] != peer), (None, None))
             if before[0] is not None:
@@ -126,7 +123,7 @@ class SeatMachine(RuleBasedStateMachine):
                 assert any(isinstance(each, Command) and each.values == [0.0] for each in own)
                 self.act(self.seat.moved(peer, self.now))
                 self.moved_at = self.now
-            self.sent.append((peer, outcome.message))
+            self.sent.append((peer, outcome.command))
             if answered:
                 self.answer()
 

@@ -7,12 +7,13 @@ from contextlib import asynccontextmanager
 
 from prometheus_client import CollectorRegistry
 
-from server.audit import Actor
+from server.board.board import StopAnswer
 from server.board.board_metrics import BoardMetrics
 from server.board.redis_board import RedisBoard
 from server.board.seal import Seal
 from server.board.tile import Tile
 from server.invitations import Invitation
+from server.stop_presses import Press
 
 __all__ = ["KEY", "FakeHost", "FakeLinks", "TestBoard", "eventually", "running_board", "tile"]
 
@@ -29,12 +30,16 @@ class FakeHost:
 
     def __init__(self) -> None:
         self.stops: list[tuple[str, str, str]] = []
+        self.presses: list[str] = []
         self.away: set[str] = set()
         self.ended: list[Invitation] = []
 
-    def stop_robot(self, name: str, by: Actor, reason: str) -> tuple[bool, int]:
-        self.stops.append((name, by.name, reason))
-        return name not in self.away, 7
+    async def stop_robot(self, name: str, press: Press) -> StopAnswer:
+        self.stops.append((name, press.by.name, press.reason))
+        self.presses.append(press.id)
+        if name in self.away:
+            return StopAnswer(True, False, 7, "the robot cannot be told now; it is sent first when the link is back")
+        return StopAnswer(True, True, 7, "", 3)
 
     def links_revoked(self, ended: list[Invitation]) -> None:
         self.ended += ended

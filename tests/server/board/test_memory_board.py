@@ -2,6 +2,7 @@ import asyncio
 
 from server.audit import Actor, AuditRecord
 from server.board.memory_board import MemoryBoard
+from server.stop_presses import new_press
 from tests.server.board.boards import tile
 
 
@@ -13,5 +14,5 @@ async def test_a_console_that_is_alone_has_no_others_and_misses_nothing() -> Non
     assert board.others() == []
     assert (board.state.shared, board.state.unknown_since, board.state.conflicts) == (False, None, ())
     assert (await board.audit(10)) == ([], True, "")
-    assert not (await board.stop(["far"], Actor(), ""))["far"].confirmed
+    assert not (await board.stop(["far"], new_press(Actor(), "http", "")))["far"].confirmed
     running.cancel()

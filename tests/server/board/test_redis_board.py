@@ -9,6 +9,7 @@ from structlog.testing import capture_logs
 
 from server.audit import Actor, AuditRecord
 from server.board import redis_board
+from server.stop_presses import new_press
 from tests.server.board.boards import eventually, running_board, tile
 from tests.support.redis_server import RedisServer
 
@@ -47,9 +48,10 @@ async def test_a_stop_reaches_the_robot_of_another_console_once_and_is_answered(
     ):
         await eventually(lambda: len(two.others()) == 2, "the robots")
         one.host.away.add("right")
-        answers = await two.stop(["left", "right"], ANN, "smoke")
+        answers = await two.stop(["left", "right"], new_press(ANN, "http", "smoke", "p"))
         assert one.host.stops == [("left", "Ann", "smoke"), ("right", "Ann", "smoke")]
-        assert answers["left"] == (True, True, 7, "")
+        assert answers["left"] == (True, True, 7, "", 3)
+        assert one.host.presses == ["p", "p"], "the press of whoever asked"
         assert (answers["right"].confirmed, answers["right"].delivered) == (True, False)
         assert "sent first when the link is back" in answers["right"].detail
 
@@ -60,12 +62,12 @@ async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(
     monkeypatch.setattr(redis_board, "STOP_PATIENCE", 0.5)
     async with running_board(server.url, "two") as two:
         await eventually(lambda: two.state.unknown_since is None, "the board")
-        answers = await two.stop(["left"], ANN, "")
+        answers = await two.stop(["left"], new_press(ANN, "http", ""))
         assert answers["left"][:2] == (False, False)
         assert answers["left"].detail == "not confirmed: no console has it"
         server.kill()
         await eventually(lambda: two.state.unknown_since is not None, "the loss")
-        answers = await two.stop(["left"], ANN, "")
+        answers = await two.stop(["left"], new_press(ANN, "http", ""))
         assert answers["left"].detail.startswith("not confirmed: other consoles are unknown (unreachable")
 
 
@@ -128,7 +130,7 @@ async def test_two_living_consoles_that_claim_one_robot_both_say_so_and_the_log_
                 assert (conflict.error, conflict.robot) == ("robot_claimed_twice", "left")
                 assert conflict.consoles == (one.name, two.name)
                 assert two.others() == [], "an own robot is not shown as somebody else's too"
-                answers = await two.stop(["left"], ANN, "")
+                answers = await two.stop(["left"], new_press(ANN, "http", ""))
                 assert answers["left"].confirmed
                 await eventually(lambda: _named(logs) == 2, "both logs")
             await eventually(lambda: not one.state.conflicts, "the end of it")

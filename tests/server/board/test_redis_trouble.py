@@ -14,6 +14,7 @@ from server.board.messages import MAX_PUBLISHED, Published, pack_published
 from server.board.redis_private import LARGEST
 from server.board.seal import Seal
 from server.board.tile import within_bounds
+from server.stop_presses import new_press
 from tests.server.board.boards import KEY, eventually, running_board, tile
 from tests.support.certificates import Authority
 from tests.support.redis_server import RedisServer
@@ -63,7 +64,7 @@ async def test_a_wrong_password_is_named_and_never_shown(tmp_path: Path) -> None
         with capture_logs() as logs:
             async with running_board(wrong, "one") as one:
                 await eventually(lambda: one.state.detail.startswith("refused"), "the refusal")
-                await one.stop(["left"], ANN, "")
+                await one.stop(["left"], new_press(ANN, "http", ""))
                 shown = f"{one.state} {logs}"
             assert one.count("lockstep_board_failures_total", reason="refused") >= 1
             assert PASSWORD not in shown
@@ -169,7 +170,7 @@ async def test_a_stop_comes_through_a_flood_of_news(server: RedisServer) -> None
             for _ in range(100):
                 pipeline.publish("lockstep:news", b"x" * 100)
             await pipeline.execute()
-        answers = await two.stop(["left"], ANN, "")
+        answers = await two.stop(["left"], new_press(ANN, "http", ""))
         assert answers["left"].delivered
         await eventually(lambda: one.count("lockstep_board_bad_input_total", reason="not_sealed") == 500, "the flood")
 
@@ -212,7 +213,7 @@ async def test_a_user_who_may_do_no_more_than_the_guide_says_suffices(server: Re
         one.record("left", NOTE)
         one.links.revoke("abc")
         await eventually(lambda: "abc" in two.links.elsewhere, "the revocation")
-        assert (await two.stop(["left"], ANN, ""))["left"].delivered
+        assert (await two.stop(["left"], new_press(ANN, "http", "")))["left"].delivered
         async with asyncio.timeout(10):
             while not (await two.audit(10)).records:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)

@@ -11,6 +11,7 @@ from server.audit import Actor
 from server.fleet.tiles import FAILED
 from server.media.plane import MediaPlane
 from server.recording.recorder import Recorder
+from server.stop_presses import new_press
 from tests.server.fleet.rig import FleetRig, drive_once, running_fleet, running_fleet_rig
 from tests.server.rig import PATIENCE, eventually, reset_by_http, running_bridge, stop_words
 
@@ -94,8 +95,10 @@ async def test_a_stop_at_a_robot_whose_session_has_failed_is_kept_and_done_first
         await faults.back(rig, "left")
         console = rig.session("left").console
         await eventually(lambda: stop_words(console.clock.stop) == ("observer", "smoke"))
-        assert _stops(rig, "left")[0] == ("observer", "http, not delivered yet")
-        await reset_by_http(rig.http, "/robots/left/api/reset", rig.token("operator"), lambda: console.clock.stop)
+        await eventually(lambda: bool(_stops(rig, "left")))
+        number = console.clock.stop.number
+        assert _stops(rig, "left")[0] == ("observer", f"http, sent again, stop {number}")
+        await reset_by_http(rig.http, "/robots/left/api/reset", rig.token("supervisor"), lambda: console.clock.stop)
 
 
 async def test_who_may_not_stop_a_robot_may_not_while_its_session_has_failed(faults: Faults) -> None:
@@ -116,13 +119,18 @@ async def test_a_stop_that_the_robot_has_not_heard_of_outlives_a_session_that_fa
             await rig.all_reached()
             await first.close()
             await eventually(lambda: not rig.session("left").console.robot.up)
-            rig.session("left").console.stop(Actor("Ann"), "stop", "smoke")
+            rig.session("left").console.stops.stop(new_press(Actor("Ann"), "stop", "smoke", "p"))
             await faults.end(rig, "left")
             async with running_bridge(port):
                 await faults.back(rig, "left")
                 clock = rig.session("left").console.clock
-                await eventually(lambda: stop_words(clock.stop) == ("Ann", "smoke"))
-                assert ("Ann", "restart, not delivered yet") in _stops(rig, "left")
+                await eventually(lambda: clock.stop.stopped)
+                assert (clock.stop.by, clock.stop.reason, clock.stop.press) == ("Ann", "smoke", "p")
+                stops = _stops(rig, "left")
+                assert stops == [
+                    ("Ann", "stop, not delivered yet"),
+                    ("Ann", f"stop, sent again, stop {clock.stop.number}"),
+                ]
 
 
 async def test_a_robot_whose_directory_cannot_be_made_is_without_a_session_and_the_others_run(tmp_path: Path) -> None:

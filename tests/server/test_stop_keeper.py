@@ -1,0 +1,112 @@
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from robot_bridge.protocol.messages import StopTaken
+from server import stop_keeper
+from server.kept_stops import KeptStops
+from server.stop_keeper import StopKeeper
+from server.stop_presses import Press
+from tests.server.rig import PATIENCE
+
+ROBOT = "tcp://127.0.0.1:1"
+
+
+@asynccontextmanager
+async def _running(directory: Path) -> AsyncIterator[StopKeeper]:
+    keeper = StopKeeper(directory, ROBOT)
+    await keeper.load()
+    task = asyncio.create_task(keeper.run())
+    try:
+        yield keeper
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+def _on_disk(directory: Path) -> int:
+    return len(list(directory.rglob("*.json")))
+
+
+def _pressed(keeper: StopKeeper, name: str) -> Press:
+    press = Press(id=name, reason="smoke")
+    keeper.presses.press(press)
+    return press
+
+
+async def test_a_stop_that_is_kept_is_on_the_disk_and_pending_in_the_next_run_until_it_is_answered(
+    tmp_path: Path,
+) -> None:
+    async with _running(tmp_path) as keeper:
+        keeper.keep(_pressed(keeper, "a"))
+        assert await keeper.written("a") == ""
+        assert _on_disk(tmp_path) == 1
+    async with _running(tmp_path) as keeper:
+        assert keeper.presses.pending == [Press(id="a", reason="smoke")]
+        keeper.presses.taken(StopTaken(press="a", number=1))
+        keeper.settled("a")
+        async with asyncio.timeout(PATIENCE):
+            while _on_disk(tmp_path):  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+    async with _running(tmp_path) as keeper:
+        assert keeper.presses.pending == []
+
+
+async def test_what_was_answered_meanwhile_is_not_kept(tmp_path: Path) -> None:
+    async with _running(tmp_path) as keeper:
+        press = _pressed(keeper, "a")
+        keeper.presses.taken(StopTaken(press="a", number=1))
+        keeper.keep(press)
+        assert await keeper.written("a") == ""
+        assert _on_disk(tmp_path) == 0
+
+
+async def test_what_has_no_answer_when_the_console_ends_is_written_then(tmp_path: Path) -> None:
+    async with _running(tmp_path) as keeper:
+        await asyncio.sleep(0)
+        _pressed(keeper, "a")
+    assert _on_disk(tmp_path) == 1
+
+
+async def test_a_disk_that_does_not_take_stops_is_told_of_and_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop_keeper, "RETRY_SECONDS", 0.01)
+    keep, fails = KeptStops.keep, True
+
+    def fail(files: KeptStops, press: Press) -> None:
+        if fails:
+            raise OSError(28, "No space left on device")
+        keep(files, press)
+
+    monkeypatch.setattr(KeptStops, "keep", fail)
+    async with _running(tmp_path) as keeper:
+        told: list[str] = []
+        again = asyncio.Event()
+
+        def tell(trouble: str) -> None:
+            told.append(trouble)
+            if not trouble:
+                again.set()
+
+        keeper.on_trouble = tell
+        keeper.keep(_pressed(keeper, "a"))
+        assert await keeper.written("a") == "No space left on device"
+        fails = False
+        async with asyncio.timeout(PATIENCE):
+            await again.wait()
+        assert told == ["No space left on device", ""]
+        assert await keeper.written("a") == ""
+        assert _on_disk(tmp_path) == 1
+
+
+async def test_a_disk_that_hangs_holds_up_nobody_who_pressed_for_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop_keeper, "WRITE_PATIENCE", 0.01)
+    keeper = StopKeeper(tmp_path, ROBOT)  # nobody runs it
+    keeper.keep(_pressed(keeper, "a"))
+    assert await keeper.written("a") == "the disk has not answered"

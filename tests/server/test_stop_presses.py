@@ -1,0 +1,91 @@
+from robot_bridge.protocol.messages import Stop, StopTaken
+from server.audit import Actor
+from server.stop_presses import (
+    MAX_PENDING,
+    MAX_REMEMBERED,
+    MAX_SAME,
+    AlreadyTaken,
+    NewPress,
+    Press,
+    Settled,
+    StopPresses,
+    UnderWay,
+    new_press,
+)
+
+
+def _press(name: str) -> Press:
+    return Press(id=name, by=Actor("Ann"), where="http", reason="smoke")
+
+
+def _ids(presses: StopPresses) -> list[str]:
+    return [press.id for press in presses.pending]
+
+
+def test_a_press_is_pending_until_the_robot_answers_it_and_in_the_order_of_pressing() -> None:
+    presses = StopPresses()
+    assert presses.press(_press("a")) == NewPress(_press("a"), None)
+    presses.press(_press("b"))
+    assert _ids(presses) == ["a", "b"]
+    assert _press("a").message() == Stop(by="Ann", reason="smoke", press="a")
+    assert presses.outcome("a") is None
+    taken = StopTaken(press="a", number=5)
+    assert presses.taken(taken) == [Settled(_press("a"), taken)]
+    assert (_ids(presses), presses.outcome("a")) == (["b"], taken)
+
+
+def test_a_repeat_has_the_outcome_of_its_first_also_after_it_was_answered() -> None:
+    presses = StopPresses()
+    presses.press(_press("a"))
+    assert presses.press(_press("a")) == UnderWay(_press("a"))
+    taken = StopTaken(press="a", number=5)
+    presses.taken(taken)
+    assert presses.press(_press("a")) == AlreadyTaken(taken)
+    assert presses.taken(taken) == [], "an answer to what was sent twice"
+    assert not presses.pending
+
+
+def test_with_too_many_pending_the_newest_is_replaced_and_has_the_outcome_of_the_one_after_it() -> None:
+    presses = StopPresses()
+    for number in range(MAX_PENDING):
+        presses.press(_press(str(number)))
+    replaced = _press(str(MAX_PENDING - 1))
+    assert presses.press(_press("one more")) == NewPress(_press("one more"), replaced)
+    assert len(presses.pending) == MAX_PENDING
+    assert presses.press(replaced) == UnderWay(_press("one more"))
+    presses.press(_press("and more"))
+    settled = presses.taken(StopTaken(press="and more", number=9))
+    assert [(each.press.id, each.taken.press, each.taken.number) for each in settled] == [
+        (name, name, 9) for name in ("and more", "one more", replaced.id)
+    ]
+    assert presses.press(replaced) == AlreadyTaken(StopTaken(press=replaced.id, number=9))
+
+
+def test_a_flood_of_presses_takes_bounded_memory() -> None:
+    presses = StopPresses()
+    for number in range(3 * (MAX_PENDING + MAX_SAME)):
+        presses.press(_press(str(number)))
+    assert len(presses.pending) == MAX_PENDING
+    newest = presses.pending[-1].id
+    assert len(presses.taken(StopTaken(press=newest, number=1))) == 1 + MAX_SAME
+    for number in range(2 * MAX_REMEMBERED):
+        presses.taken(StopTaken(press=f"t{number}", number=number))
+    assert presses.outcome("t0") is None
+    assert presses.outcome(f"t{2 * MAX_REMEMBERED - 1}") is not None
+    assert not presses.is_pending("100")
+
+
+def test_a_press_is_said_again_to_another_epoch_though_it_was_answered_in_the_last() -> None:
+    presses = StopPresses()
+    presses.press(_press("a"))
+    presses.taken(StopTaken(press="a", number=5))
+    assert presses.again(_press("a"))
+    assert _ids(presses) == ["a"]
+    assert not presses.again(_press("a"))
+
+
+def test_a_press_without_an_id_gets_one_of_its_own() -> None:
+    first, second = (new_press(Actor("Ann"), "http", "") for _ in range(2))
+    assert first.id != second.id
+    assert len(first.id) == 32
+    assert new_press(Actor("Ann"), "http", "", "given").id == "given"
