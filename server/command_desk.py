@@ -161,6 +161,7 @@ class CommandDesk:
             return self._refuse(command, "not_neutral", "send a neutral command first")
         self._in_flight = self._clamped(command, description, self._speed_cap.share(now))
         self._sender, self._sent_event, self._abandoned = peer, command.event, False
+        self._resting = None  # a rest of before does not void this one
         return Forward(self._in_flight)
 
     @property

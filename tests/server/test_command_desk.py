@@ -224,6 +224,13 @@ def test_a_rest_passes_while_a_command_is_in_flight_and_while_stopped() -> None:
     assert bench.desk.rest("me", Rest(event=8)) == ForwardRest(Rest(event=8))
 
 
+def test_a_rest_after_a_command_passes_though_the_same_was_said_before_it() -> None:
+    bench = Bench()
+    assert bench.desk.abandon() == ForwardRest(Rest(event=8))
+    bench.desk.command("me", _command(8, NEUTRAL))
+    assert bench.desk.abandon() == ForwardRest(Rest(event=8))
+
+
 def test_a_rest_that_names_a_far_event_names_the_next_instead() -> None:
     assert Bench().desk.rest("me", Rest(event=1000)) == ForwardRest(Rest(event=8))
 

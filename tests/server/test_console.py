@@ -134,8 +134,16 @@ def test_each_kind_of_message_goes_its_way() -> None:
     ]
     for message in messages:
         connection.link_received("operator", message)
+    assert host.calls[2:] == ["feedback 1", "refusal", "media"]
+
+
+def test_the_answer_to_a_stop_counts_on_both_links() -> None:
+    connection, host = _connection()
+    connection.link_opened("operator", "a", ROBOT)
+    connection.link_opened("media", "a", ROBOT)
     connection.link_received("media", StopTaken(press="p", number=1))
-    assert host.calls[2:] == ["feedback 1", "refusal", "media", "taken p"]
+    connection.link_received("operator", StopTaken(press="q", number=2))
+    assert host.calls[2:] == ["taken p", "taken q"]
 
 
 def test_without_a_link_nothing_is_sent() -> None:
