@@ -9,9 +9,11 @@ from client.errors import (
     ConsoleLost,
     LinkFormatError,
     NoSuchStream,
+    NotArmed,
     Refused,
     SeatRefused,
     SignallingRefused,
+    StopUnconfirmed,
 )
 from client.statistics import ConsoleStatistics, Percentiles, StreamStatistics
 from client.stream import Picture, Sound
@@ -26,11 +28,13 @@ __all__ = [
     "ConsoleStatistics",
     "LinkFormatError",
     "NoSuchStream",
+    "NotArmed",
     "Percentiles",
     "Picture",
     "Refused",
     "SeatRefused",
     "SignallingRefused",
     "Sound",
+    "StopUnconfirmed",
     "StreamStatistics",
 ]

@@ -1,6 +1,7 @@
 """A connected console: messages in and out, seat, stop, heartbeat. `Console` is its public face."""
 
 import asyncio
+import secrets
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -8,7 +9,7 @@ from pathlib import Path
 
 from client.command_gate import CommandGate, Pacing
 from client.driving import Driver
-from client.errors import ConnectFailed, ConsoleError, ConsoleLost, SignallingRefused
+from client.errors import ConnectFailed, ConsoleError, ConsoleLost, SignallingRefused, StopUnconfirmed
 from client.finish import cancel_all, finish
 from client.link import ConsoleLink
 from client.media_gate import GateMode
@@ -36,7 +37,7 @@ from robot_bridge.protocol.console import (
     decode_server_message,
 )
 from robot_bridge.protocol.errors import MessageError
-from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Stop, StopState
+from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Stop, StopState, StopTaken
 
 __all__ = ["Connection", "ConnectionOptions"]
 
@@ -273,7 +274,9 @@ class Connection:
             case RobotState():
                 self._take_robot(message)
             case StopStateNotice():
-                self.session.stop_state = message.stop
+                self.session.stop_shown(message.stop)
+            case StopTaken():
+                self.session.stop_taken(message)
             case Welcome() | Seat() | Participants() | SharedNote():
                 self.session.hear(message)
         self._wake_waiters()
@@ -284,7 +287,7 @@ class Connection:
             return
         if not self._driver.feedback(feedback):
             return
-        self.session.stop_state = feedback.stop
+        self.session.stop_shown(feedback.stop)
         now = self._loop.time()
         self._event_rate.event(feedback.event, now)
         self.feedback_log.append(FeedbackArrival(now, feedback.event))
@@ -301,6 +304,8 @@ class Connection:
     def _take_robot(self, robot: RobotState) -> None:
         self._robot = robot
         if self._driver is not None:
+            if robot.link == "down":
+                self._driver.hold_back("link_down")
             return
         description = robot.description
         rate = min(description.max_event_rate, self.options.event_rate or description.max_event_rate)
@@ -382,19 +387,24 @@ class Connection:
         await self._peer.restart_ice(self.options.connect_seconds)
 
     async def stop(self, reason: str) -> StopState:
-        """Raises ConsoleLost when neither the data channel nor HTTP reached the console."""
-        self._peer.send("stop", Stop(by=self.options.name, reason=reason))
+        """Raises StopUnconfirmed when neither the data channel nor HTTP brought the robot's answer."""
+        press = secrets.token_hex(16)
+        self._peer.send("stop", Stop(by=self.options.name, reason=reason, press=press))
         try:
             async with asyncio.timeout(STOP_SECONDS):
-                await self._until(lambda: self.session.stop_state.stopped)
+                await self._until(lambda: self.session.confirmed(press) is not None)
         except (TimeoutError, ConsoleLost):
-            await self._stop_by_http(reason)
-        return self.session.stop_state
+            await self._stop_by_http(reason, press)
+        if self._driver is not None:
+            self._driver.hold_back("stopped")
+        confirmed = self.session.confirmed(press)
+        if confirmed is None:
+            raise StopUnconfirmed(press, "the stop was not confirmed")
+        return confirmed
 
-    async def _stop_by_http(self, reason: str) -> None:
+    async def _stop_by_http(self, reason: str, press: str) -> None:
         try:
-            await self._peer.stop_by_http(reason)
+            self.session.stop_taken(await self._peer.stop_by_http(reason, press))
         except ConsoleError as error:
-            raise ConsoleLost(f"the stop was not confirmed: {error}") from error
-        if not self.session.stop_state.stopped:
-            self.session.stop_state = StopState(stopped=True, by=self.options.name, reason=reason)
+            if self.session.confirmed(press) is None:  # the channel may have said so meanwhile
+                raise StopUnconfirmed(press, f"the stop was not confirmed: {error}") from error

@@ -3,13 +3,14 @@
 import asyncio
 import math
 from collections.abc import AsyncGenerator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from client.command_gate import GateState, Pacing
 from client.connection import Connection, ConnectionOptions
-from client.errors import CommandError, ConsoleError, ConsoleLost
+from client.errors import CommandError, CommandRefused, ConsoleError, ConsoleLost, NotArmed
 from client.link import parse_link
 from client.media_gate import GateMode
 from client.newest_queue import NewestQueue, QueueClosed
@@ -214,12 +215,16 @@ class Console:
     # Driving
 
     async def take_seat(self) -> None:
-        """Take the control seat: an operator when it is free, a supervisor from whoever holds it.
+        """Take the control seat: an operator when it is free, a supervisor from whoever holds it; and `arm`.
+
+        While the robot is stopped or away the seat is taken, and `arm` is left to you.
 
         Raises:
             SeatRefused: somebody else holds it, or this link is an observer's.
         """
-        await self._live().session.take_seat()
+        connection = self._live()
+        await connection.session.take_seat()
+        await self._arm_if_possible(connection)
 
     async def request_seat(self, seconds: float = 65.0) -> None:
         """Ask whoever holds the control seat for it; returns when it is granted, or at once when it is free.
@@ -229,7 +234,28 @@ class Console:
         Raises:
             SeatRefused: the holder declined, nobody answered, or this link is an observer's.
         """
-        await self._live().session.request_seat(seconds)
+        connection = self._live()
+        await connection.session.request_seat(seconds)
+        await self._arm_if_possible(connection)
+
+    async def _arm_if_possible(self, connection: Connection) -> None:
+        newest = connection.driver.pilot.newest
+        if newest is None or newest.stop.stopped or connection.robot.link == "down":
+            return
+        with suppress(CommandRefused):
+            await connection.driver.arm()
+
+    async def arm(self) -> Feedback:
+        """Let the robot move again, by one neutral command; the feedback that answers it.
+
+        Needed after a stop and its reset, a lost robot link, and whenever the robot says so; taking the seat arms too.
+        Call it when whoever is responsible wants the robot to move on, never as an answer to `NotArmed` alone.
+
+        Raises:
+            CommandRefused: the robot is stopped, this console does not hold the seat, …
+            ConsoleLost: the connection ended.
+        """
+        return await self._live().driver.arm()
 
     def grant(self, peer: str) -> None:
         """Hand the control seat to a peer that asked for it: one of `seat.claims`."""
@@ -253,11 +279,17 @@ class Console:
 
         Raises:
             CommandError: an unknown axis, or a value that is not finite.
+            NotArmed: after a stop, a reset, a lost robot link or a new seat `arm` comes first.
             CommandRefused: the robot is stopped, this console does not hold the seat, …
             ConsoleLost: the connection ended.
         """
         connection = self._live()
-        return await connection.driver.drive(self._command(values))
+        command, pilot = self._command(values), connection.driver.pilot
+        if connection.session.holds_seat and not pilot.ready:
+            if pilot.newest is not None and pilot.newest.stop.stopped:
+                raise CommandRefused("stopped", pilot.newest.stop.reason)
+            raise NotArmed
+        return await connection.driver.drive(command)
 
     def _command(self, values: Mapping[str, float] | Sequence[float]) -> list[float]:
         axes = self.description.axes
@@ -282,19 +314,22 @@ class Console:
     async def stop(self, reason: str = "") -> StopState:
         """Latch the stop, from any role, at any time; over HTTP as well when the data channel does not confirm it.
 
+        Returns when the robot has confirmed this very press, with the number that it got.
+
         Raises:
-            ConsoleLost: neither way reached the console.
+            StopUnconfirmed: the robot has not; the console keeps it if it was reached.
         """
         return await self._live().stop(reason)
 
-    async def reset(self) -> StopState:
-        """Release the latched stop; moves nothing.
+    async def reset(self, number: int | None = None) -> StopState:
+        """Release stop `number`, or the newest that this connection was told of; moves nothing, and `arm` comes next.
 
         Raises:
-            CommandRefused: this link's role does not permit it.
+            CommandRefused: neither holder of the seat nor supervisor, a newer stop (`stale_reset`), less than a second
+                after the stop (`too_soon`), somebody at the robot keeps it (`locked_out`), …
         """
-        connection = self._live()
-        return await connection.session.reset(connection.options.name)
+        session = self._live().session
+        return await session.reset(self._live().options.name, session.newest_stop if number is None else number)
 
     async def note(self, text: str) -> SharedNote:
         """Write a note to everyone; it keeps the event reference of that moment.

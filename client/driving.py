@@ -4,10 +4,10 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from client.errors import CommandRefused, ConsoleLost
+from client.errors import CommandRefused, ConsoleLost, NotArmed
 from client.pilot import Pilot
 from client.statistics import PictureDelay
-from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest
 
 __all__ = ["Driver"]
 
@@ -49,6 +49,7 @@ class Driver:
         """Send `values` as soon as the gate opens; the feedback that answers.
 
         Raises:
+            NotArmed: a neutral command comes first.
             CommandRefused: and another try would be refused as well.
             ConsoleLost: the connection ended.
         """
@@ -56,6 +57,18 @@ class Driver:
         self._waiting.append((self.pilot.intend(values, self._loop.time()), answered))
         self.pump()
         return await answered
+
+    async def arm(self) -> Feedback:
+        """Send a neutral command; the feedback that answers it. Raises as `drive`."""
+        answered: asyncio.Future[Feedback] = self._future()
+        self._waiting.append((self.pilot.arm(), answered))
+        self.pump()
+        return await answered
+
+    def hold_back(self, reason: RefusalReason) -> None:
+        """The robot may not move until somebody arms again."""
+        self.pilot.hold_back(reason)
+        self.pump()
 
     async def rest(self) -> None:
         """Rest at once; returns when the robot is proven to be at rest. Raises ConsoleLost."""
@@ -96,7 +109,7 @@ class Driver:
                 if outcome.feedback is not None:
                     waiting.set_result(outcome.feedback)
                 elif outcome.refusal is not None:
-                    waiting.set_exception(CommandRefused(outcome.refusal.reason, outcome.refusal.detail))
+                    waiting.set_exception(_error(outcome.refusal))
         if not self.pilot.resting:
             for rested in self._rested:
                 if not rested.done():
@@ -113,3 +126,7 @@ class Driver:
         for future in pending:
             if not future.done():
                 future.set_exception(lost)
+
+
+def _error(refusal: Refusal) -> CommandRefused:
+    return NotArmed() if refusal.reason == "not_neutral" else CommandRefused(refusal.reason, refusal.detail)

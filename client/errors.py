@@ -7,8 +7,10 @@ ConsoleError
 ├── SignallingRefused       the console answered WHEP with an error
 ├── ConnectFailed           the console, or the way to it, did not work within the time allowed
 ├── ConsoleLost             an established connection ended; terminal, make a new Console
+├── StopUnconfirmed         the robot has not confirmed a stop; it is not lost, but do not rely on it
 └── Refused                 the console or the robot said no
     ├── CommandRefused      … to a command
+    │   └── NotArmed        … until `await console.arm()`: after a stop, a reset, a lost link, …
     └── SeatRefused         … to the control seat
 """
 
@@ -20,9 +22,11 @@ __all__ = [
     "ConsoleLost",
     "LinkFormatError",
     "NoSuchStream",
+    "NotArmed",
     "Refused",
     "SeatRefused",
     "SignallingRefused",
+    "StopUnconfirmed",
 ]
 
 ADVICE = {
@@ -103,6 +107,25 @@ class Refused(ConsoleError):
 
 class CommandRefused(Refused):
     """The command was not executed, and repeating it would not help."""
+
+
+class NotArmed(CommandRefused):
+    """The robot may not move before a neutral command: call `await console.arm()` when it is safe to go on."""
+
+    def __init__(self) -> None:
+        super().__init__("not_neutral", "the robot was stopped, reset or away, or the seat is new: arm() first")
+
+
+class StopUnconfirmed(ConsoleError):
+    """A stop that the robot has not confirmed. The console keeps it, if it was reached; use the hardware stop.
+
+    Attributes:
+        press: its id; the same press may be said again
+    """
+
+    def __init__(self, press: str, detail: str) -> None:
+        super().__init__(detail)
+        self.press = press
 
 
 class SeatRefused(Refused):

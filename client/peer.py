@@ -45,6 +45,7 @@ from robot_bridge.protocol.carriers import (
     unpack_event_reference,
 )
 from robot_bridge.protocol.console import ClientMessage, encode_console_message
+from robot_bridge.protocol.messages import StopTaken
 
 __all__ = ["ChannelName", "Peer", "Route", "stamp_reader"]
 
@@ -237,9 +238,9 @@ class Peer:
         finally:
             await restart.close()
 
-    async def stop_by_http(self, reason: str) -> None:
+    async def stop_by_http(self, reason: str, press: str) -> StopTaken:
         """The way to stop that needs no data channel; raises as `Whep.stop`."""
-        await self._whep.stop(reason)
+        return await self._whep.stop(reason, press)
 
     async def close(self) -> None:
         """End the connection and say so to the console. Idempotent."""

@@ -6,7 +6,9 @@ and hand out what `outcomes` returns.
 - One command is in flight; its repeats carry the newest intention under the same event number, and answer the newest
   issue of its feedback.
 - Armed and without a new intention for `IDLE`, it sends neutral values at that interval.
-- New in the control seat, the first command is neutral: the console refuses a moving one.
+- A neutral command has to be executed before the robot may move: after taking the seat, a stop, a reset, a lost link,
+  and whenever the robot says so. That lets motion begin again, so only `arm` sends it, which somebody asked for: what
+  was in flight or wanted before is given up, and nothing neutral leaves by itself until then.
 - While the path loses packets every command is followed by `ECHOES` copies, `ECHO` apart, until its answer: a copy
   covers the loss of the command and, being answered from the stored feedback, the loss of the answer too. On a clean
   path nothing is copied.
@@ -22,8 +24,8 @@ from typing import NamedTuple
 from client.command_gate import CommandGate
 from client.repeat_timer import INITIAL, RepeatTimer
 from client.rest_call import RestCall
-from robot_bridge.protocol.messages import Command, Feedback, Refusal, Rest
-from robot_bridge.protocol.serial import event_gap
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest
+from robot_bridge.protocol.serial import FIRST_EVENT, event_gap
 
 __all__ = ["Outcome", "Pilot"]
 
@@ -35,7 +37,7 @@ SALVO = 12
 SALVO_SPACING = 0.003  # s
 SALVO_LEAST = 0.050  # s; with a shorter interval single repeats are as quick
 LOSSY_SPELL = 60.0  # s to go on copying after the last loss that was seen
-PATIENT_REASONS = {"late", "out_of_order", "rested", "not_neutral"}  # another try, on fresh feedback, can succeed
+PATIENT_REASONS = {"late", "out_of_order", "rested", "unseen", "warning"}  # another try, on fresh feedback, can succeed
 NEEDLESS = 0.75  # an answer within this part of a ping's round trip after the last repeat answers an earlier sending
 NEEDLESS_BLIND = 0.25  # of the whole wait, while no ping is known
 PINGS = 8  # of which the shortest counts
@@ -62,8 +64,9 @@ class _Want(Enum):
 class _Flight:
     """The command that was sent and not answered."""
 
-    def __init__(self, command: Command, want: _Want, ticket: int, now: float) -> None:
+    def __init__(self, command: Command, want: _Want, ticket: int, now: float, *, neutral: bool) -> None:
         self.command = command
+        self.neutral = neutral  # all that it asks for is rest
         self.want = want
         self.ticket = ticket  # of the intention it was sent for
         self.issue = command.issue  # that the last sending answered
@@ -83,6 +86,7 @@ class Pilot:
         self.gate = gate
         self.timer = RepeatTimer()
         self.armed = False
+        self.ready = False  # whether the robot may move: a neutral command was executed since one was last needed
         self.newest: Feedback | None = None
         self.repeats = 0  # sent because no answer came in time
         self.echoes = 0  # sent because the path loses packets
@@ -97,7 +101,8 @@ class Pilot:
         self._lossy_until = float("-inf")
         self._pings: deque[float] = deque(maxlen=PINGS)  # round trips; none of a command is shorter
         self._void: int | None = None  # an event that only neutral values may use
-        self._unproven = False  # this console has the seat and no neutral command of it was answered yet
+        self._arming = False  # that command is wanted, or on its way
+        self._stop_number: int | None = None  # of the newest stop seen; None before the first feedback
         self._used_up: tuple[int, int] | None = None  # a feedback that can no longer be answered
         self._moved = False  # values were sent since the robot was last proven to be at rest
         self._rest: RestCall | None = None
@@ -114,6 +119,7 @@ class Pilot:
             self._void = None
         if self._flight is not None and event_gap(feedback.event, self._flight.command.event) >= 0:
             self._landed(self._flight, feedback, now)
+        self._look_for_stops(feedback)
         if self._rest is not None and self._rest.proven_by(feedback, now):
             self._rest = None
             self._moved = False
@@ -121,7 +127,28 @@ class Pilot:
 
     def seated(self) -> None:
         """This console holds the control seat from now on."""
-        self._unproven = True
+        self.hold_back("not_neutral")
+
+    def hold_back(self, reason: RefusalReason) -> None:
+        """The robot may not move until somebody arms again: gives up what is wanted or in flight, for `reason`."""
+        self.ready = False
+        if self._arming and reason == "not_neutral":
+            return  # that is what it is for
+        self.armed = self._arming = False
+        self._want = _Want.NOTHING
+        if self._flight is not None:
+            self.gate.refused(self._flight.command.event)
+            self._flight = None
+        current = FIRST_EVENT if self.newest is None else self.newest.event
+        self._outcomes.append(Outcome(self._ticket, None, Refusal(event=current, reason=reason, current=current)))
+
+    def _look_for_stops(self, feedback: Feedback) -> None:
+        known, self._stop_number = self._stop_number, feedback.stop.number
+        if feedback.stop.stopped:
+            if self.ready or self._arming or self._flight is not None or self._want is not _Want.NOTHING:
+                self.hold_back("stopped")
+        elif self.ready and (feedback.neutral_needed or known not in (None, feedback.stop.number)):
+            self.hold_back("not_neutral")
 
     def refusal(self, refusal: Refusal) -> None:
         """Take a refusal. Those that fresh feedback can cure lead to another try, the others to an outcome."""
@@ -131,18 +158,16 @@ class Pilot:
         self._flight = None
         if refusal.reason == "rested":
             self._void = flight.command.event
-        elif refusal.reason == "not_neutral":
-            self._unproven = True
         elif refusal.reason in PATIENT_REASONS and self.newest is not None:
             self._used_up = (self.newest.event, flight.issue)
         if refusal.reason not in PATIENT_REASONS:
             self._want = _Want.NOTHING
-            self.armed = False
+            self.armed = self._arming = self.ready = False
             self._outcomes.append(Outcome(self._ticket, None, refusal))
-        elif self.armed:
+        elif self.armed or self._arming:
             self._want = max(self._want, flight.want, key=lambda want: want.value)
         else:
-            self._want = _Want.NEUTRAL
+            self._want = _Want.NEUTRAL if self.ready else _Want.NOTHING
             self._outcomes.append(Outcome(flight.ticket, None, refusal))
 
     def shown(self, stamp: int) -> None:
@@ -171,9 +196,18 @@ class Pilot:
         self._ticket += 1
         return self._ticket
 
+    def arm(self) -> int:
+        """Send a neutral command, after which the robot may move. Returns a ticket, whose outcome is its feedback."""
+        self._rest = None
+        self._arming = True
+        self._values = list(self._neutral)
+        self._want = _Want.VALUES
+        self._ticket += 1
+        return self._ticket
+
     def rest(self, now: float) -> None:
         """Let go: rest at once, until it is proven; one neutral command; then silence. Disarms."""
-        self.armed = False
+        self.armed = self._arming = False
         self._values = list(self._neutral)
         if self._rest is not None:
             return
@@ -185,7 +219,7 @@ class Pilot:
             return
         event = self._flight.command.event if self._flight is not None else self.newest.event
         self._rest = RestCall(Rest(event=event), once=not self._moved, now=now)
-        self._want = _Want.NEUTRAL if self._moved else _Want.NOTHING
+        self._want = _Want.NEUTRAL if self._moved and self.ready else _Want.NOTHING
 
     @property
     def resting(self) -> bool:
@@ -231,7 +265,8 @@ class Pilot:
         event, issue = self.gate.next()
         want = _Want.NEUTRAL if self._only_neutral(event) else self._want
         command = Command(event=event, issue=issue, values=self._values_for(want), nonce=self._nonce)
-        flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now)
+        neutral = command.values == self._neutral
+        flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now, neutral=neutral)
         flight.repeat_at = now + self._wait(1)
         if now < self._lossy_until:
             flight.echo_at, flight.echoes_left = now + ECHO, ECHOES
@@ -288,7 +323,7 @@ class Pilot:
         return INITIAL if len(self.samples) < FEW_SAMPLES else 0.0
 
     def _only_neutral(self, event: int) -> bool:
-        return self._unproven or event == self._void
+        return event == self._void
 
     def _values_for(self, want: _Want) -> list[float]:
         return self._values if want is _Want.VALUES else self._neutral
@@ -297,7 +332,7 @@ class Pilot:
 
     def _landed(self, flight: _Flight, feedback: Feedback, now: float) -> None:
         self._flight = None
-        self._unproven = False  # whatever it carried, the console let it pass
+        self._prove(flight, feedback)
         taken = now - flight.first_sent_at
         self.samples.append(taken)
         soonest = NEEDLESS * min(self._pings) if self._pings else NEEDLESS_BLIND * taken
@@ -306,9 +341,20 @@ class Pilot:
             self.timer.sample(taken)  # echoes make a sample too long at times, which is the safe side
         else:
             self.loss(now)  # and no sample, by Karn's rule
-        if flight.ticket:
+        if flight.ticket and not self._arming:
             self._outcomes.append(Outcome(flight.ticket, feedback, None))
             self._idle_at = max(self._idle_at, now + TURN)
+
+    def _prove(self, flight: _Flight, feedback: Feedback) -> None:
+        """Whether the robot may move now. Something that came in between asks for one more neutral command."""
+        if feedback.stop.stopped or (not self.ready and not self._arming):
+            return
+        if feedback.neutral_needed:
+            if self._arming:
+                self._want = _Want.VALUES
+            return
+        if flight.neutral:
+            self.ready, self._arming = True, False
 
     def _is_used_up(self) -> bool:
         newest = self.newest

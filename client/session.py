@@ -19,7 +19,7 @@ from robot_bridge.protocol.console import (
     SharedNote,
     Welcome,
 )
-from robot_bridge.protocol.messages import Refusal, Reset, StopState
+from robot_bridge.protocol.messages import Refusal, Reset, StopState, StopTaken
 
 __all__ = ["Session"]
 
@@ -44,6 +44,8 @@ class Session:
         self.welcome: Welcome | None = None
         self.seat = Seat()
         self.stop_state = StopState()
+        self.taken: dict[str, StopTaken] = {}  # answers to presses of this connection
+        self.newest_stop = 0  # number of the newest stop that this connection was told of
         self.participants = Participants(participants=[])
         self.notes: deque[SharedNote] = deque(maxlen=KEPT_NOTES)
         self.seated: Callable[[], None] = _ignore
@@ -75,6 +77,25 @@ class Session:
                 held, self.seat = self.holds_seat, message
                 if self.holds_seat and not held:
                     self.seated()
+
+    def stop_shown(self, stop: StopState) -> None:
+        """What the robot says of its stop now."""
+        self.stop_state = stop
+        self.newest_stop = max(self.newest_stop, stop.number)
+
+    def stop_taken(self, taken: StopTaken) -> None:
+        """The robot's answer to a press."""
+        if len(self.taken) >= KEPT_NOTES:
+            del self.taken[next(iter(self.taken))]
+        self.taken[taken.press] = taken
+        self.newest_stop = max(self.newest_stop, taken.number)
+
+    def confirmed(self, press: str) -> StopState | None:
+        """The stop that `press` became; None as long as nothing says so that was said of this press."""
+        taken, shown = self.taken.get(press), self.stop_state
+        if shown.press == press:
+            return shown
+        return None if taken is None else StopState(stopped=True, number=taken.number, press=press, kept=taken.kept)
 
     def refused(self, refusal: Refusal) -> None:
         """A refusal that names no event."""
@@ -116,18 +137,21 @@ class Session:
             raise CommandRefused(*(("declined", "") if refusal is None else (refusal.reason, refusal.detail)))
         return note
 
-    async def reset(self, by: str) -> StopState:
-        """The stop that was the newest when this was called, and no later one. Raises CommandRefused."""
-        reset = Reset(by=by, number=self.stop_state.number)
+    async def reset(self, by: str, number: int) -> StopState:
+        """Release stop `number`, and no later one; waits where it is too soon. Raises CommandRefused."""
+        reset = Reset(by=by, number=number)
         loop = asyncio.get_running_loop()
         until = loop.time() + ANSWER_SECONDS
         while True:
-            refusal = await self._ask(lambda: not self.stop_state.stopped, "stop", reset, ANSWER_SECONDS)
+            refusal = await self._ask(lambda: self._is_released(number), "stop", reset, ANSWER_SECONDS)
             if refusal is None:
                 return self.stop_state
             if refusal.reason != "too_soon" or loop.time() > until:
                 raise CommandRefused(refusal.reason, refusal.detail)
             await asyncio.sleep(RESET_AGAIN)
+
+    def _is_released(self, number: int) -> bool:
+        return not self.stop_state.stopped and self.stop_state.number == number
 
     async def _seat(self, message: SeatRequest | SeatTake, seconds: float) -> None:
         refusal = await self._ask(lambda: self.holds_seat, "session", message, seconds)

@@ -17,7 +17,7 @@ from client.relay import RelayTicket
 from client.sdp import Section
 from client.whep import Whep
 from robot_bridge.protocol.console import ClientMessage, Report, encode_console_message
-from robot_bridge.protocol.messages import Ping
+from robot_bridge.protocol.messages import Ping, StopTaken
 
 __all__ = ["LineBlocked", "WatchLine"]
 
@@ -124,9 +124,9 @@ class WatchLine:
         """Raises ConnectFailed: there is no ICE in TCP."""
         raise ConnectFailed("this observer's line to the console is TCP: another path takes another Console")
 
-    async def stop_by_http(self, reason: str) -> None:
+    async def stop_by_http(self, reason: str, press: str) -> StopTaken:
         """The way to stop that needs no line; raises as `Whep.stop`."""
-        await self._whep.stop(reason)
+        return await self._whep.stop(reason, press)
 
     async def close(self) -> None:
         """Idempotent."""

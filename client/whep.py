@@ -13,6 +13,7 @@ from aiortc import RTCIceServer
 from client.errors import ConnectFailed, SignallingRefused
 from client.link import ConsoleLink
 from client.relay import RelayTicket
+from robot_bridge.protocol.messages import StopTaken
 
 __all__ = ["Answer", "Whep"]
 
@@ -38,6 +39,10 @@ class _WatchTicket(msgspec.Struct):
     ticket: str
 
 
+class _StopAnswer(msgspec.Struct):
+    number: int
+
+
 class _RelayAnswer(msgspec.Struct):
     relay: RelayTicket | None
 
@@ -49,6 +54,7 @@ class _Problem(msgspec.Struct):
 
 _ice_servers = msgspec.json.Decoder(_IceServers)
 _watch_ticket = msgspec.json.Decoder(_WatchTicket)
+_stop_answer = msgspec.json.Decoder(_StopAnswer)
 _relay_answer = msgspec.json.Decoder(_RelayAnswer)
 _problem = msgspec.json.Decoder(_Problem)
 
@@ -133,9 +139,13 @@ class Whep:
         """End the session; raises as `offer`."""
         await self._request("DELETE", resource)
 
-    async def stop(self, reason: str) -> None:
-        """Latch the stop by HTTP; raises as `offer`."""
-        await self._request("POST", self._base + "/api/stop", json={"reason": reason})
+    async def stop(self, reason: str, press: str) -> StopTaken:
+        """Latch the stop by HTTP; raises as `offer`, also when the robot has not confirmed it."""
+        answer = await self._request("POST", self._base + "/api/stop", json={"reason": reason, "press": press})
+        try:
+            return StopTaken(press=press, number=_stop_answer.decode(answer.content).number)
+        except msgspec.DecodeError as error:
+            raise SignallingRefused(answer.status_code, "", "not an answer to a stop") from error
 
     async def _request(self, method: str, url: str, **arguments: object) -> httpx.Response:
         try:
