@@ -23,7 +23,7 @@ from robot_bridge.protocol.messages import Refusal, Reset, StopState, StopTaken
 
 __all__ = ["Session"]
 
-RESET_AGAIN = 0.25  # s between two tries while the stop is too new
+RESET_AGAIN = 0.5  # s between two tries while the stop is too new
 ANSWER_SECONDS = 5.0  # for the console to answer a request
 KEPT_NOTES = 100
 

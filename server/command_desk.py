@@ -170,9 +170,13 @@ class CommandDesk:
         return bool(self._presses.pending) or self._newest_stop > self._shown_stop
 
     def moves(self, command: Command) -> bool:
-        """Whether `command` is an intention to move."""
-        axes = () if self._description is None else self._description.axes
-        return any(value != axis.rest for value, axis in zip(command.values, axes, strict=False))
+        """Whether `command` is an intention to move; a light or horn that warns before motion is none."""
+        description = self._description
+        if description is None:
+            return False
+        signal = "" if description.start_warning is None else description.start_warning.axis
+        axes = zip(command.values, description.axes, strict=False)
+        return any(value != axis.rest and axis.name != signal for value, axis in axes)
 
     def rest(self, peer: str, rest: Rest) -> RestOutcome:
         """A rest of the holder always passes. One that names an event that is far ahead names the next instead."""

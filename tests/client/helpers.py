@@ -3,8 +3,24 @@
 from robot_bridge.protocol.messages import Feedback, Refusal, RefusalReason, StopState
 
 
-def feedback(event: int, issue: int = 1, *, at_rest: bool = True, stopped: bool = False) -> Feedback:
-    return Feedback(event=event, issue=issue, time=0.0, axes=[0.0], at_rest=at_rest, stop=StopState(stopped=stopped))
+def feedback(
+    event: int,
+    issue: int = 1,
+    *,
+    at_rest: bool = True,
+    stopped: bool = False,
+    stop: StopState | None = None,
+    neutral_needed: bool = False,
+) -> Feedback:
+    return Feedback(
+        event=event,
+        issue=issue,
+        time=0.0,
+        axes=[0.0],
+        at_rest=at_rest,
+        stop=stop or StopState(stopped=stopped),
+        neutral_needed=neutral_needed,
+    )
 
 
 def refusal(event: int, reason: RefusalReason, current: int = 1) -> Refusal:

@@ -12,6 +12,7 @@ NEUTRAL = [0.0]
 def new_pilot(event: int = 1, min_interval: float = 0.0) -> Pilot:
     pilot = Pilot(CommandGate("feedback", 4, min_interval), NEUTRAL)
     pilot.feedback(feedback(event), 0.0)
+    pilot.ready = True
     return pilot
 
 

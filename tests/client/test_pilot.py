@@ -1,3 +1,4 @@
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
@@ -6,7 +7,7 @@ from client.command_gate import CommandGate
 from client.pilot import IDLE, TURN, Pilot
 from client.repeat_timer import INITIAL
 from client.rest_call import SETTLE
-from robot_bridge.protocol.messages import Command, Rest
+from robot_bridge.protocol.messages import Command, Feedback, Rest, StopState
 from robot_bridge.protocol.serial import MAX_EVENT, event_after
 from tests.client.helpers import feedback, refusal
 from tests.client.pilots import FAST, NEUTRAL, commands, flying, new_pilot, rests
@@ -154,27 +155,85 @@ def test_an_event_voided_by_a_rest_is_used_up_by_a_neutral_command_first() -> No
     assert [outcome.ticket for outcome in pilot.outcomes()] == [ticket]
 
 
-def test_new_in_the_seat_the_first_command_is_neutral_and_the_intention_follows() -> None:
+def test_arming_sends_one_neutral_command_and_is_done_with_its_feedback() -> None:
     pilot = new_pilot()
     pilot.seated()
-    ticket = pilot.intend(FAST, 0.0)
-    assert pilot.due(0.0) == [Command(event=2, issue=1, values=NEUTRAL)]
-    assert pilot.due(INITIAL) == [Command(event=2, issue=1, values=NEUTRAL)], "its repeat as well"
+    assert not pilot.ready
+    assert pilot.due(0.0) == []
+    ticket = pilot.arm()
+    assert [(each.event, each.values) for each in commands(pilot.due(0.0))] == [(2, NEUTRAL)]
+    assert [(each.event, each.values) for each in commands(pilot.due(INITIAL))] == [(2, NEUTRAL)], "its repeat as well"
+    assert not pilot.ready
     pilot.feedback(feedback(2), INITIAL)
-    assert pilot.outcomes() == [], "the neutral one was nobody's"
-    assert [(each.event, each.values) for each in commands(pilot.due(INITIAL))] == [(3, FAST)]
-    pilot.feedback(feedback(3), 0.3)
-    assert [each.ticket for each in pilot.outcomes()] == [ticket]
+    assert [each.ticket for each in pilot.outcomes() if each.feedback is not None] == [ticket]
+    assert pilot.ready
+    assert not pilot.armed, "nothing more leaves by itself"
+    assert pilot.due(10.0) == []
 
 
-def test_a_console_that_asks_for_a_neutral_command_first_gets_one() -> None:
+def test_arming_goes_on_over_a_refusal_that_fresh_feedback_cures_and_until_the_robot_asks_for_nothing_more() -> None:
+    pilot = new_pilot()
+    pilot.seated()
+    pilot.arm()
+    pilot.due(0.0)
+    pilot.refusal(refusal(2, "late"))
+    pilot.feedback(feedback(1, 2, neutral_needed=True), 0.01)
+    assert [each.event for each in commands(pilot.due(0.01))] == [2]
+    pilot.feedback(feedback(2, neutral_needed=True), 0.02)
+    assert not pilot.ready
+    assert [each.event for each in commands(pilot.due(0.02))] == [3]
+    pilot.feedback(feedback(3), 0.03)
+    assert pilot.ready
+
+
+def _again(what: str) -> Feedback:
+    """Feedback 1 measured again, after a stop, its reset, or something else."""
+    stops = {"stopped": StopState(stopped=True, number=1), "reset": StopState(number=1), "asked": StopState()}
+    return feedback(1, 2, stop=stops[what], neutral_needed=what == "asked")
+
+
+@pytest.mark.parametrize("what", ["stopped", "reset", "asked"])
+@pytest.mark.parametrize("doing", ["driving", "idle", "resting", "wanting"])
+def test_after_a_stop_or_whatever_else_asks_for_it_nothing_leaves_by_itself_that_lets_the_robot_move(
+    what: str, doing: str
+) -> None:
+    pilot = new_pilot()
+    ticket = pilot.intend(FAST, 0.0)
+    if doing != "wanting":
+        pilot.due(0.0)
+    if doing in ("idle", "resting"):
+        pilot.feedback(feedback(1, 1), 0.01)
+        pilot.intend(NEUTRAL, 0.01)
+    pilot.feedback(_again(what), 0.02)
+    if doing == "resting":
+        pilot.rest(0.02)
+    assert not pilot.ready
+    assert not pilot.armed
+    refused = [each for each in pilot.outcomes() if each.refusal is not None]
+    assert refused
+    assert refused[-1].ticket >= ticket
+    for now in (0.02, 0.1, 0.3, 1.0, 5.0):
+        assert commands(pilot.due(now)) == [], "neither a repeat, nor an idle command, nor one after a rest"
+        pilot.feedback(feedback(1, 3 + int(now)), now)
+    pilot.arm()
+    assert [each.values for each in commands(pilot.due(6.0))] == [NEUTRAL]
+
+
+def test_a_refusal_for_want_of_a_neutral_command_is_an_outcome_and_no_reason_to_send_one() -> None:
     pilot = new_pilot()
     flying(pilot)
     pilot.refusal(refusal(2, "not_neutral"))
-    assert pilot.armed
-    assert pilot.due(0.01) == [Command(event=2, issue=1, values=NEUTRAL)]
-    pilot.feedback(feedback(2), 0.02)
-    assert [(each.event, each.values) for each in commands(pilot.due(0.02))] == [(3, FAST)]
+    assert [each.refusal.reason for each in pilot.outcomes() if each.refusal] == ["not_neutral"]
+    assert pilot.due(1.0) == []
+
+
+def test_a_stop_ends_arming() -> None:
+    pilot = new_pilot()
+    pilot.seated()
+    ticket = pilot.arm()
+    pilot.feedback(_again("stopped"), 0.0)
+    assert [(each.ticket, each.refusal.reason) for each in pilot.outcomes() if each.refusal][-1] == (ticket, "stopped")
+    assert pilot.due(1.0) == []
 
 
 def test_rest_leaves_at_once_past_the_shut_gate_and_names_the_event_in_flight() -> None:
