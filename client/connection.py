@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from msgspec.structs import replace as replace_struct
+
 from client.command_gate import CommandGate, Pacing
 from client.driving import Driver
 from client.errors import ConnectFailed, ConsoleError, ConsoleLost, SignallingRefused, StopUnconfirmed
@@ -400,7 +402,7 @@ class Connection:
         confirmed = self.session.confirmed(press)
         if confirmed is None:
             raise StopUnconfirmed(press, "the stop was not confirmed")
-        return confirmed
+        return replace_struct(confirmed, by=confirmed.by or self.options.name, reason=confirmed.reason or reason)
 
     async def _stop_by_http(self, reason: str, press: str) -> None:
         try:

@@ -158,7 +158,7 @@ async def reset_spam(target: Target, random: Random) -> None:
         for _ in range(100):
             peer.send("stop", encode_console_message(Reset(by="the crowd")))
             await asyncio.sleep(0.01)
-        await asyncio.gather(*(target.ask("POST", "/api/reset") for _ in range(5)))
+        await asyncio.gather(*(target.ask("POST", "/api/reset", '{"number": 1}') for _ in range(5)))
 
 
 async def slow_reader(target: Target, random: Random) -> None:

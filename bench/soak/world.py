@@ -108,7 +108,7 @@ class World:
             try:
                 stopped = await http.post("/api/stop", headers=_bearer(self.observer), json={"reason": "soak"})
                 await asyncio.sleep(seconds)
-                await http.post("/api/reset", headers=_bearer(self.operator))
+                await self._reset(http)
             except httpx.TransportError:
                 return False
             return stopped.is_success
@@ -118,13 +118,20 @@ class World:
         async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
             while True:
                 try:
-                    session = await http.get("/api/session", headers=_bearer(self.operator))
-                    if session.is_success and not session.json()["stopped"]:
+                    if await self._reset(http):
                         return
-                    await http.post("/api/reset", headers=_bearer(self.operator))
                 except httpx.TransportError:
                     pass
-                await asyncio.sleep(0.5)
+                await asyncio.sleep(1.0)
+
+    async def _reset(self, http: httpx.AsyncClient) -> bool:
+        """Ask for the reset of the newest stop, by the link of whoever holds the seat; whether none holds."""
+        session = await http.get("/api/session", headers=_bearer(self.operator))
+        if not session.is_success or not session.json()["stopped"]:
+            return session.is_success
+        number = session.json()["stop"]["number"]
+        await http.post("/api/reset", headers=_bearer(self.operator), json={"number": number})
+        return False
 
     # What is measured
 

@@ -10,6 +10,7 @@ from client import (
     Console,
     ConsoleLost,
     NoSuchStream,
+    NotArmed,
     SeatRefused,
     SignallingRefused,
 )
@@ -124,10 +125,13 @@ async def test_a_stop_from_an_observer_latches_until_an_operator_resets(stack: S
         with pytest.raises(CommandRefused, match="not_allowed"):
             await observer.reset()
         stopped = operator.feedback
-        assert not (await operator.reset()).stopped
+        assert not (await operator.reset(state.number)).stopped
         assert stopped is not None
-        feedback = await operator.drive([0.0, 0.0, 0.0])
-        assert feedback.event == stopped.event + 1
+        with pytest.raises(NotArmed):
+            await operator.drive([0.0, 0.0, 0.0])
+        feedback = await operator.arm()
+        assert (feedback.event, feedback.at_rest) == (stopped.event + 1, True)
+        assert (await operator.drive([0.1, 0.0, 0.0])).event == stopped.event + 2
 
 
 async def test_a_script_that_says_nothing_sends_neutral_and_then_rests(stack: Stack) -> None:

@@ -163,11 +163,9 @@ def test_arming_sends_one_neutral_command_and_is_done_with_its_feedback() -> Non
     ticket = pilot.arm()
     assert [(each.event, each.values) for each in commands(pilot.due(0.0))] == [(2, NEUTRAL)]
     assert [(each.event, each.values) for each in commands(pilot.due(INITIAL))] == [(2, NEUTRAL)], "its repeat as well"
-    assert not pilot.ready
     pilot.feedback(feedback(2), INITIAL)
     assert [each.ticket for each in pilot.outcomes() if each.feedback is not None] == [ticket]
-    assert pilot.ready
-    assert not pilot.armed, "nothing more leaves by itself"
+    assert (pilot.ready, pilot.armed) == (True, False), "nothing more leaves by itself"
     assert pilot.due(10.0) == []
 
 

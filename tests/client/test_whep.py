@@ -65,7 +65,7 @@ async def test_an_error_keeps_its_name_and_detail() -> None:
 async def test_an_error_that_is_not_ours_is_reported_as_it_is() -> None:
     async with http_server(answer("502 Bad Gateway", "<html>")) as (link, _), Whep(parse_link(link)) as whep:
         with pytest.raises(SignallingRefused, match="502: <html>"):
-            await whep.stop("")
+            await whep.stop("", "p")
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,7 @@ def pilot_after_driving() -> tuple[Pilot, float]:
     """A client's pilot that has driven event 2 and got its feedback, and now."""
     pilot = Pilot(CommandGate("feedback", 4, 0.0), NEUTRAL)
     pilot.feedback(Feedback(event=1, issue=1, time=0.0, axes=NEUTRAL), 0.0)
+    pilot.ready = True
     pilot.intend(DRIVE, 0.0)
     assert [message.values for message in pilot.due(0.0) if isinstance(message, Command)] == [DRIVE]
     pilot.feedback(Feedback(event=2, issue=1, time=0.0, axes=DRIVE, at_rest=False), 0.05)

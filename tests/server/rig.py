@@ -180,11 +180,11 @@ def stop_words(stop: StopState) -> tuple[str, str] | None:
 async def reset_by_http(
     http: httpx.AsyncClient, path: str, headers: dict[str, str], stop: Callable[[], StopState]
 ) -> None:
-    """Reset until the stop is released: the bridge takes none within a second of it."""
+    """Reset until the stop is released: the bridge takes none within a second of it. `headers`: a supervisor's."""
     async with asyncio.timeout(PATIENCE):
         while stop().stopped:
-            await http.post(path, headers=headers)
-            await asyncio.sleep(0.1)
+            await http.post(path, headers=headers, json={"number": stop().number})
+            await asyncio.sleep(0.4)
 
 
 @asynccontextmanager

@@ -47,16 +47,26 @@ async def test_the_session_tells_what_is_going_on() -> None:
         assert session["description"]["axes"]
 
 
-async def test_an_observer_can_stop_and_only_an_operator_can_reset() -> None:
+async def test_an_observer_can_stop_and_only_the_holder_of_the_seat_or_a_supervisor_can_reset() -> None:
     async with running_rig() as rig:
         answer = await rig.http.post("/api/stop", headers=rig.token("observer"), json={"reason": "dog in the room"})
         assert (answer.status_code, answer.json()["delivered"]) == (200, True)
         assert stop_words(await _stop_state(rig, stopped=True)) == ("observer", "dog in the room")
         assert (await rig.session())["stopped"] is True
-        refused = await rig.http.post("/api/reset", headers=rig.token("observer"))
-        assert (refused.status_code, refused.json()["error"]) == (403, "not_allowed")
+        number = rig.services.console.clock.stop.number
+        assert answer.json()["number"] == number
+        for token, error in ((rig.token("observer"), "not_allowed"), (rig.token("operator"), "no_seat")):
+            refused = await rig.http.post("/api/reset", headers=token, json={"number": number})
+            assert (refused.status_code, refused.json()["error"]) == (403, error)
+        headers = rig.token("supervisor")
+        early = await rig.http.post("/api/reset", headers=headers, json={"number": number})
+        assert (early.status_code, early.json()["error"]) == (409, "too_soon")
+        stale = await rig.http.post("/api/reset", headers=headers, json={"number": number - 1})
+        assert (stale.status_code, stale.json()["error"]) == (409, "stale_reset")
+        nameless = await rig.http.post("/api/reset", headers=headers)
+        assert (nameless.status_code, nameless.json()["error"]) == (400, "bad_json")
         assert (await rig.session())["stopped"] is True
-        await reset_by_http(rig.http, "/api/reset", rig.token("operator"), lambda: rig.services.console.clock.stop)
+        await reset_by_http(rig.http, "/api/reset", rig.token("supervisor"), lambda: rig.services.console.clock.stop)
         await _stop_state(rig, stopped=False)
         assert rig.count("lockstep_stops_total", where="http") == 1
 
@@ -137,7 +147,7 @@ async def test_without_a_robot_the_console_runs_and_says_so() -> None:
         session = await rig.session()
         assert (session["epoch"], session["description"]) == ("", None)
         for path in ("/api/stop", "/api/reset"):
-            answer = await rig.http.post(path, headers=rig.token("operator"))
+            answer = await rig.http.post(path, headers=rig.token("supervisor"), json={"number": 1})
             assert (answer.status_code, answer.json()["error"]) == (503, "link_down")
         answer = await rig.http.post("/api/scene", headers=rig.token("operator"))
         assert (answer.status_code, answer.json()["error"]) == (503, "scene_unavailable")

@@ -55,7 +55,7 @@ async def test_a_fault_in_showing_or_stopping_one_robot_hides_and_spares_no_othe
         raise RuntimeError("a fault of ours")
 
     async with running_fleet_rig("left", "right") as rig:
-        monkeypatch.setattr(rig.session("left").console, "stop", fault)
+        monkeypatch.setattr(rig.session("left").console.stops, "stop", fault)
         monkeypatch.setattr(rig.session("left").recorder, "state", fault)
         assert (await rig.tiles())["left"]["trouble"] == UNREADABLE
         answer = await rig.http.post("/api/fleet/stop", headers=rig.token("operator"))
