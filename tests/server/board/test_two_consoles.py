@@ -253,10 +253,12 @@ async def _driving(console: Console, robot: str) -> AsyncIterator[_Driven]:
 
 async def _reset(place: Place, robot: str) -> None:
     """Until it is released: a bridge takes no reset within a second of a stop."""
+    headers = place.token(place.stack.supervisor)
     async with asyncio.timeout(PATIENCE):
-        while (await place.http.get(f"/robots/{robot}/api/session", headers=place.token())).json()["stopped"]:
-            await place.http.post(f"/robots/{robot}/api/reset", headers=place.token())
-            await asyncio.sleep(0.1)
+        while (state := (await place.http.get(f"/robots/{robot}/api/session", headers=headers)).json())["stopped"]:
+            number = {"number": state["stop"]["number"]}
+            await place.http.post(f"/robots/{robot}/api/reset", headers=headers, json=number)
+            await asyncio.sleep(0.5)
 
 
 async def _until(console: Console, true: Callable[[Feedback], bool]) -> None:
