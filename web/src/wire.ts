@@ -301,6 +301,7 @@ export interface RobotDescription {
   readonly body_twists: readonly (BodyTwist)[];
   readonly start_warning: StartWarning | null;
   readonly hold: number;
+  readonly watchdog: number | null;
   readonly max_event_age: number;
   readonly max_event_rate: number;
 }
