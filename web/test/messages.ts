@@ -60,6 +60,7 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     geofences: [],
     force_feeling: null,
     start_warning: null,
+    watchdog: null,
     body_twists: [],
     hold: 0.3,
     max_event_age: 2,
