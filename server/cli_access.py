@@ -22,9 +22,11 @@ from server.cli_audit import verify_audit
 from server.console_address import read_address
 from server.durations import duration_words, parse_duration
 from server.errors import ConsoleError
+from server.evidence.anchors import ANCHORS_NAME
 from server.evidence.signer import KEY_FILE, evidence_signer, is_public_key
 from server.invitations import Invitation
 from server.links import console_link
+from server.recording.errors import RecordingError
 from server.settings import Settings
 from server.state import ConsoleState, open_state, robot_directory, state_path
 from server.state_dir import StateDir, StateDirUnusable
@@ -123,7 +125,8 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             bool, typer.Option("--verify", help="Say whether it was cut, changed or reordered; then exit code 1.")
         ] = False,
         anchors: Annotated[
-            Path | None, typer.Option(help="Where its signed heads are; unset: where the settings say.")
+            Path | None,
+            typer.Option(help="File or folder of its signed heads, or a recording; unset: as the settings say."),
         ] = None,
         signed_by: Annotated[
             str, typer.Option(help="Public key of the signed heads; unset: that of the state directory.")
@@ -143,7 +146,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         if not follow and not path.exists():
             raise _usage(f"there is no audit log at {path}")
         if verify:
-            place = anchors or anchors_path(settings, folder)
+            place = anchors or _anchors(settings, folder, robot)
             _verify(
                 path, robot, place, signed_by or _public_key(folder if directory else state_path(settings)), as_json
             )
@@ -167,6 +170,12 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             raise _usage(f"{path}: {error.strerror}") from error
 
 
+def _anchors(settings: Settings, folder: Path, robot: str) -> Path:
+    if robot and settings.audit_anchor is None and settings.recording.directory is not None:
+        return settings.recording.directory / robot / ANCHORS_NAME  # as the console does
+    return anchors_path(settings, folder)
+
+
 def _verify(path: Path, robot: str, anchors: Path, key: str, as_json: bool) -> None:
     if key and not is_public_key(key):
         raise _usage("a public key has 64 hexadecimal digits")
@@ -174,6 +183,8 @@ def _verify(path: Path, robot: str, anchors: Path, key: str, as_json: bool) -> N
         verdict = verify_audit(path, robot, anchors, key)
     except OSError as error:
         raise _usage(f"{error.filename}: {error.strerror}") from error
+    except RecordingError as error:
+        raise _usage(str(error)) from error
     if as_json:
         sys.stdout.write(verdict.as_json().decode() + "\n")
     else:

@@ -8,8 +8,12 @@ import msgspec
 
 from server.audit_file import chained_lines, chatter_path
 from server.audit_store import audit_name
-from server.evidence.anchors import Anchor, AnchorFile, AnchorNote, check_anchors
+from server.evidence.anchors import Anchor, AnchorFile, AnchorNote, check_anchors, parse_anchor
 from server.evidence.chain import ChainReport, check_chain
+from server.recording.payload import own_record
+from server.recording.reader import RecordingReader
+from server.recording.records import SignatureRecord
+from server.recording.topics import SIGNATURE
 
 __all__ = ["AuditVerdict", "verify_audit"]
 
@@ -18,6 +22,7 @@ class AuditVerdict(NamedTuple):
     own: ChainReport
     chatter: ChainReport
     anchors: AnchorNote
+    place: Path  # where signed heads were looked for
     key: str  # that the heads had to be signed with; "" where none is known
 
     @property
@@ -28,7 +33,7 @@ class AuditVerdict(NamedTuple):
         """Print it."""
         for name, report in ((path.name, self.own), (chatter_path(path).name, self.chatter)):
             sys.stdout.write("\n".join(_chain_words(name, report)) + "\n")
-        sys.stdout.write("\n".join(_anchor_words(self.anchors, self.own, self.key)) + "\n")
+        sys.stdout.write("\n".join(_anchor_words(self)) + "\n")
 
     def as_json(self) -> bytes:
         shown = [msgspec.structs.replace(each, hashes={}) for each in (self.own, self.chatter)]
@@ -40,16 +45,29 @@ def verify_audit(path: Path, robot: str, anchors: Path, key: str) -> AuditVerdic
     """Of the audit at `path`.
 
     Args:
-        anchors: file or folder of its signed heads; one that is not there holds none
+        anchors: file or folder of its signed heads, or a recording; one that is not there holds none
         key: public key that signs them; "": that of the newest one
 
     Raises:
         OSError: something cannot be read.
+        RecordingError: the recording is none.
     """
     own, chatter = check_chain(chained_lines(path)), check_chain(chained_lines(chatter_path(path)))
-    signed = AnchorFile(anchors, 0).read(audit_name(path, robot))
+    name = audit_name(path, robot)
+    signed = _recorded(anchors, name) if anchors.suffix == ".mcap" else AnchorFile(anchors, 0).read(name)
     key = key or _key_of(signed)
-    return AuditVerdict(own, chatter, check_anchors(own, chatter, signed, key), key)
+    return AuditVerdict(own, chatter, check_anchors(own, chatter, signed, key), anchors, key)
+
+
+def _recorded(recording: Path, name: str) -> list[Anchor]:
+    """Those that the signatures of a recording hold."""
+    found: dict[str, Anchor] = {}
+    with RecordingReader(recording) as reader:
+        for record in reader.records(topics={SIGNATURE}):
+            anchor = parse_anchor(own_record(SignatureRecord, record.data).audit)
+            if anchor is not None and anchor.log == name:
+                found[anchor.signature] = anchor
+    return list(found.values())
 
 
 def _key_of(anchors: list[Anchor]) -> str:
@@ -73,16 +91,17 @@ def _faults(report: ChainReport) -> list[str]:
     return [f"        {fault.kind}: {fault.text}" for fault in report.faults[:20]]
 
 
-def _anchor_words(note: AnchorNote, own: ChainReport, key: str) -> list[str]:
+def _anchor_words(verdict: AuditVerdict) -> list[str]:
+    note, key = verdict.anchors, verdict.key
     if note.newest is None:
         return [
-            f"--    {note.known} signed heads, none of this audit and key: whoever could write the files is not found"
+            f"--    {note.known} signed heads in {verdict.place}, none that fits this audit and key:",
+            "        a cut at the end, and files that were written anew, would not be found",
         ]
-    newest = note.newest
     lines = [
         f"ok    {note.fitting + note.too_old} signed heads fit ({note.too_old} of records that are not kept any more)",
         f"        signed by {key}",
-        f"        the newest is of record {newest.n}: what came later could be cut off unseen",
+        f"        the newest is of record {note.newest.n}: what came later could be cut off unseen",
     ]
     if note.other_keys:
         lines.append(f"        {note.other_keys} are signed by other keys, and say nothing here")

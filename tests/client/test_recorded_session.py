@@ -12,6 +12,7 @@ import pytest
 from bench.emulator import Network, load_profile
 from client import Console
 from robot_bridge.robots.event_strip import read_event_strip
+from server.cli_audit import verify_audit
 from server.evidence.anchors import parse_anchor
 from server.evidence.signer import evidence_signer
 from server.recording.payload import own_record_of
@@ -84,6 +85,17 @@ def test_it_is_signed_with_the_consoles_key_to_its_end_and_a_flipped_byte_is_nam
     verdict = verify_file(flipped)
     assert verdict.signature.state == "broken"
     assert "chunk" in verdict.checks["signed"].violations[0].text
+
+
+def test_the_audit_is_held_against_the_signed_heads_in_the_recording(session: Session, tmp_path: Path) -> None:
+    key = evidence_signer(StateDir(session.state)).public_key
+    good = verify_audit(session.state / "audit.jsonl", "", session.recording, key)
+    assert good.ok
+    assert good.anchors.fitting
+    cut = tmp_path / "audit.jsonl"
+    cut.write_bytes(b"")
+    found = verify_audit(cut, "", session.recording, key)
+    assert {fault.kind for fault in found.own.faults} == {"cut"}
 
 
 def test_at_ten_random_events_command_feedback_pictures_and_sound_are_those_with_that_reference(
