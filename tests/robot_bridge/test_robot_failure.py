@@ -99,6 +99,24 @@ async def test_whatever_the_adapter_raises_the_last_values_are_at_rest_and_the_s
     assert robot.calls[-1] == "close"
 
 
+async def test_after_a_failure_the_next_bridge_begins_stopped_with_the_reason_and_the_robots_stop(
+    tmp_path: Path,
+) -> None:
+    settings = BridgeSettings(port=0, state_dir=tmp_path / "state")
+    broken = BreakableRobot()
+    async with Bridge(broken, settings) as bridge:
+        broken.broken["measure"] = OSError("no answer")
+        with pytest.raises(RobotFailed):
+            await bridge.wait()
+    robot = RecordingRobot()
+    async with Bridge(robot, settings) as bridge, operator(bridge) as driver:
+        assert driver.feedback.stop.stopped
+        assert "robot failed: OSError: no answer" in driver.feedback.stop.reason
+        assert (await driver.refused(driver.command())).reason == "stopped"
+        await robot.until(lambda: robot.calls == ["stop"], "the robot's own stop")
+    assert all(values == NEUTRAL for _, values in robot.applied)
+
+
 async def test_a_robot_that_works_but_for_its_measurement_ramps_down() -> None:
     robot = BreakableRobot()
     async with running_bridge(robot) as bridge, operator(bridge) as driver:
