@@ -19,6 +19,7 @@ Why each is needed:
 import asyncio
 import contextlib
 import struct
+from collections import deque
 from collections.abc import Callable, Sequence
 from types import MethodType
 from typing import Any, Protocol
@@ -57,9 +58,11 @@ require_consent_hooks(Connection, StunProtocol)
 
 LAST_OF_STUN = b"\x03"  # the largest first byte of its messages
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
-RETRANSMISSION_CEILING = 1.5  # s; above every round trip that one drives over, satellites' included
+RETRANSMISSION_CEILING = 1.5  # s; on a path whose shortest round trip is longer than half of it, twice that
+SAMPLES = 8  # of the round trip, of which the shortest is the path's and not an outage's
 ACKNOWLEDGEMENT_DELAY = 0.15  # s; RFC 9260 6.2 allows 0.5 and recommends 0.2
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
+CONNECT_CEILING = 3.0  # s, to which the interval grows while nobody answers; aiortc gives up after eight
 RECORD = 1500  # bytes, the most that a DTLS record carries here
 WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
 
@@ -295,12 +298,22 @@ def hasten_sctp(pc: RTCPeerConnection) -> None:
     """
     sctp: Any = pc.sctp
     measure, expire, transmit = sctp._update_rto, sctp._t3_expired, sctp._transmit
+    expire_connecting = sctp._t1_expired
+
+    samples: deque[float] = deque(maxlen=SAMPLES)
 
     def update(round_trip: float) -> None:
         measure(round_trip)
+        samples.append(round_trip)
         # A network that was cut and delivers everything at its end is no path of ten seconds: with a wait of that
         # order, whatever is lost next would keep the operator from the seat for as long.
-        sctp._rto = min(max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar), RETRANSMISSION_CEILING)
+        ceiling = max(RETRANSMISSION_CEILING, 2 * min(samples))
+        sctp._rto = min(max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar), ceiling)
+
+    def expired_connecting() -> None:
+        # The wait grows: eight short ones would end before a path that was gone for five seconds is back.
+        sctp._rto = min(2 * sctp._rto, CONNECT_CEILING)
+        expire_connecting()
 
     def expired() -> None:
         expire()
@@ -314,6 +327,7 @@ def hasten_sctp(pc: RTCPeerConnection) -> None:
     sctp._rto = RETRANSMISSION_START
     sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
     sctp._update_rto = update
+    sctp._t1_expired = expired_connecting
     sctp._t3_expired = expired
     sctp._transmit = transmit_or_not
     _delay_acknowledgements(sctp)

@@ -70,7 +70,7 @@ class Console:
         sound_codec: str | None = None,
         event_rate: float | None = None,
         name: str = "script",
-        connect_seconds: float = 15.0,
+        connect_seconds: float = 30.0,
         silence_seconds: float = 5.0,
         route: Route | None = None,
         tls_ca: str | Path | None = None,

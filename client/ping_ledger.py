@@ -5,7 +5,10 @@ from collections import OrderedDict
 
 __all__ = ["PingLedger"]
 
-LOST_AFTER = 1.0  # s
+LOST_AFTER = 1.0  # s, at least
+LOST_TRIPS = 2  # round trips after which a ping counts as lost on a long path
+LOST_UNKNOWN = 3.0  # s, before the first answer
+FORGOTTEN = 10.0  # s; until then a late answer still tells the round trip
 
 
 class PingLedger:
@@ -15,6 +18,7 @@ class PingLedger:
         self.round_trip: float | None = None  # s, of the last answered ping
         self._out: OrderedDict[int, float] = OrderedDict()
         self._ids = itertools.count(1)
+        self._counted = 0  # pings up to this one were counted, if lost
 
     def send(self, now: float) -> int:
         """The id of the ping to send now."""
@@ -31,9 +35,11 @@ class PingLedger:
         return self.round_trip
 
     def lost(self, now: float) -> int:
-        """How many pings have become lost since the last call."""
-        count = 0
-        while self._out and next(iter(self._out.values())) < now - LOST_AFTER:
+        """How many pings have become lost since the last call. An answer that comes yet still tells the round trip."""
+        limit = LOST_UNKNOWN if self.round_trip is None else max(LOST_AFTER, LOST_TRIPS * self.round_trip)
+        overdue = [number for number, sent_at in self._out.items() if sent_at < now - limit]
+        count = sum(number > self._counted for number in overdue)
+        self._counted = max([self._counted, *overdue])
+        while self._out and next(iter(self._out.values())) < now - FORGOTTEN:
             self._out.popitem(last=False)
-            count += 1
         return count

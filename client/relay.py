@@ -37,7 +37,7 @@ from robot_bridge.protocol.janus import (
 
 __all__ = ["RelayMedia", "RelayTicket"]
 
-ANSWER_SECONDS = 5.0
+ANSWER_SECONDS = 10.0
 CLOSE_SECONDS = 3.0
 KEEPALIVE_SECONDS = 25.0  # Janus forgets a session after 60 s
 SILENCE_SECONDS = 1.5  # without a word on the feedback channel; the console says something there every 0.4 s

@@ -4,6 +4,7 @@ Call order: `receive` with bytes as they come, `tick` every 50 ms or so, `end` t
 what `take_outgoing` returns and, once `ended` is set, close. An ended session stays ended.
 """
 
+from collections import OrderedDict
 from collections.abc import Callable
 from enum import Enum
 from typing import Literal, NamedTuple
@@ -37,7 +38,10 @@ from robot_bridge.protocol.messages import (
 __all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState", "kind_of"]
 
 PING_INTERVAL = 0.2  # s
-SILENCE = 1.0  # s without a valid message after which the other side is taken for dead
+SILENCE = 1.0  # s without a valid message after which the other side is taken for dead, and `ROUND_TRIPS` besides
+ROUND_TRIPS = 4  # in which TCP has found out about a loss and repaired it, though what repairs it may be lost too
+MOST_SILENCE = 5.0  # s, whatever the other side makes of the round trip by late pongs
+PINGS_OUT = 64  # of which a pong still tells the round trip
 HELLO_TIMEOUT = 2.0  # s
 OWN_STALL = 0.5  # s between two ticks; more means that we did not look, not that the other side was silent
 
@@ -83,6 +87,17 @@ class LinkSession:
         self._last_tick = now
         self._last_ping = now
         self._ping_id = 0
+        self._pings: OrderedDict[int, float] = OrderedDict()  # id -> when it was sent, of those without a pong
+        self._round_trip = 0.0  # s, smoothed; 0 before it was measured
+
+    @property
+    def patience(self) -> float:
+        """Seconds of silence after which the other side is taken for dead.
+
+        A loss holds back everything behind it until TCP has repeated it, which takes round trips: on a long path a
+        link that waited for a second alone would end with nearly every loss.
+        """
+        return min(SILENCE + ROUND_TRIPS * self._round_trip, MOST_SILENCE)
 
     def receive(self, data: bytes, now: float) -> list[LinkMessage | BadInput]:
         """What these bytes bring, in order; heartbeats are answered here and not returned."""
@@ -120,8 +135,11 @@ class LinkSession:
                 self._last_valid = now
                 self._outgoing.append(Pong(id=number))
                 return None
-            case Pong():
+            case Pong(id=number):
                 self._last_valid = now
+                sent = self._pings.pop(number, None)
+                if sent is not None:
+                    self._measured(now - sent)
                 return None
             case Goodbye():
                 self.left = message.error == "closing"
@@ -140,6 +158,11 @@ class LinkSession:
         self.role, self._allowed, self._last_valid = role, allowed, now
         self.state = LinkState.OPEN
 
+    def _measured(self, round_trip: float) -> None:
+        """One more round trip; smoothed as TCP does (RFC 6298 2.3)."""
+        before = self._round_trip
+        self._round_trip = round_trip if before == 0.0 else before + (round_trip - before) / 8
+
     def tick(self, now: float) -> None:
         """Send heartbeats that are due; end a silent session."""
         gap, self._last_tick = now - self._last_tick, now
@@ -151,11 +174,14 @@ class LinkSession:
         if self.state is LinkState.HANDSHAKE:
             if now - self._opened > HELLO_TIMEOUT:
                 self.end("silent", f"no hello within {HELLO_TIMEOUT:g} s")
-        elif now - self._last_valid > SILENCE:
-            self.end("silent", f"nothing valid received for {SILENCE:g} s")
+        elif now - self._last_valid > self.patience:
+            self.end("silent", f"nothing valid received for {self.patience:.1f} s")
         elif now - self._last_ping >= PING_INTERVAL:
             self._last_ping = now
             self._ping_id += 1
+            self._pings[self._ping_id] = now
+            if len(self._pings) > PINGS_OUT:
+                self._pings.popitem(last=False)
             self._outgoing.append(Ping(id=self._ping_id))
 
     def end(self, error: str, detail: str = "") -> None:
@@ -191,6 +217,7 @@ class BridgeSession(LinkSession):
         self._admit = admit
         self._secret = secret
         self._challenged: Hello | None = None  # the hello that was answered with a challenge
+        self._challenged_at = now
         self._nonce = b""  # of that challenge
 
     @property
@@ -209,13 +236,14 @@ class BridgeSession(LinkSession):
         if self._secret is None:
             return self._open_for(message, b"", now)
         if self._challenged is None:
-            return self._challenge(message)
+            return self._challenge(message, now)
+        self._measured(now - self._challenged_at)
         return self._check(message, self._challenged, self._secret, now)
 
-    def _challenge(self, hello: Hello) -> BadInput | None:
+    def _challenge(self, hello: Hello, now: float) -> BadInput | None:
         if len(hello.nonce) != NONCE_BYTES:
             return self._reject("unauthorised", "this bridge asks for the link secret")
-        self._challenged, self._nonce = hello, draw_nonce()
+        self._challenged, self._challenged_at, self._nonce = hello, now, draw_nonce()
         self._outgoing.append(Challenge(nonce=self._nonce))
         return None
 
@@ -275,6 +303,7 @@ class ClientSession(LinkSession):
         if not self._is_proven(message):
             return self._reject("unauthorised", "the bridge does not prove that it knows the link secret")
         assert self.role is not None  # set by __init__
+        self._measured(now - self._opened)
         self._open(self.role, FROM_ROBOT[self.role], now)
         self.hello = message
         return message

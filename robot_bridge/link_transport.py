@@ -17,7 +17,6 @@ __all__ = ["TICK_INTERVAL", "LinkTransport"]
 
 TICK_INTERVAL = 0.05  # s between calls of `LinkTransport.tick`
 HIGH_WATER = 64 << 10  # bytes the kernel would not take before output waits in the outboxes
-STALLED = 1.0  # s without the other side taking a byte
 CLOSE_TIMEOUT = 1.0  # s for the goodbye to leave
 
 
@@ -89,8 +88,8 @@ class LinkTransport(asyncio.Protocol):
         if not self._full or buffered < self._buffered:
             self._moved = now
         self._buffered = buffered
-        if now - self._moved > STALLED:
-            self.session.lose(f"did not read for {STALLED:g} s")
+        if now - self._moved > self.session.patience:
+            self.session.lose(f"did not read for {self.session.patience:.1f} s")
             self._transport.abort()
 
     def end(self, error: str, detail: str = "") -> None:

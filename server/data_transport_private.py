@@ -15,6 +15,7 @@ What is used and why:
 
 import asyncio
 import contextlib
+from collections import deque
 from typing import Any
 
 from aiortc import RTCDataChannel, RTCPeerConnection
@@ -27,7 +28,8 @@ from server.run_now import run_now
 __all__ = ["tune_data_transport"]
 
 RETRANSMISSION_FLOOR = 0.3  # s; above a browser's delayed acknowledgement (0.2 s, RFC 9260 6.2)
-RETRANSMISSION_CEILING = 1.5  # s; above every round trip that one drives over, satellites' included
+RETRANSMISSION_CEILING = 1.5  # s; on a path whose shortest round trip is longer than half of it, twice that
+SAMPLES = 8  # of the round trip, of which the shortest is the path's and not an outage's
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
 CONNECT_CEILING = 3.0  # s, to which the interval grows while nobody answers; aiortc gives up after eight
 ACKNOWLEDGEMENT_DELAY = 0.15  # s; RFC 9260 6.2 allows 0.5 and recommends 0.2
@@ -88,11 +90,15 @@ def _hasten_sctp(sctp: Any) -> None:
     measure, transmit = sctp._update_rto, sctp._transmit
     expire_connecting, expire_sending = sctp._t1_expired, sctp._t3_expired
 
+    samples: deque[float] = deque(maxlen=SAMPLES)
+
     def update(round_trip: float) -> None:
         measure(round_trip)
+        samples.append(round_trip)
         # A network that was cut and delivers everything at its end is no path of ten seconds: with a wait of that
         # order, whatever is lost next would keep the operator from the seat for as long.
-        sctp._rto = min(max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar), RETRANSMISSION_CEILING)
+        ceiling = max(RETRANSMISSION_CEILING, 2 * min(samples))
+        sctp._rto = min(max(RETRANSMISSION_FLOOR, sctp._srtt + 4 * sctp._rttvar), ceiling)
 
     def expired_connecting() -> None:
         # The wait grows: eight short ones would end before a path that was gone for five seconds is back.

@@ -3,25 +3,31 @@
 What is used and why:
 
 - `RTCSctpTransport._receive_data_chunk`, `._receive_forward_tsn_chunk`, `._inbound_streams`, `._sack_misordered`,
-  `._advertised_rwnd`: aiortc announces a receive window (RFC 9260 6.2) and does not insist on it; a message that never
-  ends, holes in the numbering and 65,536 streams would each be kept without bound
+  `._last_received_tsn`, `._advertised_rwnd`: aiortc announces a receive window (RFC 9260 6.2) and does not insist on
+  it; a message that never ends, holes in the numbering and 65,536 streams would each be kept without bound
 - `aioice.stun.parse_message`: raises what its caller does not expect, of a datagram that anybody can send
 - `aioice.Connection.check_incoming`, `._remote_candidates`: every address that an authenticated check comes from
   becomes a candidate, and every candidate a check of ours
 """
 
 import struct
+import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 import aioice.stun
 from aiortc import RTCPeerConnection
+from aiortc.rtcsctptransport import SCTP_DATA_UNORDERED, ForwardTsnChunk
+from aiortc.utils import uint32_gt, uint32_gte
 
 __all__ = ["guard_data", "guard_ice"]
 
 RECEIVE_WINDOW = 256 * 1024  # bytes of messages that are not complete
 MAX_STREAMS = 16  # we use three
 MAX_GAPS = 1024  # chunks that came before an earlier one
+ENOUGH_GAPS = 256  # so many, and what is missing before them is looked at
+GIVEN_UP_SECONDS = 5.0  # after which a chunk that may be given up is not repeated any more
 MAX_ADDRESSES = 200  # of one peer; a browser has a few
 
 Refused = Callable[[str], None]
@@ -29,8 +35,12 @@ Refused = Callable[[str], None]
 _parse_message = aioice.stun.parse_message  # aioice's own
 
 
-def guard_data(pc: RTCPeerConnection, on_refused: Refused) -> None:
+def guard_data(pc: RTCPeerConnection, on_refused: Refused, clock: Callable[[], float] = time.monotonic) -> None:
     """Take only what fits; `on_refused` gets a stable name, and should end the peer: SCTP cannot go on with a hole.
+
+    It can where the peer has given up the chunk and does not say so: Firefox gives up a lost message of a channel
+    without retransmissions, sends no FORWARD TSN for it (RFC 3758 3.5) while other data flow, and everything after it
+    would count as out of order for the rest of the connection.
 
     Call after setRemoteDescription(offer), before setLocalDescription.
     """
@@ -38,13 +48,23 @@ def guard_data(pc: RTCPeerConnection, on_refused: Refused) -> None:
     if sctp is None:
         return
     take, forward = sctp._receive_data_chunk, sctp._receive_forward_tsn_chunk
+    seen = _Seen()
 
     async def take_bounded(chunk: Any) -> None:
         wrong = _too_much(sctp, chunk)
         if wrong:
             on_refused(wrong)
-        else:
-            await take(chunk)
+            return
+        await take(chunk)
+        given_up = seen.take(chunk.tsn, clock())
+        if given_up is None or len(sctp._sack_misordered) < ENOUGH_GAPS:
+            return
+        if _waits_for_a_missing_message(sctp, given_up):
+            on_refused("message_missing")
+        elif uint32_gt(given_up, sctp._last_received_tsn):
+            skip = ForwardTsnChunk()
+            skip.cumulative_tsn = given_up
+            await forward(skip)
 
     async def forward_bounded(chunk: Any) -> None:
         if len({number for number, _ in chunk.streams} | sctp._inbound_streams.keys()) > MAX_STREAMS:
@@ -55,6 +75,34 @@ def guard_data(pc: RTCPeerConnection, on_refused: Refused) -> None:
     sctp._advertised_rwnd = RECEIVE_WINDOW
     sctp._receive_data_chunk = take_bounded
     sctp._receive_forward_tsn_chunk = forward_bounded
+
+
+class _Seen:
+    """The highest chunk number of each moment: what is missing below that of `GIVEN_UP_SECONDS` ago comes no more."""
+
+    def __init__(self) -> None:
+        self._highest: int | None = None
+        self._marks: deque[tuple[float, int]] = deque()  # one a second
+
+    def take(self, number: int, now: float) -> int | None:
+        """One more; the number up to which nothing comes any more. None: not known yet."""
+        if self._highest is None or uint32_gt(number, self._highest):
+            self._highest = number
+        if not self._marks or now - self._marks[-1][0] >= 1.0:
+            self._marks.append((now, self._highest))
+        while len(self._marks) > 1 and now - self._marks[1][0] >= GIVEN_UP_SECONDS:
+            self._marks.popleft()
+        since, highest = self._marks[0]
+        return highest if now - since >= GIVEN_UP_SECONDS else None
+
+
+def _waits_for_a_missing_message(sctp: Any, number: int) -> bool:
+    """Whether an ordered message below `number` waits for one before it, which then was not given up."""
+    return any(
+        not chunk.flags & SCTP_DATA_UNORDERED and uint32_gte(number, chunk.tsn)
+        for stream in sctp._inbound_streams.values()
+        for chunk in stream.reassembly
+    )
 
 
 def _too_much(sctp: Any, chunk: Any) -> str:

@@ -56,7 +56,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     seat_claim_seconds: Annotated[float, Field(gt=0)] = 60.0  # until a claim on the seat counts as declined
     speed_cap: SpeedCapMode = "operator"  # whether the speed is capped by the delay of what the operator sees
     peer_silence: Annotated[float, Field(gt=0)] = 20.0  # a peer with data channels that says nothing is closed
-    peer_connect_timeout: Annotated[float, Field(gt=0)] = 15.0  # from the answer to the connection
+    peer_connect_timeout: Annotated[float, Field(gt=0)] = 40.0  # from the answer to the connection
     max_peers: Annotated[int, Field(ge=1)] = 200
     max_message_rate: Annotated[float, Field(gt=0)] = 200.0  # Hz a peer; stop is never limited
     max_sdp_bytes: Annotated[int, Field(ge=1024)] = 64 * 1024

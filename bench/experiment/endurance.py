@@ -61,6 +61,7 @@ class Endurance:
     reconnections: int = 0  # the client was live again after it had not been
     seat_losses: int = 0
     longest_silence: float = 0.0  # s in which the client was not live
+    refused: Mapping[str, float] = field(default_factory=dict)  # what the console took from no peer, by why
     driven_seconds: float = 0.0  # the client was armed and had the seat
     _ended: Counter[str] = field(default_factory=Counter)
     _at: float | None = None
@@ -111,6 +112,7 @@ class Endurance:
             "reconnections": self.reconnections,
             "longest_silence_seconds": round(self.longest_silence, 1),
             "seat_losses": self.seat_losses,
+            "refused": {why: round(count) for why, count in self.refused.items() if count},
             "driven_seconds": round(self.driven_seconds),
             "pictures": pictures,
             "sound_segments": self._total("audio rendered"),

@@ -91,7 +91,9 @@ async def _count(stage: Stage, endurance: Endurance, clock: Callable[[], float],
         while True:
             with contextlib.suppress(httpx.HTTPError):
                 text = (await http.get("/metrics")).raise_for_status().text
-                for lost in endurance.ended(clock(), Metrics(text).values("lockstep_peers_ended_total", "why")):
+                counters = Metrics(text)
+                endurance.refused = counters.values("lockstep_bad_input_total", "reason", where="transport")
+                for lost in endurance.ended(clock(), counters.values("lockstep_peers_ended_total", "why")):
                     say(f"{lost.at:7.1f} s  a connection ended: {lost.why}")
             if clock() > news_at:
                 news_at += NEWS_SECONDS

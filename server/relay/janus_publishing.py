@@ -21,7 +21,7 @@ from server.relay.publication import Publication
 
 __all__ = ["PublishedMedia", "publish"]
 
-CONNECT_SECONDS = 5.0
+CONNECT_SECONDS = 15.0
 CLOSE_SECONDS = 2.0
 FEEDBACK = "feedback"  # label of the data channel
 

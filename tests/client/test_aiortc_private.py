@@ -330,6 +330,23 @@ async def test_a_lost_message_is_found_out_sooner_and_does_not_shut_the_window()
         assert sctp._cwnd >= aiortc_private.WINDOW_FLOOR
         sctp._update_rto(10.0)
         assert sctp._rto == aiortc_private.RETRANSMISSION_CEILING
+        for _ in range(8):
+            sctp._update_rto(1.8)
+        assert 1.8 < sctp._rto <= 3.6
+
+
+async def test_the_wait_for_an_answer_to_the_connection_grows_and_does_not_give_up_after_seconds() -> None:
+    pc = new_peer()
+    pc.createDataChannel("x")
+    hasten_sctp(pc)
+    sctp: Any = pc.sctp
+    waits = []
+    for _ in range(8):
+        waits.append(sctp._rto)
+        sctp._t1_failures = 8  # the next one would be sent by a task
+        sctp._t1_expired()
+    assert waits == [0.5, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0]
+    await pc.close()
 
 
 async def test_every_second_message_is_acknowledged_at_once_and_a_single_one_after_a_while() -> None:

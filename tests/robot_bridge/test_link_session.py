@@ -234,6 +234,43 @@ def test_a_side_that_sends_nothing_valid_is_dead_after_a_second(side: int, noise
     assert session.ended.error == "silent"
 
 
+def _answer_pings(session: LinkSession, round_trip: float, until: float) -> float:
+    """Time passes while the other side answers every ping after `round_trip`; when it said something last."""
+    under_way: list[tuple[float, int]] = []
+    now = last = 0.0
+    while now < until:
+        now += TICK
+        while under_way and under_way[0][0] <= now:
+            session.receive(wire(Pong(id=under_way.pop(0)[1])), now)
+            last = now
+        session.tick(now)
+        under_way += [(now + round_trip, each.id) for each in session.take_outgoing() if isinstance(each, Ping)]
+    return last
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize(("round_trip", "patience"), [(0.1, 1.4), (0.3, 2.2), (0.6, 3.4), (0.9, 4.6), (3.0, 5.0)])
+def test_on_a_long_path_silence_lasts_four_round_trips_more_and_never_over_five_seconds(
+    side: int, round_trip: float, patience: float
+) -> None:
+    session = open_pair()[side]
+    session._last_valid = round_trip  # until the first answer the other side is heard by its own pings
+    last = _answer_pings(session, round_trip, 10.0)
+    assert session.patience == pytest.approx(patience, abs=4 * TICK)
+    pass_time(session, 10.0, last + session.patience - TICK)
+    assert not is_over(session)
+    pass_time(session, last + session.patience - TICK, last + session.patience + 2 * TICK)
+    assert session.ended is not None
+    assert session.ended.error == "silent"
+
+
+def test_a_pong_that_answers_no_ping_says_nothing_of_the_path() -> None:
+    session = open_pair()[0]
+    for number in range(100):
+        session.receive(wire(Pong(id=number)), 0.9)
+    assert session.patience == SILENCE
+
+
 @pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize("life", [Ping(id=1), Pong(id=1)])
 def test_a_side_that_is_heard_stays(side: int, life: LinkMessage) -> None:

@@ -176,6 +176,13 @@ async def test_what_an_outage_held_for_ten_seconds_does_not_lengthen_the_wait_to
     assert sctp._rto == RETRANSMISSION_CEILING
 
 
+async def test_on_a_path_of_more_than_a_second_and_a_half_nothing_is_repeated_before_its_answer(ends: Ends) -> None:
+    sctp: Any = ends.server.transport
+    for _ in range(8):
+        sctp._update_rto(1.8)
+    assert 1.8 < sctp._rto <= 3.6
+
+
 async def test_a_timeout_does_not_shut_the_window(ends: Ends) -> None:
     await ends.exchange()
     sctp: Any = ends.server.transport

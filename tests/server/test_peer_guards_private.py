@@ -4,9 +4,18 @@ import asyncio
 import os
 from typing import Any
 
+from aiortc import RTCConfiguration, RTCPeerConnection
 from aiortc.rtcsctptransport import DataChunk, ForwardTsnChunk, InboundStream
 
-from server.peer_guards_private import MAX_ADDRESSES, MAX_GAPS, MAX_STREAMS, RECEIVE_WINDOW, guard_ice
+from server.peer_guards_private import (
+    ENOUGH_GAPS,
+    MAX_ADDRESSES,
+    MAX_GAPS,
+    MAX_STREAMS,
+    RECEIVE_WINDOW,
+    guard_data,
+    guard_ice,
+)
 from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_rig
 
 MOVED = "aiortc or aioice moved a private part: see server/peer_guards_private.py"
@@ -189,3 +198,67 @@ async def test_data_that_looks_like_stun_passes_for_data() -> None:
         protocol = connection._nominated[1].protocol
         protocol.datagram_received(lookalike, ("127.0.0.1", 9))
         assert (lookalike, 1) in came
+
+
+class _Association:
+    """What `guard_data` uses of aiortc's; without a socket."""
+
+    def __init__(self) -> None:
+        self.pc: Any = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+        self.pc.createDataChannel("x")
+        self.sctp: Any = self.pc.sctp
+        self.sctp._last_received_tsn = 2**32 - 10  # the numbers wrap on the way
+        self.number = 2**32 - 10
+        self.now = 0.0
+        self.messages = 0
+        self.refused: list[str] = []
+
+        async def receive(*message: object) -> None:
+            self.messages += 1
+
+        self.sctp._receive = receive
+        guard_data(self.pc, self.refused.append, lambda: self.now)
+
+    async def sends(self, *, ordered: int | None = None, lost: bool = False, seconds: float = 0.04) -> None:
+        """A message of one chunk; `ordered`: its number in the stream."""
+        self.now += seconds
+        self.number = (self.number + 1) % 2**32
+        if lost:
+            return
+        chunk = DataChunk(flags=3 if ordered is not None else 7)
+        chunk.tsn, chunk.stream_id, chunk.stream_seq, chunk.protocol = self.number, 1 + (ordered is None), 0, 51
+        chunk.stream_seq = ordered or 0
+        chunk.user_data = b"x" * 50
+        await self.sctp._receive_data_chunk(chunk)
+
+
+async def test_a_connection_lives_on_when_a_peer_gives_up_messages_and_says_nothing_of_it() -> None:
+    peer = _Association()
+    for number in range(5000):
+        await peer.sends(lost=number % 100 == 50)
+    assert peer.refused == []
+    assert peer.messages == 4950
+    assert len(peer.sctp._sack_misordered) <= ENOUGH_GAPS
+    await peer.pc.close()
+
+
+async def test_a_reliable_message_that_never_comes_ends_the_peer_instead_of_being_passed_over() -> None:
+    peer = _Association()
+    await peer.sends(ordered=0)
+    await peer.sends(ordered=1, lost=True)
+    await peer.sends(ordered=2)
+    for _ in range(1000):
+        await peer.sends()
+        if peer.refused:
+            break
+    assert peer.refused == ["message_missing"]
+    assert peer.messages < 300
+    await peer.pc.close()
+
+
+async def test_holes_that_come_faster_than_a_message_is_given_up_end_the_peer() -> None:
+    peer = _Association()
+    for number in range(MAX_GAPS + 3):
+        await peer.sends(lost=number == 1, seconds=0.001)
+    assert set(peer.refused) == {"too_many_gaps"}
+    await peer.pc.close()

@@ -32,6 +32,7 @@ def test_a_run_without_trouble_has_one_connection_and_all_verdicts() -> None:
         "reconnections": 0,
         "longest_silence_seconds": 0.0,
         "seat_losses": 0,
+        "refused": {},
         "driven_seconds": 10,
         "pictures": 300,
         "sound_segments": 600,

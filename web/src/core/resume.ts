@@ -15,6 +15,7 @@ export interface Resume {
   silentMs: number; // without a message, counted in steps: a page that was held up counts nothing
   stepMs: number | null; // the last step; null before the first
   askedMs: number; // the last question
+  answerMs: number; // what the console's last answer took: one round trip of the path or a few
   alarmedUntilMs: number; // the network changed: silence counts sooner
 }
 
@@ -23,8 +24,10 @@ const ALARMED_MS = 700; // after a change of the network
 const ALARM_MS = 5000;
 const STEP_LIMIT_MS = 100; // a longer step is a page that was held up
 const ASK_MS = 1000; // questions overlap: the first answer counts
-const HOPE_MS = 400; // for the old path, once the console can be reached
-const MOVE_MS = 3000; // for the new path
+const HOPE_MS = 400; // for the old path, once the console can be reached; and half of what its answer took
+const MOST_HOPE_MS = 2000;
+const MOVE_MS = 3000; // for the new path; and four times what the console's answer took
+const MOST_MOVE_MS = 10_000;
 
 export function createResume(): Resume {
   return {
@@ -33,6 +36,7 @@ export function createResume(): Resume {
     silentMs: 0,
     stepMs: null,
     askedMs: -Infinity,
+    answerMs: 0,
     alarmedUntilMs: -Infinity,
   };
 }
@@ -61,19 +65,20 @@ export function resumeStep(resume: Resume, now: number): ResumeAction | null {
     case "asking":
       return now - resume.askedMs < ASK_MS ? null : ask(resume, now);
     case "hoping":
-      if (spent < HOPE_MS) return null;
+      if (spent < Math.min(HOPE_MS + resume.answerMs / 2, MOST_HOPE_MS)) return null;
       enter(resume, "restarting", now);
       return "restart";
     case "moving":
-      return spent < MOVE_MS ? null : giveUp(resume, now);
+      return spent < Math.min(MOVE_MS + 4 * resume.answerMs, MOST_MOVE_MS) ? null : giveUp(resume, now);
     case "restarting":
     case "over":
       return null;
   }
 }
 
-/** The console answered a question, or something else did in its place. */
-export function resumeAsked(resume: Resume, reached: boolean, now: number): void {
+/** The console answered a question after `tookMs`, or something else did in its place. */
+export function resumeAsked(resume: Resume, reached: boolean, now: number, tookMs = 0): void {
+  if (reached) resume.answerMs = tookMs;
   if (resume.phase === "asking" && reached) enter(resume, "hoping", now);
 }
 

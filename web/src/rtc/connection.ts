@@ -142,11 +142,12 @@ export class Connection {
 
   /** Whether the console can be reached; its answer also brings TURN credentials that are good now. */
   private async ask(peer: Peer): Promise<void> {
+    const askedMs = performance.now();
     const reached = await peer.refresh().then(
       () => true,
       (error: unknown) => error instanceof ConsoleError && error.status !== 0 && error.status < 500,
     );
-    if (peer === this.peer) resumeAsked(this.resume, reached, performance.now());
+    if (peer === this.peer) resumeAsked(this.resume, reached, performance.now(), performance.now() - askedMs);
   }
 
   private async restart(peer: Peer): Promise<void> {

@@ -34,7 +34,7 @@ export interface MediaOffer {
 }
 
 const FRAGMENT = "application/trickle-ice-sdpfrag";
-const RESTART_LIMIT_MS = 5000;
+const RESTART_LIMIT_MS = 10_000;
 
 /** The console's HTTP interface (docs/console-api.md), for the holder of one token. */
 export class ConsoleApi {

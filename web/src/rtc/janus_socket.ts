@@ -1,6 +1,6 @@
 import { parseJanus, type JanusMessage } from "../core/relay";
 
-const ANSWER_MS = 4000;
+const ANSWER_MS = 8000;
 const KEEPALIVE_MS = 25_000; // a Janus forgets a session after 60 s
 
 /** One session with a Janus over its WebSocket, and its handle of the video room. It ends once. */

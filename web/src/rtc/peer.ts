@@ -45,8 +45,11 @@ export interface PeerEvents {
 /** Offered before the console has said how many there are; sections too many are answered inactive. */
 const USUAL_CAMERAS = 2;
 const USUAL_MICROPHONES = 1;
-const CONNECT_LIMIT_MS = 10_000;
-const REQUEST_LIMIT_MS = 5000;
+const SIGNALLING_LIMIT_MS = 20_000; // for all requests until the answer
+const REQUEST_LIMIT_MS = 10_000;
+const PATH_LIMIT_MS = 10_000; // from the answer to the connection; and so many times what the answer took
+const PATH_TRIPS = 10; // round trips of ICE and DTLS, some of them lost
+const MOST_PATH_MS = 30_000; // the console gives up later
 
 /**
  * One connection to the console: WebRTC, or for an observer behind a relay a WebSocket where one passes. It ends once;
@@ -67,6 +70,7 @@ export class Peer {
   private tag = ""; // of the ICE session
   private timer: ReturnType<typeof setTimeout> | undefined;
   private isOver = false;
+  private pathLimitMs = PATH_LIMIT_MS;
 
   constructor(
     private readonly api: ConsoleApi,
@@ -85,7 +89,7 @@ export class Peer {
 
   /** Returns when the answer is set; the channels open shortly after. Raises ConsoleError. */
   async connect(): Promise<void> {
-    const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(CONNECT_LIMIT_MS)]);
+    const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(SIGNALLING_LIMIT_MS)]);
     // Without an answer about relays there is still the console.
     const ticket = this.options.watches ? await this.api.relay("", "", signal).catch(() => null) : null;
     if (this.options.thumbnail === true) await this.connectSmall(signal);
@@ -94,7 +98,7 @@ export class Peer {
     if (this.line !== null) return;
     this.connection.onicegatheringstatechange = () => this.sendCandidates();
     this.sendCandidates();
-    this.endAfter(CONNECT_LIMIT_MS);
+    this.endAfter(this.pathLimitMs);
   }
 
   /** Media come from the relay, everything else by a line, or by data channels where no WebSocket passes. */
@@ -153,7 +157,10 @@ export class Peer {
   }
 
   private async exchange(query: string, signal: AbortSignal): Promise<void> {
+    const offeredMs = performance.now();
     const answer = await this.api.offer(this.localSdp(), query, signal);
+    const tookMs = performance.now() - offeredMs;
+    this.pathLimitMs = Math.min(PATH_LIMIT_MS + PATH_TRIPS * tookMs, MOST_PATH_MS);
     this.location = answer.location;
     this.tag = answer.tag;
     if (this.isOver) throw new ConsoleError(0, "closed", "closed while connecting", null);
@@ -266,7 +273,7 @@ export class Peer {
     else if (state === "closed") this.finish(new PeerEnd("lost", "the connection was closed"));
     else if (this.isConnected) this.events.troubled();
     else if (state === "failed") this.finish(this.noPath());
-    else this.endAfter(CONNECT_LIMIT_MS);
+    else this.endAfter(this.pathLimitMs);
   }
 
   /** Ends it unless it is connected by then. */

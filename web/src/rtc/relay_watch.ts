@@ -6,7 +6,7 @@ import type { Section } from "./section";
 import type { StampReader } from "./stamp_reader";
 
 const RETRY_MS = 500;
-const REQUEST_LIMIT_MS = 5000;
+const REQUEST_LIMIT_MS = 10_000;
 
 export interface RelayWatchEvents {
   feedback(data: unknown): void;

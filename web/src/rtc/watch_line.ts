@@ -2,7 +2,9 @@
 import { expectsPong } from "../core/expects_pong";
 import { ConsoleError, type ConsoleApi } from "./console_api";
 
-const OPEN_MS = 3000;
+const OPEN_MS = 3000; // and so many times what the ticket took: TCP, TLS and the upgrade are round trips too
+const OPEN_TRIPS = 6;
+const MOST_OPEN_MS = 12_000;
 const ANSWER_MS = 5000; // for the console to say anything after a ping
 const UNREAD_MS = 500; // more: a page that was held up has answers waiting that it has not read
 const MAX_WAITING = 100_000; // bytes
@@ -88,11 +90,13 @@ export async function openLine(
   events: LineEvents,
   makeSocket: (url: string) => Socket = (url) => new WebSocket(url),
 ): Promise<WatchLine | null> {
+  const askedMs = performance.now();
   const ticket = await ticketOf(api, relay, signal);
+  const openMs = Math.round(Math.min(OPEN_MS + OPEN_TRIPS * (performance.now() - askedMs), MOST_OPEN_MS));
   if (ticket === null) return null;
   try {
     const socket = makeSocket(api.lineAddress(ticket));
-    await opened(socket, AbortSignal.any([signal, AbortSignal.timeout(OPEN_MS)]));
+    await opened(socket, AbortSignal.any([signal, AbortSignal.timeout(openMs)]));
     return new WatchLine(socket, events);
   } catch {
     api.declineLine(ticket).catch(() => undefined); // its end comes by itself

@@ -100,6 +100,19 @@ describe("resuming a connection", () => {
     expect(run(resume, 2210, 9000)).toEqual([[5200, "reconnect"]]);
   });
 
+  it("gives a long path more time, up to ten seconds", () => {
+    const resume = asking();
+    resumeAsked(resume, true, 1600, 1200);
+    expect(run(resume, 1610, 3000)).toEqual([[2600, "restart"]]);
+    resumeRestarted(resume, "accepted", 4000);
+    expect(run(resume, 4010, 15_000)).toEqual([[11_800, "reconnect"]]);
+    const longer = asking();
+    resumeAsked(longer, true, 1600, 8000);
+    expect(run(longer, 1610, 4000)).toEqual([[3600, "restart"]]);
+    resumeRestarted(longer, "accepted", 5000);
+    expect(run(longer, 5010, 20_000)).toEqual([[15_000, "reconnect"]]);
+  });
+
   it("is live again when the new path brings a message", () => {
     const resume = asking();
     resumeAsked(resume, true, 1600);
