@@ -2,7 +2,7 @@
 
 import asyncio
 import os
-from typing import Any
+from typing import Any, cast
 
 from aiortc import RTCConfiguration, RTCPeerConnection
 from aiortc.rtcsctptransport import DataChunk, ForwardTsnChunk, InboundStream
@@ -206,7 +206,7 @@ class _Association:
     def __init__(self) -> None:
         self.pc: Any = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self.pc.createDataChannel("x")
-        self.sctp: Any = self.pc.sctp
+        self.sctp = cast(Any, self.pc.sctp)
         self.sctp._last_received_tsn = 2**32 - 10  # the numbers wrap on the way
         self.number = 2**32 - 10
         self.now = 0.0
