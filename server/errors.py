@@ -386,7 +386,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     RecordingFailed: HttpError(503, "recording_failed", {"Retry-After": "5"}),
     ResetNotKept: HttpError(503, "not_kept", {"Retry-After": "5"}),
     RobotFailed: HttpError(503, "robot_failed", {"Retry-After": "2"}),
-    RobotUnreachable: HttpError(503, "robot_unreachable", {"Retry-After": "1"}),
+    RobotUnreachable: HttpError(409, "robot_unreachable", {"Retry-After": "1"}),
     SceneUnavailable: HttpError(503, "scene_unavailable", {"Retry-After": "5"}),
     ShuttingDown: HttpError(503, "shutting_down", {"Retry-After": "5"}),
     StateUnavailable: HttpError(503, "state_unavailable", {"Retry-After": "5"}),

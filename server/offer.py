@@ -23,12 +23,15 @@ MAX_SECTIONS = 16  # media sections, of a robot with fewer streams; each costs t
 MAX_PAYLOAD_TYPE = 127  # RFC 3550 5.1: seven bits
 MAX_CANDIDATES = 100  # of a section
 DEFAULT_MESSAGE_SIZE = "a=max-message-size:65536"
+HOST_NAME = re.compile(r"(?=.*[A-Za-z])[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)+\.?|[A-Za-z][A-Za-z0-9-]*")
+HEX_PAIRS = re.compile(r"[0-9A-Fa-f]{2}(:[0-9A-Fa-f]{2})+")
+HASH_BYTES = {"sha-1": 20, "sha-224": 28, "sha-256": 32, "sha-384": 48, "sha-512": 64}  # RFC 8122 5
 ICE_USERNAME = re.compile(r"[A-Za-z0-9+/]{4,256}")
 ICE_PASSWORD = re.compile(r"[A-Za-z0-9+/]{22,256}")
 
 
 def prepare_offer(text: str, max_sections: int = MAX_SECTIONS) -> str:
-    """`text` without mDNS candidates, and with the default for what aiortc needs and RFC 8841 6.1 leaves out.
+    """`text` without candidates whose address is a name, and with the message size that RFC 8841 6.1 leaves out.
 
     Header extensions whose ids fit no packet have another id in it, or are left out (`with_usable_ids`).
 
@@ -42,7 +45,7 @@ def prepare_offer(text: str, max_sections: int = MAX_SECTIONS) -> str:
     lines = text.splitlines()
     _count(lines, max_sections)
     _check_payload_types(lines)
-    kept = [line for line in lines if not (line.startswith("a=candidate:") and ".local " in line)]
+    kept = [line for line in lines if not (line.startswith("a=candidate:") and _has_name(line))]
     if len(kept) != len(lines):
         kept = [line for line in kept if line != "a=end-of-candidates"]
     kept = with_usable_ids(kept)
@@ -55,6 +58,12 @@ def prepare_offer(text: str, max_sections: int = MAX_SECTIONS) -> str:
     prepared = "\r\n".join(kept) + "\r\n"
     _check(prepared)
     return prepared
+
+
+def _has_name(candidate: str) -> bool:
+    """Whether its address is a name: mDNS (`.local`), or a host's, which is to be discarded in silence."""
+    words = candidate.split()
+    return len(words) > 4 and HOST_NAME.fullmatch(words[4]) is not None
 
 
 def _count(lines: Sequence[str], max_sections: int) -> None:
@@ -97,7 +106,13 @@ def _check_media(media: sdp.MediaDescription) -> None:
     if media.ice is None or not media.ice.usernameFragment or not media.ice.password:
         raise BadSdp("a media section without ice-ufrag and ice-pwd")
     if media.dtls is None or not media.dtls.fingerprints:
-        raise BadSdp("a media section without a certificate fingerprint")
+        raise BadSdp(f"section {media.rtp.muxId}: needs a=fingerprint and a=setup (RFC 8842 5)"[:120])
+    for each in media.dtls.fingerprints:
+        length = HASH_BYTES.get(each.algorithm.lower())
+        if length is not None and (not HEX_PAIRS.fullmatch(each.value) or len(each.value) != 3 * length - 1):
+            raise BadSdp(f"section {media.rtp.muxId}: a fingerprint that is none (RFC 8122 5)"[:120])
+    if media.kind != "application" and not media.rtcp_mux:
+        raise BadSdp(f"section {media.rtp.muxId}: needs a=rtcp-mux (RFC 8834 4.5)"[:120])
     if media.kind == "application" and media.sctp_port is None:
         raise BadSdp("a data channel section without sctp-port")
     if len(media.ice_candidates) > MAX_CANDIDATES:
@@ -131,7 +146,7 @@ def parse_fragment(text: str, first_mid: str) -> Fragment:
     """The credentials and candidates in `text`.
 
     Its a=end-of-candidates is not passed on: the peer may still be reached from an address that only its checks show.
-    mDNS candidates are left out for the reason that `prepare_offer` gives.
+    Candidates with names are left out for the reason that `prepare_offer` gives.
 
     Args:
         first_mid: for lines before the first media section; with BUNDLE all candidates are for it
@@ -152,7 +167,7 @@ def parse_fragment(text: str, first_mid: str) -> Fragment:
         elif line.startswith("a=candidate:"):
             if len(candidates) == MAX_CANDIDATES:
                 raise BadSdpFragment(f"more than {MAX_CANDIDATES} candidates")
-            if ".local " not in line:
+            if not _has_name(line):
                 candidates.append(FragmentCandidate(mid, line[2:]))
         elif line and line[1:2] != "=":
             raise BadSdpFragment("a line that is not SDP")

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from aiortc import RTCIceCandidate, RTCIceGatherer, RTCIceServer, RTCPeerConnection, RTCSessionDescription
 from aiortc.sdp import SessionDescription, candidate_from_sdp, candidate_to_sdp
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
 from server.access import Identity
 from server.api_ice import servers_for
@@ -36,6 +36,7 @@ from server.offer import (
     parse_fragment,
     prepare_offer,
 )
+from server.offer_sections import answerable
 from server.peer_guards_private import guard_data
 from server.services import Services, authorized, services
 from server.webrtc_peer import WebRtcPeer
@@ -69,14 +70,16 @@ async def create(
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(identity.token_id)  # before it costs anything
     text = await read_text(request, SDP, here.settings.max_sdp_bytes)
-    offer = prepare_offer(text, max(MAX_SECTIONS, len(here.media.offers) + FURTHER_SECTIONS))
+    offer = answerable(prepare_offer(text, max(MAX_SECTIONS, len(here.media.offers) + FURTHER_SECTIONS)))
     ice = servers_for(here.settings, identity.token_id)
     thumbnail = view == "thumbnail"
     if thumbnail:
         identity = identity._replace(role="observer")
     relayed = bool(relay) and not thumbnail and identity.role == "observer" and here.relays.arrived(relay)
     with here.console.peers.place(identity, relayed=relayed, thumbnail=thumbnail):
-        peer, answer = await _negotiate(here, identity, offer, ice, trailer=stamp == "trailer", thumbnail=thumbnail)
+        peer, answer = await _negotiate(
+            here, identity, offer.text, ice, trailer=stamp == "trailer", thumbnail=thumbnail
+        )
         peer.relay = relay if relayed else ""
         here.console.peers.admit(peer)
     headers = {
@@ -87,7 +90,18 @@ async def create(
     }
     if ice.ice_servers:
         headers["Link"] = ", ".join(link_headers(ice))
-    return Response(answer, status_code=201, media_type=SDP, headers=headers)
+    return Response(offer.answer(answer), status_code=201, media_type=SDP, headers=headers)
+
+
+@router.options("/whep")
+async def options() -> Response:
+    """What may be posted here (draft-ietf-wish-whep 4.2); a browser's preflight is answered before it comes here."""
+    return Response(status_code=204, headers={"Accept-Post": SDP, "Allow": "OPTIONS, POST"})
+
+
+@router.get("/whep")
+async def nothing_to_get() -> Response:
+    raise HTTPException(405, "offers are posted here", {"Allow": "OPTIONS, POST"})
 
 
 @router.patch("/whep/{resource}")
