@@ -93,13 +93,13 @@ async def create(
     return Response(offer.answer(answer), status_code=201, media_type=SDP, headers=headers)
 
 
-@router.options("/whep")
+@router.options("/whep", include_in_schema=False)
 async def options() -> Response:
     """What may be posted here (draft-ietf-wish-whep 4.2); a browser's preflight is answered before it comes here."""
     return Response(status_code=204, headers={"Accept-Post": SDP, "Allow": "OPTIONS, POST"})
 
 
-@router.get("/whep")
+@router.get("/whep", include_in_schema=False)
 async def nothing_to_get() -> Response:
     raise HTTPException(405, "offers are posted here", {"Allow": "OPTIONS, POST"})
 
