@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol, TypeVar
 from robot_bridge.errors import StateDirUnusable
 from robot_bridge.protocol.messages import StopTaken
 from robot_bridge.stop_latch import StopLatch
-from robot_bridge.stop_store import Kept, StopStore, start_of, wall_microseconds
+from robot_bridge.stop_store import RESERVED, Kept, StopStore, start_of, wall_microseconds
 
 __all__ = ["StopAsker", "StopKeeper"]
 
@@ -69,7 +69,7 @@ class StopKeeper:
             self._latch = StopLatch(numbers_after=wall)
             return self._latch
         start = start_of(await self._in_thread(self._store.open), wall)
-        self._latch = StopLatch(start.record, numbers_after=start.numbers_after, keeps=True)
+        self._latch = StopLatch(start.record, numbers_after=start.numbers_after, keeps=True, now=now)
         if start.stop_reason:
             self._latch.stop("", "robot bridge", start.stop_reason, now)
             _logger.warning("the robot starts stopped: %s", start.stop_reason)
@@ -138,7 +138,7 @@ class StopKeeper:
 
     async def _write(self, store: StopStore, *, ended: bool) -> None:
         version, record = self._latch.version, self._latch.record
-        if (newest := self._latch.last_number) >= self._reserved:
+        if (newest := self._latch.last_number) + RESERVED // 2 >= self._reserved:  # long before the last is given
             self._reserved = await self._in_thread(partial(store.reserve, newest))
         await self._in_thread(partial(store.write, Kept(latch=record, ended=ended)))
         self._on_disk = version

@@ -88,10 +88,18 @@ WriteOutcome = ResetTaken | ResetRefused | None
 class StopLatch:
     """Gives every new press the next number, and releases only for a reset that names the newest."""
 
-    def __init__(self, record: StopRecord | None = None, *, numbers_after: int = 0, keeps: bool = False) -> None:
+    def __init__(
+        self,
+        record: StopRecord | None = None,
+        *,
+        numbers_after: int = 0,
+        keeps: bool = False,
+        now: float = -math.inf,
+    ) -> None:
         """`record`: as it was left; None before the first run. `numbers_after`: no number up to this is given again.
 
-        `keeps`: whether there is a disk that `record` is written to.
+        `keeps`: whether there is a disk that `record` is written to. `now`: a stop that was left counts as new, since
+        nobody knows how long ago it was.
         """
         record = record or StopRecord()
         self.version = 0  # of `record`; raised by whatever has to be written
@@ -101,7 +109,7 @@ class StopLatch:
         self._keeps = keeps
         self._presses: dict[str, int] = dict(record.presses)  # oldest first
         self._last_number = max(record.number, numbers_after)
-        self._stopped_at = -math.inf  # s, when the newest stop came
+        self._stopped_at = now  # s, when the newest stop came
         self._shown = 0  # newest stop that a feedback has shown
         self._resetting: tuple[int, int] | None = None  # number of the reset that waits for the disk, and its version
         self._written = 0  # newest version on the disk

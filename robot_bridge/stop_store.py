@@ -17,7 +17,7 @@ import msgspec
 from robot_bridge.errors import StateDirInUse, StateDirUnusable
 from robot_bridge.stop_latch import MAX_NUMBER, StopRecord
 
-__all__ = ["Found", "Kept", "Start", "StopStore", "start_of", "wall_microseconds"]
+__all__ = ["RESERVED", "Found", "Kept", "Start", "StopStore", "start_of", "wall_microseconds"]
 
 STOP_FILE = "stop.json"
 NUMBERS_FILE = "numbers.json"
@@ -69,8 +69,8 @@ def wall_microseconds() -> int:
 def start_of(found: Found, wall_microseconds: int) -> Start:
     """What a bridge begins with that finds this. `wall_microseconds`: since 1970, by a clock that may be wrong.
 
-    Numbers go on after the newest on the disk. The clock and the reserve only matter when that one is not known: a
-    directory that was deleted, restored from a backup, or damaged.
+    Numbers go on after the newest on the disk. The clock and the reserve matter when that one may not be the newest: a
+    directory that was deleted, restored from a backup, or damaged, and a bridge that did not end in order.
     """
     clock = max(0, min(wall_microseconds, LATEST_CLOCK))
     if found.kept is None:
@@ -79,8 +79,11 @@ def start_of(found: Found, wall_microseconds: int) -> Start:
         what = f"cannot be read ({found.trouble})" if found.trouble else "is missing"
         return Start(StopRecord(), max(clock, found.reserved), f"The robot's stop file {what}")
     record = found.kept.latch
-    unclean = "" if found.kept.ended else "The robot bridge did not end in order: power cut, kill or crash"
-    return Start(record, max(clock, record.number), unclean)
+    if found.kept.ended:
+        return Start(record, max(clock, record.number), "")
+    # It may have given numbers that never reached the disk.
+    numbers_after = max(clock, record.number, found.reserved)
+    return Start(record, numbers_after, "The robot bridge did not end in order: power cut, kill or crash")
 
 
 class StopStore:

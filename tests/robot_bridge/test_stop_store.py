@@ -53,6 +53,7 @@ def test_a_bridge_that_did_not_end_in_order_begins_stopped(tmp_path: Path, recor
     start = start_of(found(tmp_path), WALL)
     assert start.record == record
     assert "did not end in order" in start.stop_reason
+    assert start.numbers_after > record.number + 1000, "numbers that never reached the disk may have been given"
 
 
 def test_a_used_directory_without_the_stop_file_begins_stopped_and_its_numbers_go_on(tmp_path: Path) -> None:
