@@ -69,6 +69,7 @@ class Bridge:
         self._core = EventCore(
             self.description.axes,
             max_event_age=self.description.max_event_age,
+            max_event_rate=self.description.max_event_rate,
             first_event=settings.first_event,
             start_warning=self.description.start_warning,
         )

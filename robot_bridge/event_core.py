@@ -20,6 +20,7 @@ from robot_bridge.stop_latch import ResetOutcome, ResetTaken, StopGiven, StopLat
 __all__ = ["Absorbed", "Answered", "CommandOutcome", "EventCore", "Executed", "Refused", "draw_nonce"]
 
 REFRESH_INTERVAL = 0.5  # s between issues of the same event while nothing is commanded
+BURST = 2  # events that may come ahead of the event rate: the network bunches what was sent in time
 MAX_REMEMBERED_ISSUES = 1024  # of the current event; a forgotten issue counts as late
 MAX_NONCE = 2**53 - 1  # what a JavaScript number holds exactly
 
@@ -73,11 +74,12 @@ class EventCore:
         *,
         max_event_age: float,
         first_event: int = FIRST_EVENT,
+        max_event_rate: float = math.inf,
         refresh_interval: float = REFRESH_INTERVAL,
         start_warning: StartWarning | None = None,
         nonces: Callable[[], int] = draw_nonce,
     ) -> None:
-        """`nonces`: draws that of each issue."""
+        """`max_event_rate`: Hz, of answered commands. `nonces`: draws that of each issue."""
         if not is_event(first_event):
             raise ValueError(f"the first event must be a valid reference, not {first_event}")
         self._rest_values = [axis.rest for axis in axes]
@@ -85,6 +87,8 @@ class EventCore:
         self._drives = [axis.name != self._signal for axis in axes]  # all axes but a light or horn
         self._max_event_age = max_event_age
         self._refresh_interval = refresh_interval
+        self._interval = 1 / max_event_rate  # s between two answers
+        self._answer_at = -math.inf  # s, when an answer would be due if all of them kept that interval
         self._current = first_event  # s: latest executed and answered event, 1
         self._pending: int | None = None  # executed, waiting for its feedback, 2
         self._feedback: Feedback | None = None  # latest issue of the current event; None before the first
@@ -243,8 +247,14 @@ class EventCore:
         self._issue_wanted = True
 
     def issue_due(self, now: float) -> bool:
-        """Whether to measure and `issue` now."""
+        """Whether to measure and `issue` now.
+
+        An answer that comes sooner than the event rate allows waits, and with it the next event: nothing is refused.
+        A stop is fed back at once.
+        """
         self._look(now)
+        if self._pending is not None and not self._latch.state.stopped:
+            return now >= self._answer_at - BURST * self._interval
         if self._pending is not None or self._issue_wanted or self._feedback is None:
             return True
         return now - self._issued_at >= self._refresh_interval
@@ -264,6 +274,7 @@ class EventCore:
         """
         if self._pending is not None:
             self._current, self._pending = self._pending, None
+            self._answer_at = max(now, self._answer_at) + self._interval
             self._issued.clear()
             self._issue = 0
         self._issue += 1

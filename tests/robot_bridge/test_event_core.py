@@ -139,6 +139,51 @@ def test_the_same_event_is_measured_again_twice_a_second() -> None:
     assert not core.issue_due(100.999)
 
 
+def answered_at(core: EventCore, sent: list[float], until: float) -> list[float]:
+    """When the commands that are sent at these times, or as soon as they may be, are answered."""
+    now, answers = sent[0], []
+    while now < until:
+        feedback = core.feedback
+        assert feedback is not None
+        if core.pending is None and len(answers) < len(sent) and now >= sent[len(answers)]:
+            core.command(command(event_after(feedback.event), issue=feedback.issue, values=NEUTRAL), now)
+        if core.issue_due(now) and core.issue(MEASURED, now).event != feedback.event:
+            answers.append(now)
+        now += 0.001
+    return answers
+
+
+def paced_core() -> EventCore:
+    core = EventCore(AXES, max_event_age=MAX_AGE, max_event_rate=25.0, nonces=lambda: NONCE)
+    core.issue(MEASURED, 100.0)
+    return core
+
+
+def test_a_burst_of_commands_is_answered_at_the_event_rate_and_none_is_refused() -> None:
+    answers = answered_at(paced_core(), [100.0] * 20, 101.0)
+    assert len(answers) == 20
+    assert answers[2] - answers[0] < 0.01, "a few may come at once"
+    assert all(when - answers[0] >= (number - 2) * 0.04 - 1e-6 for number, when in enumerate(answers))
+
+
+def test_a_driver_that_keeps_the_event_rate_never_waits_however_its_commands_are_bunched() -> None:
+    sent = [100.0 + 0.04 * (3 * (number // 3)) for number in range(20)]
+    answers = answered_at(paced_core(), sent, 102.0)
+    assert all(answer - when < 0.005 for answer, when in zip(answers, sent, strict=True))
+
+
+def test_a_stop_is_fed_back_at_once_also_while_an_answer_waits() -> None:
+    core = paced_core()
+    for event in range(2, 5):
+        core.command(command(event, values=NEUTRAL), 100.0)
+        if core.issue_due(100.0):
+            core.issue(MEASURED, 100.0)
+    assert core.pending == 4
+    assert not core.issue_due(100.001)
+    core.stop("", "Ada", "", 100.001)
+    assert core.issue_due(100.001)
+
+
 def test_somebody_who_joins_gets_an_issue() -> None:
     core = core_at()
     core.want_issue()

@@ -64,6 +64,13 @@ class StopLife(RuleBasedStateMachine):
             self.a_tick_ends()
             self.deliver(self.answer(self.seen[-1], values))
 
+    @rule()
+    def the_bridge_is_held_up_while_a_neutral_command_is_on_its_way(self) -> None:
+        on_its_way = self.answer(self.seen[-1], NEUTRAL)
+        self.bridge.held_up()
+        self.deliver(on_its_way)
+        self.a_tick_ends()
+
     @precondition(lambda self: self.sent)
     @rule(data=st.data())
     def the_network_delivers_a_copy(self, data: st.DataObject) -> None:

@@ -5,6 +5,8 @@
 
 static const uint32_t LAST_EVENT = 0x7fffffff;
 static const double LEAST_STOP = 1.0; /* s between the newest stop and a reset */
+static const double EVENT_INTERVAL = 1 / 25.0; /* s, of max_event_rate; the description leaves it at its default */
+static const int BURST = 2;                    /* events that may come ahead of it */
 static const double REFRESH = 0.5; /* s between feedbacks while nothing is commanded */
 
 static uint32_t event_after(uint32_t event) { return event == LAST_EVENT ? 1 : event + 1; }
@@ -21,7 +23,7 @@ void events_begin(events *of, uint64_t numbers_after) {
     of->current = 1;
     of->wanted = of->neutral_needed = true;
     of->last_number = numbers_after;
-    of->deadline = -INFINITY;
+    of->deadline = of->answer_at = -INFINITY;
 }
 
 static bool known_and_fresh(const events *of, uint64_t issue, double now) {
@@ -145,6 +147,7 @@ bool events_at_rest(const events *of) {
 }
 
 bool events_issue_due(const events *of, double now) {
+    if (of->pending != 0 && !of->stopped) return now >= of->answer_at - BURST * EVENT_INTERVAL;
     return of->pending != 0 || of->wanted || now - of->issues[of->issue % ISSUES].time >= REFRESH;
 }
 
@@ -153,6 +156,7 @@ void events_issue(events *of, double now, uint64_t nonce) {
         of->current = of->pending;
         of->pending = 0;
         of->issue = 0;
+        of->answer_at = fmax(now, of->answer_at) + EVENT_INTERVAL;
     }
     of->issue++;
     of->issues[of->issue % ISSUES] = (issued){now, nonce, of->spell};

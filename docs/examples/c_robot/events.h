@@ -31,6 +31,7 @@ typedef struct {
     uint32_t pending;          /* executed, waiting for its feedback; 0: none */
     uint32_t issue;            /* of the newest feedback of s */
     issued issues[ISSUES];     /* by issue modulo ISSUES */
+    double answer_at;          /* s, when an answer would be due if all of them kept the event rate */
     bool wanted;               /* a feedback is wanted at the end of this tick */
     uint32_t rested;           /* moving commands up to this event are void; 0: none */
     bool neutral_needed;       /* no moving command executes before a neutral one */
