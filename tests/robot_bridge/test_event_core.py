@@ -173,15 +173,16 @@ def test_a_driver_that_keeps_the_event_rate_never_waits_however_its_commands_are
 
 
 def test_a_stop_is_fed_back_at_once_also_while_an_answer_waits() -> None:
-    core = paced_core()
-    for event in range(2, 5):
-        core.command(command(event, values=NEUTRAL), 100.0)
-        if core.issue_due(100.0):
-            core.issue(MEASURED, 100.0)
-    assert core.pending == 4
-    assert not core.issue_due(100.001)
-    core.stop("", "Ada", "", 100.001)
-    assert core.issue_due(100.001)
+    core, now = paced_core(), 100.0
+    for event in range(2, 6):
+        now += 0.001
+        core.command(command(event, values=NEUTRAL), now)
+        if core.issue_due(now):
+            core.issue(MEASURED, now)
+    assert core.pending == 5
+    assert not core.issue_due(now + 0.001)
+    core.stop("", "Ada", "", now + 0.001)
+    assert core.issue_due(now + 0.001)
 
 
 def test_somebody_who_joins_gets_an_issue() -> None:
