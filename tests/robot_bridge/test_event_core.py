@@ -141,7 +141,8 @@ def test_the_same_event_is_measured_again_twice_a_second() -> None:
 
 def answered_at(core: EventCore, sent: list[float], until: float) -> list[float]:
     """When the commands that are sent at these times, or as soon as they may be, are answered."""
-    now, answers = sent[0], []
+    now = sent[0]
+    answers: list[float] = []
     while now < until:
         feedback = core.feedback
         assert feedback is not None

@@ -152,12 +152,14 @@ def test_a_robot_that_is_driven_stopped_reset_and_armed_as_it_should_be_moves() 
     """Or nothing above would be worth anything."""
     life = StopLife()
     life.begin(1, True)
-    life.the_operator_drives_as_it_should(MOVES[0])
-    assert life.bridge.driven
-    life.somebody_stops("a" * 32)
-    assert not life.bridge.driven
-    life.the_disk_writes()
-    life.somebody_resets_as_they_should()
-    assert not life.bridge.witness.holds
-    life.the_operator_drives_as_it_should(MOVES[0])
-    assert life.bridge.driven
+    states = []
+    for step in (
+        lambda: life.the_operator_drives_as_it_should(MOVES[0]),
+        lambda: life.somebody_stops("a" * 32),
+        life.the_disk_writes,
+        life.somebody_resets_as_they_should,
+        lambda: life.the_operator_drives_as_it_should(MOVES[0]),
+    ):
+        step()
+        states.append((life.bridge.driven, life.bridge.witness.holds))
+    assert states == [(True, False), (False, True), (False, True), (False, False), (True, False)]
