@@ -1,6 +1,8 @@
 """Random lives of a STOP: whatever happens in whatever order, the robot moves only after a reset that names the newest
 stop, then a neutral command, then another."""
 
+from collections.abc import Callable
+
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -153,13 +155,14 @@ def test_a_robot_that_is_driven_stopped_reset_and_armed_as_it_should_be_moves() 
     life = StopLife()
     life.begin(1, True)
     states = []
-    for step in (
+    steps: list[Callable[[], object]] = [
         lambda: life.the_operator_drives_as_it_should(MOVES[0]),
         lambda: life.somebody_stops("a" * 32),
-        life.the_disk_writes,
-        life.somebody_resets_as_they_should,
+        lambda: life.the_disk_writes(),
+        lambda: life.somebody_resets_as_they_should(),
         lambda: life.the_operator_drives_as_it_should(MOVES[0]),
-    ):
+    ]
+    for step in steps:
         step()
         states.append((life.bridge.driven, life.bridge.witness.holds))
     assert states == [(True, False), (False, True), (False, True), (False, False), (True, False)]
