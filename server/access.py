@@ -13,7 +13,7 @@ from robot_bridge.protocol.console import Role
 from server.audit import Actor
 from server.errors import LinkExpired, LinkOtherRobot, LinkRevoked, NotAllowed, TokenInvalid, TokenMissing
 
-__all__ = ["MAX_ROBOTS", "Access", "Identity", "RobotName", "require_role"]
+__all__ = ["MAX_ROBOTS", "Access", "Identity", "RobotName", "bearer_token", "require_role"]
 
 ALGORITHM = "HS256"
 MAX_TOKEN = 4096  # characters; ours have about 200, and 40 more for each robot that they name
@@ -138,10 +138,10 @@ class Access:
             TokenMissing: there is no bearer token.
             AccessError: as `verify`.
         """
-        scheme, _, token = (authorization or "").partition(" ")
-        if scheme.lower() != "bearer" or not token.strip():
+        token = bearer_token(authorization)
+        if not token:
             raise TokenMissing("send the token as: Authorization: Bearer TOKEN")
-        return self.verify(token.strip())
+        return self.verify(token)
 
     def issue_ticket(self, token_id: str = "") -> str:
         """A short-lived permission to watch the 3D scene, for the holder of the link `token_id`.
@@ -193,6 +193,12 @@ class Access:
             return claims
         except (jwt.InvalidTokenError, msgspec.DecodeError, UnicodeError, RecursionError) as error:
             raise TokenInvalid(INVALID) from error
+
+
+def bearer_token(authorization: str | None) -> str:
+    """The token in an Authorization header (RFC 6750 2.1); "" when there is none."""
+    scheme, _, token = (authorization or "").partition(" ")
+    return token.strip() if scheme.lower() == "bearer" else ""
 
 
 def require_role(identity: Identity, *roles: Role) -> None:

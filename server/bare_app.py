@@ -4,14 +4,19 @@ import asyncio
 
 import structlog
 from fastapi import Depends, FastAPI
+from starlette.datastructures import Headers
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import HTTPConnection
-from starlette.types import Lifespan
+from starlette.types import Lifespan, Scope
 
+from server.access import bearer_token
+from server.connection_places import ConnectionPlaces
 from server.error_answers import answer_errors, count_refused
+from server.errors import AccessError
 from server.front_door import FrontDoor, HostNames
 from server.guard import Guard
 from server.house import House, HouseMetrics
+from server.known_tokens import KnownTokens
 from server.media.aiortc_private import own_addresses, restrict_ice_hosts
 from server.rate_limits import RateLimits
 from server.security import SAFE_METHODS, SecurityHeaders, check_origin
@@ -68,11 +73,18 @@ def guard_app(app: FastAPI, settings: Settings) -> None:
             allow_headers=["Authorization", "Content-Type", "If-Match"],
             expose_headers=["Location", "ETag", "Link"],
         )
+    places = ConnectionPlaces.within(settings, lambda name: count_refused({"app": app}, name))
+    known = KnownTokens()
+    app.state.connection_places, app.state.known_tokens = places, known
     app.add_middleware(
         FrontDoor,
         hosts=HostNames((settings.host, *settings.own_names)),
         requests=RateLimits(settings.max_request_rate, settings.max_request_burst),
+        health=RateLimits(settings.max_request_rate, settings.max_request_burst),
         count=count_refused,
+        link_of=lambda scope: _link_of(scope, known),
+        places=places,
+        caught=_caught,
     )
     app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None, relays=settings.relay_origins)
 
@@ -87,6 +99,31 @@ def _restrict_ice(settings: Settings) -> None:
         restrict_ice_hosts(settings.ice_hosts)
     elif settings.bound_to_loopback:
         restrict_ice_hosts([settings.host if settings.host != "localhost" else LOOPBACK, *own_addresses()])
+
+
+def _link_of(scope: Scope, known: KnownTokens) -> str:
+    """The link whose good token a request brings; "" without one. What it opens is each route's to say."""
+    token = bearer_token(Headers(scope=scope).get("authorization"))
+    house = getattr(scope["app"].state, "house", None)
+    if not token or not isinstance(house, House):
+        return ""
+    try:
+        link = house.state.access.at(None).verify(token).token_id
+    except AccessError:
+        return ""
+    known.add(token)
+    return link
+
+
+def _caught(scope: Scope, error: Exception) -> None:
+    house = scope["app"].state.house
+    if isinstance(house, House):
+        house.metrics.faults.caught("http", error, method=scope.get("method", ""), route=_route(scope))
+
+
+def _route(scope: Scope) -> str:
+    """Not the path: one may hold a ticket."""
+    return str(getattr(scope.get("route"), "path", ""))
 
 
 async def _same_origin(connection: HTTPConnection) -> None:

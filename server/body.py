@@ -9,6 +9,7 @@ from fastapi import Request
 from starlette.requests import ClientDisconnect
 
 from server.errors import BadJson, BodyTooLarge, BodyTooSlow, WrongMediaType
+from server.guarded_http import DEADLINE
 
 __all__ = ["media_type", "read_json", "read_text"]
 
@@ -60,7 +61,7 @@ async def read_json(request: Request, kind: type[Body]) -> Body:
 async def _read(request: Request, bound: int) -> bytes:
     body = bytearray()
     try:
-        async with asyncio.timeout(request.app.state.settings.request_timeout):
+        async with asyncio.timeout_at(_deadline(request)):
             async for chunk in request.stream():
                 body += chunk
                 if len(body) > bound:
@@ -70,3 +71,12 @@ async def _read(request: Request, bound: int) -> bytes:
     except ClientDisconnect as error:
         raise BodyTooSlow("the body never came whole") from error
     return bytes(body)
+
+
+def _deadline(request: Request) -> float:
+    """On the loop's clock: of head and body together, where the connection measures them."""
+    found = request.scope.get("state", {}).get(DEADLINE)
+    if isinstance(found, float):
+        return found
+    timeout: float = request.app.state.settings.request_timeout
+    return asyncio.get_running_loop().time() + timeout

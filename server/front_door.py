@@ -8,18 +8,23 @@ from urllib.parse import urlsplit
 
 import msgspec
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.errors import ConsoleError, HostRefused, TooManyRequests, http_error
+from server.client_address import counted_address
+from server.connection_places import ConnectionPlaces, Place
+from server.errors import ConsoleError, HostRefused, InternalFault, TooManyRequests, http_error
+from server.guarded_http import PLACE
 from server.rate_limits import RateLimits
 from server.request_turns import RequestTurns
 from server.robot_paths import below_robot
 
 __all__ = ["FrontDoor", "HostNames", "client_address"]
 
-# A stop is never turned away and never waits; a health check must not fail for others' floods.
-UNLIMITED = ("/api/stop", "/api/fleet/stop", "/healthz", "/readyz")
+STOPS = ("/api/stop", "/api/fleet/stop")  # with a good token never turned away, and never waiting
+HEALTH = ("/healthz", "/readyz")  # counted apart: a check must not fail for what else comes from its address
 POLICY_VIOLATION = 1008  # RFC 6455 7.4.1
+PATIENCE = 5  # requests in a row that are turned away, then the connection is closed
+CLOSE = (b"connection", b"close")
 
 
 class HostNames:
@@ -47,7 +52,11 @@ class HostNames:
 
 
 class FrontDoor:
-    """An ASGI middleware, for HTTP and WebSockets. Refusals are counted by name and answered like all others."""
+    """An ASGI middleware, for HTTP and WebSockets. Refusals are counted by name and answered like all others.
+
+    What brings a good token is served before what does not, and keeps its connection when there are too many; a stop
+    that brings one passes every limit. A fault in what is behind is answered by name, counted, and goes no further.
+    """
 
     def __init__(
         self,
@@ -56,48 +65,92 @@ class FrontDoor:
         requests: RateLimits,
         count: Callable[[Scope, str], None],
         clock: Callable[[], float] = time.monotonic,
+        *,
+        health: RateLimits | None = None,
+        link_of: Callable[[Scope], str] = lambda scope: "",
+        places: ConnectionPlaces | None = None,
+        caught: Callable[[Scope, Exception], None] | None = None,
     ) -> None:
+        """`health`: of health checks. `link_of`: the link whose good token a request brings, "" without one."""
         self._app = app
         self._hosts = hosts
         self._requests = requests
+        self._health = requests if health is None else health
         self._count = count
         self._clock = clock
+        self._link_of = link_of
+        self._places = places
+        self._caught = caught
         self._turns = RequestTurns()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+        address, link = client_address(scope), self._link_of(scope)
+        place = scope.get("state", {}).get(PLACE)
+        if isinstance(place, Place) and self._places is not None:
+            if not self._places.serve(place, address, link):
+                return  # others needed its place
+            send = _patient(send, place)
         try:
-            self._check(scope)
+            self._check(scope, address, link)
         except ConsoleError as error:
             self._count(scope, http_error(error).name)
             await _refuse(scope, send, error)
-        else:
-            if not _is_unlimited(scope):
-                await self._turns.take(client_address(scope))
-            await self._app(scope, receive, send)
+            return
+        if not (link and _is_one_of(scope, STOPS)):
+            await self._turns.take(link or address, first=bool(link))
+        await self._serve(scope, receive, send)
 
-    def _check(self, scope: Scope) -> None:
+    def _check(self, scope: Scope, address: str, link: str) -> None:
         self._hosts.check(Headers(scope=scope).get("host"))
-        if not _is_unlimited(scope) and not self._requests.spend(client_address(scope), self._clock()):
+        if link and _is_one_of(scope, STOPS):
+            return
+        limits = self._health if _is_one_of(scope, HEALTH) else self._requests
+        if not limits.spend(address, self._clock()):
             raise TooManyRequests("too many requests from this address")
 
+    async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
+        started = False
 
-def _is_unlimited(scope: Scope) -> bool:
-    return below_robot(scope["path"]) in UNLIMITED
+        async def watched(message: Message) -> None:
+            nonlocal started
+            started = True
+            await send(message)
+
+        try:
+            await self._app(scope, receive, watched)
+        except Exception as error:
+            if self._caught is None:
+                raise
+            self._caught(scope, error)
+            if not started:
+                await _refuse(scope, send, InternalFault("the console could not answer; it has written down why"))
+
+
+def _is_one_of(scope: Scope, paths: tuple[str, ...]) -> bool:
+    return below_robot(scope["path"]) in paths
+
+
+def _patient(send: Send, place: Place) -> Send:
+    """Closes the connection of who is turned away again and again. A good token in between forgives all."""
+
+    async def counted(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            refused = 400 <= message["status"] < 500 and (not place.link or message["status"] == 429)
+            place.refused = place.refused + 1 if refused else 0
+            if place.refused >= PATIENCE:
+                message = {**message, "headers": [*message.get("headers", []), CLOSE]}
+        await send(message)
+
+    return counted
 
 
 def client_address(scope: Scope) -> str:
-    """Of one client; IPv6 clients own at least a /64, so that counts as one."""
+    """Of one client, as it is counted."""
     client = scope.get("client")
-    if client is None:
-        return ""
-    try:
-        address = ipaddress.ip_address(client[0])
-    except ValueError:
-        return str(client[0])
-    return str(address) if address.version == 4 else str(ipaddress.ip_network((address, 64), strict=False))
+    return "" if client is None else counted_address(str(client[0]))
 
 
 async def _refuse(scope: Scope, send: Send, error: ConsoleError) -> None:

@@ -1,69 +1,99 @@
-"""HTTP connections with bounds: how many there may be, and how long a request's head may take.
+"""HTTP connections with bounds: what each sends has its turn, and one deadline holds for all of an exchange.
 
-uvicorn bounds the size of a head and the time between two requests, but waits for ever for the rest of a head that has
-begun, and takes any number of connections.
+uvicorn bounds the size of a head and the time between two requests. It waits for ever for the rest of a request that
+has begun and for a client that does not read its answer, and handles whatever has come at once.
 """
 
 import asyncio
-from collections import Counter
-from collections.abc import Callable
+import re
+from typing import NamedTuple
 
 import h11
 from starlette.applications import Starlette
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from server.acceptor import PlacedProtocol
+from server.connection_places import ConnectionPlaces, Place
+from server.known_tokens import KnownTokens
 from server.limit_settings import LimitSettings
+from server.request_turns import RequestTurns
+from server.token_bucket import TokenBucket
 
-__all__ = ["ConnectionBounds", "guarded_by", "guarded_http"]
+__all__ = ["DEADLINE", "PLACE", "GuardedConnections", "guarded_by", "guarded_http"]
 
-
-class ConnectionBounds:
-    """How many connections there are, in all and from each address. `on_refused` gets a stable name to count."""
-
-    def __init__(self, total: int, per_address: int, on_refused: Callable[[str], None]) -> None:
-        self.on_refused = on_refused
-        self._total = total
-        self._per_address = per_address
-        self._open: Counter[str] = Counter()
-
-    def __len__(self) -> int:
-        return self._open.total()
-
-    def enter(self, address: str) -> bool:
-        if len(self) >= self._total or self._open[address] >= self._per_address:
-            self.on_refused("too_many_connections")
-            return False
-        self._open[address] += 1
-        return True
-
-    def leave(self, address: str) -> None:
-        self._open[address] -= 1
-        if self._open[address] <= 0:
-            del self._open[address]
+DEADLINE, PLACE = "request_deadline", "place"  # keys of a request's `state`
+GRACE = 1.0  # s after the deadline, in which the answer that says so may leave
+LEAST_READ = 16 * 1024  # bytes of an answer that a client reads within the time of a request
+BEARER = re.compile(rb"\r\nauthorization:[ \t]*bearer[ \t]+([!-~]{1,4096})[ \t]*\r\n", re.IGNORECASE)
 
 
-def guarded_http(bounds: ConnectionBounds, head_seconds: float) -> type[H11Protocol]:
-    """uvicorn's protocol within `bounds`."""
+class GuardedConnections(NamedTuple):
+    """What `server.serve.running` needs to take connections within bounds."""
 
-    class GuardedHttp(H11Protocol):
-        _address: str | None = None  # while it is counted
-        _head_timer: asyncio.TimerHandle | None = None
+    protocol: type[PlacedProtocol]
+    places: ConnectionPlaces
+    turns: RequestTurns
+
+
+def guarded_http(
+    places: ConnectionPlaces, turns: RequestTurns, tokens: KnownTokens, seconds: float
+) -> type[PlacedProtocol]:
+    """uvicorn's protocol within bounds. `seconds`: for a whole request, and for each part of its answer."""
+
+    class GuardedHttp(H11Protocol, PlacedProtocol):
+        place: Place
+        _timer: asyncio.TimerHandle | None = None
+        _asked = False  # for a turn
+        _read = True  # whether the client has read something of its answer since it was looked at
+        _unread = 0  # bytes, when it was looked at
+        _upgraded = False
+        _awaited = True  # a whole request, or the rest of one
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
-            address = self.client[0] if self.client else ""
-            if not bounds.enter(address):
+            self._arrived = bytearray()
+            self.app_state = {**self.app_state, PLACE: self.place}
+            self.place.close = transport.abort
+            if self.place.group is None:  # it was taken away in the handshake
                 transport.abort()
                 return
-            self._address = address
-            self._expect_head()
+            self._begin()
 
         def data_received(self, data: bytes) -> None:
-            if self.conn.their_state is h11.IDLE and self._head_timer is None:
-                self._expect_head()
-            super().data_received(data)
-            if self.conn.their_state is not h11.IDLE:
-                self._head_came()
+            self._arrived += data
+            if not self._asked:
+                self._asked = True
+                self.transport.pause_reading()
+                first = self._brings_known_token() if self.conn.their_state is h11.IDLE else bool(self.place.link)
+                turns.ask(self.place.link if first and self.place.link else self.place.address, self._take, first=first)
+
+        def _brings_known_token(self) -> bool:
+            found = BEARER.search(self._arrived)
+            return found is not None and found[1].decode("ascii") in tokens
+
+        def _take(self) -> None:
+            """In its turn: what has come so far."""
+            self._asked = False
+            if self.transport.is_closing():
+                return
+            data, self._arrived = bytes(self._arrived), bytearray()
+            if not self._awaited and self.conn.their_state is h11.IDLE:
+                self._begin()
+            try:
+                super().data_received(data)
+            except BaseException:
+                self.transport.abort()
+                raise
+            if self._upgraded or not self.flow.read_paused:
+                self.transport.resume_reading()
+
+        def send_400_response(self, msg: str) -> None:
+            places.on_refused("bad_request")
+            super().send_400_response(msg)
+
+        def resume_writing(self) -> None:
+            self._read = True
+            super().resume_writing()
 
         def connection_lost(self, exc: Exception | None) -> None:
             self._leave()
@@ -71,39 +101,53 @@ def guarded_http(bounds: ConnectionBounds, head_seconds: float) -> type[H11Proto
 
         def handle_websocket_upgrade(self, event: h11.Request) -> None:
             self._leave()  # from here on another protocol has the connection; viewers are bounded by themselves
+            self._upgraded = True
             super().handle_websocket_upgrade(event)
 
         def on_response_complete(self) -> None:
-            self._head_came()  # between two requests uvicorn's own timer runs
             super().on_response_complete()
+            self._awaited = self.conn.their_state is h11.SEND_BODY  # else uvicorn's own timer runs, until the next one
 
-        def _expect_head(self) -> None:
-            self._head_timer = self.loop.call_later(head_seconds, self._too_slow)
+        def _begin(self) -> None:
+            """An exchange: from its first byte, or from the connection on."""
+            self._awaited = True
+            self.app_state[DEADLINE] = self.loop.time() + seconds
+            if self._timer is not None:
+                self._timer.cancel()
+            self._look_again(seconds)
 
-        def _head_came(self) -> None:
-            if self._head_timer is not None:
-                self._head_timer.cancel()
-                self._head_timer = None
+        def _look_again(self, after: float) -> None:
+            self._timer = self.loop.call_later(after, self._look)
 
-        def _too_slow(self) -> None:
-            self._head_timer = None
-            bounds.on_refused("too_slow")
+        def _look(self) -> None:
+            self._timer = None
+            now, unread = self.loop.time(), self.transport.get_write_buffer_size()
+            if self.conn.their_state is h11.SEND_BODY and now < self.app_state[DEADLINE] + GRACE:
+                self._look_again(GRACE)  # whoever waits for the body says by name that it did not come
+            elif self._awaited and self.conn.their_state in (h11.IDLE, h11.SEND_BODY):
+                self._end("too_slow")
+            elif unread and not self._read and unread > self._unread - LEAST_READ:
+                self._end("does_not_read")
+            else:
+                self._read, self._unread = False, unread
+                self._look_again(seconds)
+
+        def _end(self, why: str) -> None:
+            places.on_refused(why)
             self.transport.abort()
 
         def _leave(self) -> None:
-            self._head_came()
-            if self._address is not None:
-                bounds.leave(self._address)
-                self._address = None
+            if self._timer is not None:
+                self._timer.cancel()
+                self._timer = None
+            places.leave(self.place)
 
     return GuardedHttp
 
 
-def guarded_by(settings: LimitSettings, app: Starlette) -> type[H11Protocol]:
-    """The protocol with the settings' bounds; refusals are counted in the app's metrics."""
-
-    def refused(name: str) -> None:
-        app.state.house.metrics.bad_input.labels("http", name).inc()
-
-    bounds = ConnectionBounds(settings.max_connections, settings.max_address_connections, refused)
-    return guarded_http(bounds, settings.request_timeout)
+def guarded_by(settings: LimitSettings, app: Starlette) -> GuardedConnections:
+    """Connections within the settings' bounds to an app that `guard_app` has seen."""
+    places: ConnectionPlaces = app.state.connection_places
+    turns = RequestTurns(lambda now: TokenBucket(settings.max_stranger_rate, settings.max_stranger_burst, now))
+    protocol = guarded_http(places, turns, app.state.known_tokens, settings.request_timeout)
+    return GuardedConnections(protocol, places, turns)

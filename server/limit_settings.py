@@ -20,7 +20,9 @@ class LimitSettings(BaseSettings):
     max_unconnected: Annotated[int, Field(ge=1)] = 60  # peers of one token that have not connected yet
     reserved_places: Annotated[int, Field(ge=0)] = 10  # of max_peers; observers do not get these
     max_connections: Annotated[int, Field(ge=1)] = 1000  # TCP, all together
-    max_address_connections: Annotated[int, Field(ge=1)] = 300  # TCP, one address
-    request_timeout: Annotated[float, Field(gt=0)] = 10.0  # s for a request's head, and for its body
+    max_address_connections: Annotated[int, Field(ge=1)] = 300  # TCP, one address; one link
+    max_stranger_rate: Annotated[float, Field(gt=0)] = 400.0  # pieces of HTTP without a good token, all together
+    max_stranger_burst: Annotated[int, Field(ge=1)] = 2000
+    request_timeout: Annotated[float, Field(gt=0)] = 10.0  # s for a request, and for a part of its answer to be read
     max_observer_rate: Annotated[float, Field(gt=0)] = 20.0  # messages of an observer; their pages send five
     max_bad_messages: Annotated[int, Field(ge=1)] = 100  # of one peer, then it is closed; two a second are forgiven

@@ -6,6 +6,8 @@ What is used and why:
   `._last_received_tsn`, `._advertised_rwnd`: aiortc announces a receive window (RFC 9260 6.2) and does not insist on
   it; a message that never ends, holes in the numbering and 65,536 streams would each be kept without bound
 - `aioice.stun.parse_message`: raises what its caller does not expect, of a datagram that anybody can send
+- `aioice.ice.StunProtocol.datagram_received`, `.receiver`, `.transactions`, `aioice.Connection.local_username`: a check
+  with false credentials would be parsed, hashed and answered, and anybody can send ten thousand a second
 - `aioice.Connection.check_incoming`, `._remote_candidates`: every address that an authenticated check comes from
   becomes a candidate, and every candidate a check of ours
 """
@@ -16,10 +18,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+import aioice.ice
 import aioice.stun
 from aiortc import RTCPeerConnection
 from aiortc.rtcsctptransport import SCTP_DATA_UNORDERED, ForwardTsnChunk
 from aiortc.utils import uint32_gt, uint32_gte
+
+from server.token_bucket import TokenBucket
 
 __all__ = ["guard_data", "guard_ice"]
 
@@ -29,10 +34,14 @@ MAX_GAPS = 1024  # chunks that came before an earlier one
 ENOUGH_GAPS = 256  # so many, and what is missing before them is looked at
 GIVEN_UP_SECONDS = 5.0  # after which a chunk that may be given up is not repeated any more
 MAX_ADDRESSES = 200  # of one peer; a browser has a few
+CHECK_RATE, CHECK_BURST = 200.0, 1000.0  # Hz, connectivity checks of one peer; it paces them at 50 (RFC 8445 14.2)
+STUN_HEADER = 20  # bytes
+STUN_BELOW = 4  # RFC 7983 7: the first byte of a STUN message
 
 Refused = Callable[[str], None]
 
 _parse_message = aioice.stun.parse_message  # aioice's own
+_datagram_received = aioice.ice.StunProtocol.datagram_received  # likewise
 
 
 def guard_data(pc: RTCPeerConnection, on_refused: Refused, clock: Callable[[], float] = time.monotonic) -> None:
@@ -123,6 +132,9 @@ def guard_ice(connection: Any, on_refused: Refused) -> None:
     of an RTP packet may be. What is none after all passes for data, process-wide, and raises nothing.
     """
     aioice.stun.parse_message = _parse_or_refuse
+    vars(aioice.ice)["StunProtocol"].datagram_received = _take_datagram
+    connection.stun_budget = TokenBucket(CHECK_RATE, CHECK_BURST, time.monotonic())
+    connection.stun_refused = on_refused
     check = connection.check_incoming
 
     def check_bounded(message: Any, address: tuple[str, int], protocol: Any) -> None:
@@ -140,3 +152,26 @@ def _parse_or_refuse(data: bytes) -> aioice.stun.Message:
         return _parse_message(data)
     except struct.error as error:
         raise ValueError("a STUN attribute of the wrong length") from error
+
+
+def _take_datagram(protocol: Any, data: bytes, address: tuple[Any, ...]) -> None:
+    """Before anything is parsed: STUN that cannot be for us, or is more than a peer has to say, goes no further."""
+    connection = protocol.receiver
+    if data and data[0] < STUN_BELOW and hasattr(connection, "stun_budget"):
+        wrong = _no_stun_of_ours(protocol, data)
+        if wrong:
+            connection.stun_refused(wrong)
+            return
+    _datagram_received(protocol, data, address)
+
+
+def _no_stun_of_ours(protocol: Any, data: bytes) -> str:
+    """Why it is not looked at; "" when it is."""
+    if len(data) < STUN_HEADER:
+        return "stun_malformed"
+    if data[0] & 0x01:  # a response, or an error
+        return "" if data[8:STUN_HEADER] in protocol.transactions else "stun_unasked"
+    connection = protocol.receiver
+    if f"{connection.local_username}:".encode() not in data:
+        return "stun_unknown_user"
+    return "" if connection.stun_budget.take(time.monotonic()) else "stun_too_often"

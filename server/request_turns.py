@@ -2,40 +2,97 @@
 
 import asyncio
 from collections import deque
+from collections.abc import Callable
+
+from server.token_bucket import TokenBucket
 
 __all__ = ["RequestTurns"]
 
+Work = Callable[[], None]
+
 
 class RequestTurns:
-    """One request in each turn of the loop; addresses take turns, and each one's requests keep their order.
+    """One piece of work in each turn of the loop; addresses take turns, and each one's work keeps its order.
 
-    Its bound is that of connections, since each has one request under way.
+    Work that is `first` comes before all other, by turns among itself. The other has a pace, if there is one. The bound
+    of what waits is that of connections, since each has one thing under way.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, pace: Callable[[float], TokenBucket] | None = None) -> None:
+        """`pace`: makes the budget of work that is not `first`, from the time on the loop's clock."""
         self._is_free = True  # in this turn of the loop
-        self._waiting: dict[str, deque[asyncio.Future[None]]] = {}  # by address, the next first
+        self._make_pace = pace
+        self._pace: TokenBucket | None = None
+        self._first: dict[str, deque[Work]] = {}  # by address, the next first
+        self._others: dict[str, deque[Work]] = {}
+        self._timer: asyncio.TimerHandle | None = None  # while the pace holds others back
 
-    async def take(self, address: str) -> None:
+    async def take(self, address: str, *, first: bool = False) -> None:
         """Returns when it is this request's turn: at once if there was no other in this turn of the loop."""
-        loop = asyncio.get_running_loop()
-        if self._is_free:
-            self._is_free = False
-            loop.call_soon(self._pass_on)
+        if self._may_begin(first):
             return
-        turn: asyncio.Future[None] = loop.create_future()
-        self._waiting.setdefault(address, deque()).append(turn)
+        turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._queue(address, lambda: _settle(turn), first)
         await turn
 
+    def ask(self, address: str, work: Work, *, first: bool = False) -> None:
+        """Call `work` in its turn, perhaps before this returns."""
+        if self._may_begin(first):
+            work()
+        else:
+            self._queue(address, work, first)
+
+    def _may_begin(self, first: bool) -> bool:
+        loop = asyncio.get_running_loop()
+        if not self._is_free or not (first or (not self._others and self._paced(loop.time()))):
+            return False
+        self._is_free = False
+        loop.call_soon(self._pass_on)
+        return True
+
+    def _queue(self, address: str, work: Work, first: bool) -> None:
+        (self._first if first else self._others).setdefault(address, deque()).append(work)
+        if self._is_free:  # nothing would come back for it
+            self._is_free = False
+            asyncio.get_running_loop().call_soon(self._pass_on)
+
+    def _paced(self, now: float) -> bool:
+        if self._make_pace is None:
+            return True
+        if self._pace is None:
+            self._pace = self._make_pace(now)
+        return self._pace.take(now)
+
     def _pass_on(self) -> None:
-        while self._waiting:
-            address = next(iter(self._waiting))
-            queue = self._waiting.pop(address)
-            turn = queue.popleft()
-            if queue:
-                self._waiting[address] = queue  # behind the others
-            if not turn.done():  # who waited for it may be gone
-                turn.set_result(None)
-                asyncio.get_running_loop().call_soon(self._pass_on)
-                return
-        self._is_free = True
+        loop = asyncio.get_running_loop()
+        if self._first:
+            work = _next(self._first)
+        elif self._others and self._paced(loop.time()):
+            work = _next(self._others)
+        else:
+            self._is_free = True
+            if self._others and self._timer is None and self._pace is not None:
+                self._timer = loop.call_later(self._pace.wait(loop.time()), self._come_back)
+            return
+        loop.call_soon(self._pass_on)
+        work()
+
+    def _come_back(self) -> None:
+        self._timer = None
+        if self._is_free:
+            self._is_free = False
+            self._pass_on()
+
+
+def _next(queues: dict[str, deque[Work]]) -> Work:
+    address = next(iter(queues))
+    queue = queues.pop(address)
+    work = queue.popleft()
+    if queue:
+        queues[address] = queue  # behind the others
+    return work
+
+
+def _settle(turn: "asyncio.Future[None]") -> None:
+    if not turn.done():  # who waited for it may be gone
+        turn.set_result(None)

@@ -6,16 +6,19 @@ import signal
 import socket
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from typing import Any, cast
 
 import uvicorn
 from starlette.applications import Starlette
 
+from server.acceptor import Acceptor, PlacedProtocol
+from server.guarded_http import GuardedConnections
 from server.guarded_websocket import GuardedWebSocket
 from server.tls import Certificate
 
 __all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
 
-BACKLOG = 128
+BACKLOG = 1024  # connections that wait to be accepted, a flood of them before somebody's STOP
 SHUTDOWN_TIMEOUT = 3  # s for HTTP requests under way
 MAX_HEAD = 16 * 1024  # bytes of a request's head
 MAX_WEBSOCKET_MESSAGE = 64 * 1024  # bytes from a viewer of the scene, or from a watcher
@@ -57,15 +60,42 @@ def bind(host: str, port: int) -> socket.socket:
 class _Server(uvicorn.Server):
     """Says when it is ready, and leaves the signals to its caller."""
 
-    def __init__(self, config: uvicorn.Config) -> None:
+    def __init__(self, config: uvicorn.Config, guarded: GuardedConnections | None, listener: socket.socket) -> None:
         super().__init__(config)
         self.settled = asyncio.Event()  # it answers, or it has failed
+        self._guarded = guarded
+        self._listener = listener
+        self._accepting: asyncio.Task[None] | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         try:
-            await super().startup(sockets)
+            await super().startup(sockets if self._guarded is None else [])
+            if self._guarded is not None and not self.should_exit:
+                self._accept(self._guarded)
         finally:
             self.settled.set()
+
+    def _accept(self, guarded: GuardedConnections) -> None:
+        """Uvicorn's own way takes any number of connections, and does a TLS handshake before it tells anybody."""
+        loop = asyncio.get_running_loop()
+
+        def make_protocol() -> PlacedProtocol:
+            config: Any = self.config
+            return cast(
+                PlacedProtocol,
+                config.http_protocol_class(
+                    config=config, server_state=self.server_state, app_state=self.lifespan.state, _loop=loop
+                ),
+            )
+
+        acceptor = Acceptor(self._listener, guarded.places, guarded.turns, make_protocol, self.config.ssl)
+        self._accepting = loop.create_task(acceptor.run(), name="accept")
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        if self._accepting is not None:
+            self._accepting.cancel()
+            await asyncio.gather(self._accepting, return_exceptions=True)
+        await super().shutdown(sockets)
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -77,13 +107,13 @@ async def running(
     app: Starlette,
     listener: socket.socket,
     *,
-    http: type[asyncio.Protocol] | None = None,
+    http: GuardedConnections | None = None,
     tls: Certificate | None = None,
 ) -> AsyncIterator[None]:
     """While entered, `app` answers on `listener`; on leaving it shuts down gracefully.
 
     Args:
-        http: the protocol of its connections; None is uvicorn's own
+        http: its connections, within bounds; None: uvicorn's own, without
         tls: what it encrypts with; None: nothing is encrypted
     """
     config = uvicorn.Config(
@@ -95,12 +125,12 @@ async def running(
         ws_max_size=MAX_WEBSOCKET_MESSAGE,
         timeout_graceful_shutdown=SHUTDOWN_TIMEOUT,
         server_header=False,
-        http=http or "h11",
+        http="h11" if http is None else http.protocol,
         h11_max_incomplete_event_size=MAX_HEAD,
         ssl_certfile=None if tls is None else tls.chain,
         ssl_keyfile=None if tls is None else tls.key,
     )
-    server = _Server(config)
+    server = _Server(config, http, listener)
     serving = asyncio.get_running_loop().create_task(server.serve([listener]), name="http")
     try:
         settled = asyncio.get_running_loop().create_task(server.settled.wait())

@@ -29,3 +29,7 @@ class TokenBucket:
             return False
         self._level -= 1
         return True
+
+    def wait(self, now: float) -> float:
+        """Seconds until `take` would succeed."""
+        return 0.0 if self.has(now) else (1 - self._level) / self._rate

@@ -5,6 +5,7 @@ import asyncio
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
+from server.client_address import NO_ADDRESS
 from server.errors import HostRefused
 from server.front_door import FrontDoor, HostNames, client_address
 from server.rate_limits import RateLimits
@@ -42,7 +43,7 @@ def test_ipv6_clients_are_counted_by_their_network() -> None:
     assert client_address({"client": ("192.0.2.1", 5)}) == "192.0.2.1"
     assert client_address({"client": ("2001:db8::1", 5)}) == client_address({"client": ("2001:db8::2", 5)})
     assert client_address({"client": ("2001:db8:0:1::1", 5)}) != client_address({"client": ("2001:db8::2", 5)})
-    assert client_address({"client": ("unix", 0)}) == "unix"
+    assert client_address({"client": ("unix", 0)}) == client_address({"client": ("x" * 16_000, 0)}) == NO_ADDRESS
     assert client_address({"client": None}) == ""
 
 
@@ -62,8 +63,11 @@ async def test_an_address_that_asks_too_often_is_refused_but_may_still_stop_the_
         assert [answer.status_code for answer in answers] == [200, 200, 200, 429]
         assert answers[3].json()["error"] == "too_many_requests"
         assert answers[3].headers["retry-after"]
-        assert (await rig.http.post("/api/stop", headers=rig.token("observer"))).status_code == 200
-        assert (await rig.http.get("/healthz")).status_code == 200
+        assert (await rig.http.post("/api/stop")).status_code == 429
+        for _ in range(5):
+            assert (await rig.http.post("/api/stop", headers=rig.token("observer"))).status_code == 200
+        health = [(await rig.http.get("/healthz")).status_code for _ in range(4)]
+        assert health == [200, 200, 200, 429], "counted apart"
 
 
 async def test_who_fails_to_say_who_they_are_too_often_is_told_so_and_others_are_not_disturbed() -> None:
@@ -107,7 +111,10 @@ async def test_a_stop_does_not_wait_for_the_turn_of_others() -> None:
     async def send(message: Message) -> None:
         raise AssertionError("nothing to send")
 
-    door = FrontDoor(app, HostNames(()), RateLimits(1, 9), lambda scope, name: None, lambda: 0.0)
+    def link_of(scope: Scope) -> str:
+        return "link" if scope["path"] == "/api/stop" else ""
+
+    door = FrontDoor(app, HostNames(()), RateLimits(1, 9), lambda scope, name: None, lambda: 0.0, link_of=link_of)
     paths = ("/api/session", "/metrics", "/api/invitations", "/api/stop")
     requests = [
         asyncio.create_task(door({"type": "http", "path": path, "headers": [(b"host", b"localhost")]}, receive, send))
@@ -116,3 +123,24 @@ async def test_a_stop_does_not_wait_for_the_turn_of_others() -> None:
     await asyncio.gather(*requests)
     assert order.index("/api/stop") < order.index("/metrics")
     assert sorted(order) == sorted(paths)
+
+
+async def test_an_address_that_a_proxy_forwards_is_the_one_that_counts_and_nobody_elses_word_is() -> None:
+    async with running_rig(max_request_burst=2, max_request_rate=0.001) as rig:
+        for address in ("192.0.2.1", "192.0.2.2", "2001:db8::1"):
+            ask = {"X-Forwarded-For": address}
+            assert [(await rig.http.get("/", headers=ask)).status_code for _ in range(3)] == [200, 200, 429]
+        assert (await rig.http.get("/", headers={"X-Forwarded-For": "2001:db8::ffff"})).status_code == 429
+        odd = [(await rig.http.get("/", headers={"X-Forwarded-For": f"x{n}" * 900})).status_code for n in range(3)]
+        assert odd == [200, 200, 429], "all that are no addresses count as one"
+
+
+async def test_a_fault_behind_the_door_is_answered_by_name_counted_and_tells_nothing() -> None:
+    async with running_rig() as rig:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("server.api.json_answer", lambda *_: 1 / 0)
+            answer = await rig.http.get("/api/session", headers=rig.token("observer"))
+        assert (answer.status_code, answer.json()["error"]) == (500, "internal_error")
+        assert "division" not in answer.text
+        assert rig.count("lockstep_internal_errors_total", where="http") == 1
+        assert (await rig.http.get("/api/session", headers=rig.token("observer"))).status_code == 200

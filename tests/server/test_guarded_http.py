@@ -1,15 +1,19 @@
 """Raw connections to a console that bounds them."""
 
 import asyncio
+import datetime
+import os
+import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
-from server.guarded_http import ConnectionBounds
-from tests.server.rig import PATIENCE, Rig, running_bridge, running_console
+from server.front_door import PATIENCE as PATIENCE_OF_THE_DOOR
+from server.tls import self_signed
+from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console
 
 HEAD = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n"
 
@@ -70,31 +74,145 @@ async def test_a_head_that_is_too_large_is_refused() -> None:
         writer.close()
 
 
-async def test_an_address_gets_only_so_many_connections_and_gets_them_back() -> None:
-    async with guarded_console(max_address_connections=2) as (rig, port):
-        held = [await asyncio.open_connection("127.0.0.1", port) for _ in range(2)]
-        for _, writer in held:
-            writer.write(HEAD)
-            await writer.drain()
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+def _refused(rig: Rig, reason: str) -> float:
+    return rig.count("lockstep_bad_input_total", where="http", reason=reason)
+
+
+async def _open(port: int, beginning: bytes = b"") -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(beginning)
+    await writer.drain()
+    return reader, writer
+
+
+async def _answer(reader: asyncio.StreamReader) -> bytes:
+    """The head of the next one."""
+    async with asyncio.timeout(PATIENCE):
+        return await reader.readuntil(b"\r\n\r\n")
+
+
+async def test_when_there_is_no_place_the_oldest_stranger_goes_and_not_the_newcomer() -> None:
+    async with guarded_console(max_connections=3) as (rig, port):
+        held = [await _open(port, HEAD) for _ in range(3)]
+        await eventually(lambda: len(rig.app.state.connection_places) == 3)
+        reader, writer = await _open(port, HEAD + b"\r\n")
+        assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
+        assert await _said(held[0][0]) == b""
+        assert rig.count("lockstep_bad_input_total", where="http", reason="too_many_connections") == 1
+        for still, other in held[1:]:
+            other.write(b"Connection: close\r\n\r\n")
+            assert (await _said(still)).startswith(b"HTTP/1.1 200")
+        for _, each in (*held, (reader, writer)):
+            each.close()
+        await eventually(lambda: len(rig.app.state.connection_places) == 0)
+
+
+async def test_who_brought_a_good_token_keeps_the_connection_when_strangers_take_all() -> None:
+    async with guarded_console(max_connections=4) as (rig, port):
+        token = rig.token("observer")["Authorization"].encode()
+        reader, writer = await _open(port, HEAD + b"Authorization: " + token + b"\r\n\r\n")
+        assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
+        strangers = [await _open(port) for _ in range(20)]
+        await eventually(
+            lambda: rig.count("lockstep_bad_input_total", where="http", reason="too_many_connections") == 17
+        )
+        await reader.readuntil(b"}")
+        writer.write(HEAD + b"Authorization: " + token + b"\r\n\r\n")
+        assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
+        for _, each in (*strangers, (reader, writer)):
+            each.close()
+
+
+async def test_a_body_that_was_announced_does_not_keep_a_connection_that_was_answered() -> None:
+    """One byte of it ends the server's own timer between two requests."""
+    async with guarded_console(request_timeout=0.3) as (rig, port):
+        reader, writer = await _open(
+            port, HEAD.replace(b"GET /healthz", b"POST /api/stop") + b"Content-Length: 9\r\n\r\n"
+        )
+        assert (await _answer(reader)).startswith(b"HTTP/1.1 401")
+        writer.write(b"{")
+        await _said(reader)
+        writer.close()
+        assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
+
+
+async def test_one_deadline_holds_for_head_and_body_together() -> None:
+    async with guarded_console(request_timeout=0.6) as (rig, port):
+        token = rig.token("observer")["Authorization"].encode()
+        reader, writer = await _open(port, HEAD.replace(b"GET /healthz", b"POST /api/stop"))
+        await asyncio.sleep(0.3)  # of the deadline: this is what the client does, not what is waited for
+        writer.write(b"Authorization: " + token + b"\r\nContent-Length: 900\r\n\r\n")
+        said = asyncio.create_task(_said(reader))
+        for _ in range(800):
+            if said.done():
+                break
+            writer.write(b" ")
+            await asyncio.sleep(0.01)
+        assert b'"too_slow"' in await said
+        writer.close()
+
+
+async def test_who_does_not_read_its_answer_loses_the_connection() -> None:
+    async with guarded_console(request_timeout=0.2) as (rig, port):
+        held = socket.socket()
+        held.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        held.setblocking(False)
+        loop = asyncio.get_running_loop()
+        with held:
+            await loop.sock_connect(held, ("127.0.0.1", port))
+            token = rig.token("supervisor")["Authorization"].encode()
+            request = b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\nAuthorization: " + token + b"\r\n\r\n"
+            await loop.sock_sendall(held, request * 200)
+            await eventually(lambda: rig.count("lockstep_bad_input_total", where="http", reason="does_not_read") == 1)
+
+
+async def test_who_is_turned_away_again_and_again_has_the_connection_closed() -> None:
+    async with guarded_console() as (_, port):
+        reader, writer = await _open(port)
+        answers = []
+        for _ in range(PATIENCE_OF_THE_DOOR):
+            writer.write(b"GET /api/session HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            answers.append(await _answer(reader))
+            await reader.readuntil(b"}")
+        assert [b"connection: close" in each.lower() for each in answers] == [False] * (PATIENCE_OF_THE_DOOR - 1) + [
+            True
+        ]
         assert await _said(reader) == b""
         writer.close()
-        assert rig.count("lockstep_bad_input_total", where="http", reason="too_many_connections") == 1
-        for reader, writer in held:
-            writer.write(b"Connection: close\r\n\r\n")
-            assert (await _said(reader)).startswith(b"HTTP/1.1 200")
-            writer.close()
-        async with httpx.AsyncClient(trust_env=False) as http:
-            assert (await http.get(f"http://127.0.0.1:{port}/healthz")).status_code == 200
 
 
-def test_places_are_counted_in_all_and_by_address() -> None:
-    refused: list[str] = []
-    bounds = ConnectionBounds(3, 2, refused.append)
-    assert [bounds.enter(each) for each in "aaabb"] == [True, True, False, True, False]
-    assert refused == ["too_many_connections"] * 2
-    bounds.leave("a")
-    assert bounds.enter("b")
-    for address in "abb":
-        bounds.leave(address)
-    assert len(bounds) == 0
+async def test_what_is_no_http_is_counted_and_closed() -> None:
+    async with guarded_console() as (rig, port):
+        reader, writer = await _open(port, b"\x16\x03\x01 what\r\n\r\n")
+        assert (await _said(reader)).startswith(b"HTTP/1.1 400")
+        writer.close()
+        assert rig.count("lockstep_bad_input_total", where="http", reason="bad_request") == 1
+
+
+async def test_silent_tls_connections_hold_no_more_than_their_places_and_a_stop_gets_through(tmp_path: Path) -> None:
+    names = {"localhost", "127.0.0.1"}
+    certificate = self_signed(tmp_path, names, datetime.datetime.now(datetime.UTC))
+    async with guarded_console(certificate=certificate, max_connections=20) as (rig, port):
+        await rig.services.console.robot.reached.wait()
+        before = len(os.listdir("/proc/self/fd"))
+        silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(100)]
+        await eventually(
+            lambda: rig.count("lockstep_bad_input_total", where="http", reason="too_many_connections") >= 80
+        )
+        assert len(rig.app.state.connection_places) <= 20
+        answer = await rig.http.post("/api/stop", headers=rig.token("observer"))
+        assert (answer.status_code, len(rig.app.state.connection_places)) == (200, 20)
+        assert len(os.listdir("/proc/self/fd")) <= before + len(silent) + 20 + 1
+        for _, writer in silent:
+            writer.transport.abort()
+
+
+async def test_a_tls_handshake_that_never_ends_is_ended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("server.acceptor.HANDSHAKE_SECONDS", 0.2)
+    certificate = self_signed(tmp_path, {"localhost"}, datetime.datetime.now(datetime.UTC))
+    async with guarded_console(certificate=certificate) as (rig, port):
+        reader, writer = await _open(port)
+        assert await _said(reader) == b""
+        writer.close()
+        assert rig.count("lockstep_bad_input_total", where="http", reason="no_handshake") == 1
+        assert len(rig.app.state.connection_places) == 0

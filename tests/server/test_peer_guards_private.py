@@ -4,12 +4,15 @@ import asyncio
 import os
 from typing import Any, cast
 
+import aioice.stun
 import pytest
 from aiortc import RTCConfiguration, RTCPeerConnection
 from aiortc.rtcsctptransport import DataChunk, ForwardTsnChunk, InboundStream
 
+from robot_bridge.protocol.messages import Ping, Pong
 from server import peer_guards_private
 from server.peer_guards_private import (
+    CHECK_BURST,
     ENOUGH_GAPS,
     MAX_ADDRESSES,
     MAX_GAPS,
@@ -265,3 +268,42 @@ async def test_holes_that_come_faster_than_a_message_is_given_up_end_the_peer() 
         await peer.sends(lost=number == 1, seconds=0.001)
     assert set(peer.refused) == {"too_many_gaps"}
     await peer.pc.close()
+
+
+def _binding_request(username: str) -> bytes:
+    message = aioice.stun.Message(
+        message_method=aioice.stun.Method.BINDING,
+        message_class=aioice.stun.Class.REQUEST,
+        transaction_id=os.urandom(12),
+    )
+    message.attributes["USERNAME"] = username
+    message.attributes["PRIORITY"] = 1
+    message.add_message_integrity(b"wrong password")
+    return bytes(message)
+
+
+async def test_checks_with_false_credentials_are_not_parsed_nor_answered_and_the_peer_goes_on() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        assert rig.webrtc_peers[0].pc.sctp is not None
+        connection: Any = rig.webrtc_peers[0].pc.sctp.transport.transport._connection
+        protocol = connection._nominated[1].protocol
+        assert protocol.datagram_received.__name__ == "_take_datagram", MOVED
+        parsed: list[bytes] = []
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("server.peer_guards_private._datagram_received", lambda _, data, __: parsed.append(data))
+            for _ in range(2000):
+                protocol.datagram_received(_binding_request("evil:evil"), ("192.0.2.1", 5))
+            response = bytearray(_binding_request("evil:evil"))
+            response[0] = 1
+            protocol.datagram_received(bytes(response), ("192.0.2.1", 5))
+            protocol.datagram_received(b"\x00", ("192.0.2.1", 5))
+            assert not parsed
+            named = _binding_request(f"{connection.local_username}:evil")
+            for _ in range(3000):
+                protocol.datagram_received(named, ("192.0.2.1", 5))
+            assert CHECK_BURST <= len(parsed) < 3000
+        for reason, least in (("stun_unknown_user", 2000), ("stun_unasked", 1), ("stun_malformed", 1)):
+            assert rig.count("lockstep_bad_input_total", where="transport", reason=reason) == least
+        assert rig.count("lockstep_bad_input_total", where="transport", reason="stun_too_often") > 0
+        peer.send("control", Ping(id=3))
+        await peer.until(lambda each: each == Pong(id=3))

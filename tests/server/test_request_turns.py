@@ -1,8 +1,10 @@
 """One request in each turn of the loop, addresses in turn."""
 
 import asyncio
+from functools import partial
 
 from server.request_turns import RequestTurns
+from server.token_bucket import TokenBucket
 
 
 class Rig:
@@ -62,3 +64,52 @@ async def test_who_is_gone_before_his_turn_holds_up_nobody() -> None:
     assert rig.served == ["a1", "a3"]
     await turns_of_the_loop(2)
     await test_a_request_alone_does_not_wait()
+
+
+async def test_what_is_first_comes_before_a_salvo_that_waits() -> None:
+    rig = Rig()
+    tasks = rig.begin("a1", "a2", "a3", "b1")
+    await turns_of_the_loop(1)
+
+    async def stop() -> None:
+        await rig.turns.take("z", first=True)
+        rig.served.append("stop")
+
+    await asyncio.gather(*tasks, asyncio.create_task(stop()))
+    assert rig.served.index("stop") <= 2
+    assert sorted(rig.served) == ["a1", "a2", "a3", "b1", "stop"]
+
+
+async def test_a_pace_holds_all_back_but_what_is_first() -> None:
+    """Two pieces at once, the next when the budget has one again: never, in this test."""
+    turns = RequestTurns(lambda now: TokenBucket(1e-6, 2, now))
+    done: list[str] = []
+    for name in ("a", "b", "c", "d"):
+        turns.ask("x", partial(done.append, name))
+    await turns_of_the_loop(20)
+    assert done == ["a", "b"]
+    turns.ask("x", partial(done.append, "stop"), first=True)
+    await turns_of_the_loop(2)
+    assert done == ["a", "b", "stop"]
+
+
+async def test_what_the_pace_held_back_comes_when_there_is_budget_again() -> None:
+    turns, served = RequestTurns(lambda now: TokenBucket(1000.0, 1, now)), asyncio.Event()
+    turns.ask("x", lambda: None)
+    turns.ask("x", served.set)
+    async with asyncio.timeout(10):
+        await served.wait()
+
+
+async def test_work_that_raises_holds_up_nobody() -> None:
+    turns, done = RequestTurns(), list[str]()
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: done.append(str(context["exception"])))
+
+    def fail() -> None:
+        raise ValueError("planted")
+
+    turns.ask("a", lambda: None)
+    turns.ask("a", fail)
+    turns.ask("a", partial(done.append, "after"))
+    await turns_of_the_loop(5)
+    assert done == ["planted", "after"]

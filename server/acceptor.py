@@ -1,0 +1,121 @@
+"""Takes connections off a listening socket: each is counted before anything is spent on it, TLS or a request."""
+
+import asyncio
+import errno
+import socket
+import ssl
+from collections.abc import Callable
+
+from server.client_address import counted_address
+from server.connection_places import ConnectionPlaces, Place
+from server.request_turns import RequestTurns
+
+__all__ = ["PROXIES", "Acceptor", "PlacedProtocol"]
+
+PROXIES = frozenset({"127.0.0.1", "::1"})  # whose X-Forwarded-For is believed; uvicorn's default too
+HANDSHAKE_SECONDS = 5.0  # for TLS
+ACCEPT = "accept"  # whose turns those of new connections are
+PAUSE = 0.1  # s, when there is no descriptor left
+
+
+class PlacedProtocol(asyncio.Protocol):
+    """A connection's protocol that knows its place."""
+
+    place: Place
+
+
+class Acceptor:
+    """Run `run` as a task."""
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        places: ConnectionPlaces,
+        turns: RequestTurns,
+        make_protocol: Callable[[], PlacedProtocol],
+        tls: ssl.SSLContext | None,
+    ) -> None:
+        """`turns`: in which connections begin; what they send has its turns too."""
+        self._listener = listener
+        self._places = places
+        self._turns = turns
+        self._make_protocol = make_protocol
+        self._tls = tls
+
+    async def run(self) -> None:
+        """Until cancelled; connections that have begun by then go on.
+
+        Each has its turn before the next one is accepted: the others wait in the kernel, where they cost nothing and
+        where the newest cannot push out one that has not begun.
+        """
+        loop = asyncio.get_running_loop()
+        async with asyncio.TaskGroup() as tasks:
+            while True:
+                try:
+                    connection, address = await loop.sock_accept(self._listener)
+                except OSError as error:
+                    if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM):
+                        self._places.on_refused("no_descriptors")
+                        await asyncio.sleep(PAUSE)
+                    else:
+                        await asyncio.sleep(0)  # it was gone before it was accepted
+                    continue
+                try:
+                    await self._turns.take(ACCEPT)
+                except BaseException:
+                    connection.close()
+                    raise
+                _Beginning(self, connection, str(address[0]), tasks)
+
+    def protocol_at(self, place: Place) -> PlacedProtocol:
+        protocol = self._make_protocol()
+        protocol.place = place
+        return protocol
+
+    async def connect(self, connection: socket.socket, protocol: PlacedProtocol) -> None:
+        """Through the handshake, if there is one; asyncio closes what ends there. Raises OSError or TimeoutError."""
+        await asyncio.get_running_loop().connect_accepted_socket(
+            lambda: protocol,
+            connection,
+            ssl=self._tls,
+            ssl_handshake_timeout=None if self._tls is None else HANDSHAKE_SECONDS,
+        )
+
+    @property
+    def places(self) -> ConnectionPlaces:
+        return self._places
+
+
+class _Beginning:
+    """A connection that has no protocol yet: it can be closed all the same."""
+
+    def __init__(self, acceptor: Acceptor, connection: socket.socket, address: str, tasks: asyncio.TaskGroup) -> None:
+        self._acceptor = acceptor
+        self._connection = connection
+        self._place = acceptor.places.enter(counted_address(address), self._close, proxy=address in PROXIES)
+        self._task: asyncio.Task[None] | None = None
+        if self._place.group is None:
+            connection.close()
+        else:
+            self._task = tasks.create_task(self._begin(), name="connection")
+
+    def _close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+
+    async def _begin(self) -> None:
+        loop, connected, handed_over = asyncio.get_running_loop(), False, False
+        try:
+            protocol = self._acceptor.protocol_at(self._place)
+            handed_over = True
+            await self._acceptor.connect(self._connection, protocol)
+            connected = True
+        except (OSError, TimeoutError):
+            self._acceptor.places.on_refused("no_handshake")
+        except Exception as error:
+            loop.call_exception_handler({"message": "a connection could not begin", "exception": error})
+        finally:
+            if not handed_over:
+                self._connection.close()
+            if not connected:
+                self._acceptor.places.leave(self._place)

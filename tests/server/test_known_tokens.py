@@ -1,0 +1,8 @@
+from server.known_tokens import KnownTokens
+
+
+def test_the_newest_are_known_and_the_oldest_forgotten() -> None:
+    tokens = KnownTokens(2)
+    for token in ("a", "b", "a", "c"):
+        tokens.add(token)
+    assert ["a" in tokens, "b" in tokens, "c" in tokens] == [True, False, True]
