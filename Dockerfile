@@ -19,7 +19,7 @@ COPY server ./server
 COPY client ./client
 # A new volume takes over the owner of the folder that it covers.
 RUN useradd --system --create-home --uid 10001 lockstep \
-    && install -d -o lockstep -g lockstep -m 0755 /run/lockstep \
+    && install -d -o lockstep -g lockstep -m 0755 /run/lockstep /run/lockstep/link /run/lockstep/turn \
     && install -d -o lockstep -g lockstep -m 0700 /var/lib/lockstep
 
 FROM base AS robot

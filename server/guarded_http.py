@@ -102,6 +102,7 @@ def guarded_http(
         def handle_websocket_upgrade(self, event: h11.Request) -> None:
             self._leave()  # from here on another protocol has the connection; viewers are bounded by themselves
             self._upgraded = True
+            self.app_state = {key: value for key, value in self.app_state.items() if key != PLACE}
             super().handle_websocket_upgrade(event)
 
         def on_response_complete(self) -> None:

@@ -1,7 +1,8 @@
 """Makes the secrets that containers of one machine share: `python -m server.make_secrets FOLDER`.
 
-A secret that is there already stays. The folder is mounted by nobody else, so its files may be read by every user:
-each container runs as one of its own.
+Each has a folder of its own in it, `link/link_secret` and `turn/turn_secret`, so that a container can be given one and
+not see the other: the relay, which faces the Internet, has no use for the robot's. One that is there already stays.
+The folders are mounted by nobody else, so the files may be read by every user: each container runs as one of its own.
 """
 
 import os
@@ -11,7 +12,7 @@ from pathlib import Path
 
 __all__ = ["NAMES", "main", "make_secrets"]
 
-NAMES = ("link_secret", "turn_secret")
+NAMES = ("link/link_secret", "turn/turn_secret")
 SECRET_BYTES = 32
 
 
@@ -19,8 +20,10 @@ def make_secrets(folder: Path) -> list[str]:
     """The names of those that were missing."""
     made = []
     for name in NAMES:
+        place = folder / name
+        place.parent.mkdir(mode=0o755, exist_ok=True)
         try:
-            file = os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o444)
+            file = os.open(place, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o444)
         except FileExistsError:
             continue
         with open(file, "w") as stream:

@@ -5,15 +5,33 @@ from random import Random
 
 from bench.hostile.target import Target
 
-__all__ = ["forged_tokens", "garbage_bytes", "giant_offers", "many_requests", "slow_requests"]
+__all__ = [
+    "address_flood",
+    "body_holders",
+    "forged_tokens",
+    "garbage_bytes",
+    "giant_offers",
+    "health_flood",
+    "many_requests",
+    "non_readers",
+    "recordings_reader",
+    "scene_flood",
+    "silent_connections",
+    "slow_posts",
+    "slow_requests",
+    "stop_flood",
+]
 
 SLOW_SECONDS = 3.0  # that one slow request is held
+HELD_SECONDS = 15.0  # that connections are held which do nothing
+HELD = 20  # of them at a time
+FLOOD = 50  # requests on one connection
 SDP = "application/sdp"
 
 
 async def garbage_bytes(target: Target, random: Random) -> None:
     """What is no HTTP, or only begins like it."""
-    reader, writer = await asyncio.open_connection(*target.address)
+    reader, writer = await target.connect()
     try:
         beginning = random.choice((b"", b"GET / HTTP/1.1\r\n", b"POST /whep HTTP/1.1\r\nContent-Length: -1\r\n\r\n"))
         writer.write(beginning + random.randbytes(random.randrange(1, 4000)) + b"\r\n\r\n")
@@ -26,7 +44,7 @@ async def garbage_bytes(target: Target, random: Random) -> None:
 
 async def slow_requests(target: Target, random: Random) -> None:
     """A head or a body that does not end, a byte at a time."""
-    _, writer = await asyncio.open_connection(*target.address)
+    _, writer = await target.connect()
     try:
         writer.write(b"POST /api/stop HTTP/1.1\r\nHost: localhost\r\n")
         if random.random() < 0.5:
@@ -64,3 +82,96 @@ async def giant_offers(target: Target, random: Random) -> None:
         )
     )
     await target.ask("POST", "/whep", text, **{"Content-Type": SDP})
+
+
+async def scene_flood(target: Target, random: Random) -> None:
+    """The 3D scene's page, without a token."""
+    await _flood(target, b"GET /scene/x HTTP/1.1\r\nHost: localhost\r\n\r\n")
+
+
+async def stop_flood(target: Target, random: Random) -> None:
+    """STOP, without a token."""
+    await _flood(target, b"POST /api/stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n")
+
+
+async def health_flood(target: Target, random: Random) -> None:
+    await _flood(target, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+
+
+async def address_flood(target: Target, random: Random) -> None:
+    """Far more than an address may ask, so that most is refused."""
+    await _flood(target, b"GET /api/session HTTP/1.1\r\nHost: localhost\r\n\r\n")
+
+
+async def _flood(target: Target, request: bytes) -> None:
+    """One request after the other on one connection, until it is closed."""
+    reader, writer = await target.connect()
+    try:
+        for _ in range(FLOOD):
+            writer.write(request)
+            await writer.drain()
+            async with asyncio.timeout(SLOW_SECONDS):
+                answer = await reader.read(65_536)
+            if not answer:
+                target.seen["closed"] += 1
+                return
+            target.seen[answer[9:12].decode(errors="replace")] += 1
+    finally:
+        writer.transport.abort()
+
+
+async def body_holders(target: Target, random: Random) -> None:
+    """Answered already, with one byte of the announced body every now and then."""
+    await _hold(target, b"POST /api/stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n")
+
+
+async def slow_posts(target: Target, random: Random) -> None:
+    """A good token, and a body that does not come."""
+    head = f"POST /api/stop HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {target.token}\r\n"
+    await _hold(target, head.encode() + b"Content-Length: 1000\r\n\r\n")
+
+
+async def silent_connections(target: Target, random: Random) -> None:
+    """TCP and nothing more: where TLS is spoken, a handshake that does not begin."""
+    opened = [await asyncio.open_connection(*target.address) for _ in range(HELD)]
+    await _until_closed(target, opened, b"")
+
+
+async def non_readers(target: Target, random: Random) -> None:
+    """Ask for much and read nothing of it."""
+    opened = [await target.connect() for _ in range(HELD)]
+    for reader, writer in opened:
+        reader.set_exception(ConnectionError("not read"))
+        writer.transport.pause_reading()  # type: ignore[attr-defined]
+        writer.write(b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n" * 100)
+    await asyncio.sleep(HELD_SECONDS)
+    for _, writer in opened:
+        writer.transport.abort()
+
+
+async def _hold(target: Target, beginning: bytes) -> None:
+    opened = [await target.connect() for _ in range(HELD)]
+    for _, writer in opened:
+        writer.write(beginning)
+    await _until_closed(target, opened, b" ")
+
+
+async def _until_closed(
+    target: Target, opened: list[tuple[asyncio.StreamReader, asyncio.StreamWriter]], byte: bytes
+) -> None:
+    """A byte a second on each, for a while."""
+    try:
+        for _ in range(int(HELD_SECONDS)):
+            await asyncio.sleep(1)
+            for _, writer in opened:
+                if byte and not writer.is_closing():
+                    writer.write(byte)
+        target.seen["closed"] += sum(reader.at_eof() or writer.is_closing() for reader, writer in opened)
+    finally:
+        for _, writer in opened:
+            writer.transport.abort()
+
+
+async def recordings_reader(target: Target, random: Random) -> None:
+    """The list of recordings, forty at a time."""
+    await asyncio.gather(*(target.ask("GET", "/api/recordings") for _ in range(40)))

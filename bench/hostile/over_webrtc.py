@@ -8,6 +8,7 @@ from random import Random
 from typing import Any
 
 import httpx
+from aioice import stun
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
 from aiortc.sdp import SessionDescription
 
@@ -21,10 +22,12 @@ __all__ = [
     "garbage_datagrams",
     "garbage_messages",
     "half_open",
+    "many_sections",
     "message_flood",
     "reset_spam",
     "restart_flood",
     "slow_reader",
+    "stun_flood",
 ]
 
 SDP = "application/sdp"
@@ -226,3 +229,34 @@ async def _shower(ports: list[int], random: Random) -> None:
                 with suppress(OSError):  # the peer was closed, or the socket is full
                     sender.sendto(data, ("127.0.0.1", random.choice(ports)))
             await asyncio.sleep(0.05)
+
+
+async def many_sections(target: Target, random: Random) -> None:
+    """Whole offers of forty media sections."""
+    pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
+    try:
+        for _ in range(40):
+            pc.addTransceiver("video", direction="recvonly")
+        await target.ask("POST", "/whep", await offer_of(pc), **{"Content-Type": SDP})
+    finally:
+        await pc.close()
+
+
+async def stun_flood(target: Target, random: Random) -> None:
+    """Connectivity checks with false credentials, to the port of one's own peer."""
+    async with joined(target) as peer:
+        if peer is None:
+            return
+        sections = SessionDescription.parse(peer.pc.remoteDescription.sdp).media
+        candidate = next(each for each in sections[0].ice_candidates if each.type == "host")
+        request = stun.Message(message_method=stun.Method.BINDING, message_class=stun.Class.REQUEST)
+        request.attributes["USERNAME"] = "evil:evil"
+        request.add_message_integrity(b"false")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.setblocking(False)
+            for _ in range(50):
+                for _ in range(BURST):
+                    with suppress(OSError):
+                        sender.sendto(bytes(request), (candidate.ip, candidate.port))
+                await asyncio.sleep(0.02)
+        target.seen["stun_sent"] += 50 * BURST

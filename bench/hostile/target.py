@@ -1,5 +1,7 @@
 """Whom the crowd attacks, and how one member of it does that."""
 
+import asyncio
+import ssl
 from collections import Counter
 from collections.abc import Awaitable, Callable
 from random import Random
@@ -22,7 +24,16 @@ class Target(NamedTuple):
     @property
     def address(self) -> tuple[str, int]:
         parts = urlsplit(self.url)
-        return parts.hostname or "", parts.port or 80
+        return parts.hostname or "", parts.port or (443 if parts.scheme == "https" else 80)
+
+    async def connect(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        """TCP, and TLS where the console or the proxy before it speaks that."""
+        host, port = self.address
+        if not self.url.startswith("https"):
+            return await asyncio.open_connection(host, port)
+        context = ssl.create_default_context()
+        context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+        return await asyncio.open_connection(host, port, ssl=context, server_hostname=host)
 
     @property
     def headers(self) -> dict[str, str]:

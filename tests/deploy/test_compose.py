@@ -73,6 +73,26 @@ def test_the_robot_link_and_the_measurements_are_published_on_loopback_only() ->
     assert SERVICES["grafana"]["environment"]["GF_SERVER_HTTP_ADDR"] == "127.0.0.1"
 
 
+def test_every_secret_is_seen_by_those_alone_who_need_it() -> None:
+    """What faces the Internet, the relay and the proxy, has no way to the robot link's."""
+    seen = {
+        secret: {
+            name
+            for name, service in SERVICES.items()
+            if any(volume.startswith(f"{secret}:") for volume in service.get("volumes", []))
+        }
+        for secret in ("link-secret", "turn-secret")
+    }
+    assert seen == {"link-secret": {"secrets", "robot", "console"}, "turn-secret": {"secrets", "console", "coturn"}}
+    writing = [
+        (name, volume)
+        for name, service in SERVICES.items()
+        for volume in service.get("volumes", [])
+        if "-secret:" in volume and not volume.endswith(":ro")
+    ]
+    assert {name for name, _ in writing} == {"secrets"}
+
+
 def test_every_file_that_is_mounted_or_copied_exists() -> None:
     volumes = [volume for service in SERVICES.values() for volume in service.get("volumes", [])]
     mounted = [volume.split(":")[0] for volume in volumes if volume.startswith("./")]

@@ -11,6 +11,7 @@ def test_missing_secrets_are_made_long_and_different(tmp_path: Path) -> None:
 
 
 def test_a_secret_that_is_there_stays(tmp_path: Path) -> None:
+    (tmp_path / NAMES[0]).parent.mkdir()
     (tmp_path / NAMES[0]).write_text("known")
     assert make_secrets(tmp_path) == [NAMES[1]]
     assert (tmp_path / NAMES[0]).read_text() == "known"
