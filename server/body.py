@@ -11,7 +11,7 @@ from starlette.requests import ClientDisconnect
 from server.errors import BadJson, BodyTooLarge, BodyTooSlow, WrongMediaType
 from server.guarded_http import DEADLINE
 
-__all__ = ["media_type", "read_json", "read_text"]
+__all__ = ["deadline", "media_type", "read_json", "read_text"]
 
 MAX_JSON = 4096  # bytes
 
@@ -61,7 +61,7 @@ async def read_json(request: Request, kind: type[Body]) -> Body:
 async def _read(request: Request, bound: int) -> bytes:
     body = bytearray()
     try:
-        async with asyncio.timeout_at(_deadline(request)):
+        async with asyncio.timeout_at(deadline(request)):
             async for chunk in request.stream():
                 body += chunk
                 if len(body) > bound:
@@ -73,7 +73,7 @@ async def _read(request: Request, bound: int) -> bytes:
     return bytes(body)
 
 
-def _deadline(request: Request) -> float:
+def deadline(request: Request) -> float:
     """On the loop's clock: of head and body together, where the connection measures them."""
     found = request.scope.get("state", {}).get(DEADLINE)
     if isinstance(found, float):

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 import typer
 import uvloop
 
-from bench.hostile.run import hostile
+from bench.hostile.crowd import KINDS
+from bench.hostile.run import FRONTS, hostile
 from bench.processes import ProcessFailed
 
 __all__ = ["hostile_command"]
@@ -18,22 +19,48 @@ def hostile_command(
     peers: Annotated[int, typer.Option(min=1, max=500, help="How many misbehave.")] = 100,
     seconds: Annotated[float, typer.Option(min=2, max=600, help="How long they do.")] = 30,
     seed: Annotated[int, typer.Option(help="Of what they do.")] = 1,
+    kind: Annotated[
+        list[str] | None, typer.Option(help="One kind of misbehaviour alone; again for more, each by itself.")
+    ] = None,
+    each: Annotated[bool, typer.Option("--each", help="Every kind by itself.")] = False,
+    front: Annotated[str, typer.Option(help="How they come: direct, tls or caddy.")] = "direct",
     json_file: Annotated[
         str | None, typer.Option("--json", help="Write the figures here; - is standard output.")
     ] = None,
 ) -> None:
     """Drive among peers that misbehave; ends with 1 when the operator's latency grew by more than a fifth."""
+    known = [each_kind.__name__ for each_kind in KINDS]
+    if front not in FRONTS or not set(kind or ()) <= set(known):
+        typer.echo(f"lockstep: the fronts are {', '.join(FRONTS)}; the kinds are {', '.join(known)}", err=True)
+        raise typer.Exit(2)
     try:
-        figures = uvloop.run(hostile(peers, seconds, seed, lambda text: typer.echo(text, err=True)))
+        found = [
+            uvloop.run(hostile(peers, seconds, seed, lambda text: typer.echo(text, err=True), one, front))
+            for one in (known if each else kind or [""])
+        ]
     except ProcessFailed as error:
         typer.echo(f"lockstep: {error}", err=True)
         raise typer.Exit(3) from error
+    figures = found if len(found) > 1 else found[0]
     if json_file == "-":
         sys.stdout.write(json.dumps(figures) + "\n")
     elif json_file is not None:
         Path(json_file).write_text(json.dumps(figures, indent=2) + "\n")
-    typer.echo(_summary(figures), err=True)
-    raise typer.Exit(int(figures["ratio"] > figures["allowed"]))
+    typer.echo(_summary(found[0]) if len(found) == 1 else _table(found), err=True)
+    raise typer.Exit(int(any(one["ratio"] > one["allowed"] for one in found)))
+
+
+def _table(found: list[dict[str, Any]]) -> str:
+    """A row for each kind. The crowd's own processor time shows whether it could do anything at all."""
+    lines = ["kind                  attempts  in peace  among them  ratio  p95 among  crowd s"]
+    for one in found:
+        attempts = sum(one["crowd"]["attempts"].values())
+        quiet, disturbed = one["quiet_ms"], one["disturbed_ms"]
+        lines.append(
+            f"{one['kind']:20} {attempts:9} {quiet['median']:9.2f} {disturbed['median']:11.2f} {one['ratio']:6.2f}"
+            f" {disturbed['p95']:10.2f} {one['crowd_cpu_seconds']:8.1f}"
+        )
+    return "\n".join(lines)
 
 
 def _summary(figures: dict[str, Any]) -> str:

@@ -1,51 +1,70 @@
-"""Drive a robot in peace, then among the crowd, then in peace again; compare what the operator feels."""
+"""Drive a robot in peace, then among the crowd, then in peace again; compare what the operator feels.
+
+The crowd comes directly, with TLS, or through a real Caddy with deploy/Caddyfile.
+"""
 
 import asyncio
+import os
+import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from pathlib import Path
 from statistics import median, quantiles
+from tempfile import TemporaryDirectory
 from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
 
 from bench.machine import busy_percent, machine_facts
 from bench.processes import Running, running_process
 from bench.stack import Stack, running_stack
 from client import Console
 
-__all__ = ["hostile", "memory_of"]
+__all__ = ["FRONTS", "hostile", "memory_of"]
+
+FRONTS = ("direct", "tls", "caddy")  # how the crowd comes
 
 WARM_UP = 3.0  # s
 INTERVAL = 0.05  # s between two commands
 ALLOWED = 1.2  # times the undisturbed median
-NICE = ("nice", "-n", "19")  # attackers have machines of their own; the crowd takes what the console leaves
+CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
 CROWD_SECONDS = 60.0  # for it to say something
 
 
-async def hostile(peers: int, seconds: float, seed: int, say: Callable[[str], None]) -> dict[str, Any]:
-    """The figures; `say` tells how it goes."""
+async def hostile(
+    peers: int, seconds: float, seed: int, say: Callable[[str], None], kind: str = "", front: str = "direct"
+) -> dict[str, Any]:
+    """The figures; `say` tells how it goes. `kind`: one of the crowd's alone; "": all of them together."""
     before = await busy_percent(1.0)
-    async with running_stack("planar") as stack:
-        async with Console(stack.operator, video=1, audio=False, name="operator") as console:
+    settings = {"LOCKSTEP_TLS": "self-signed"} if front == "tls" else {}
+    async with running_stack("planar", is_logged=True, **settings) as stack, _entry(stack, front) as link:
+        trusted = str(stack.bridge.event_log.parent / "state" / "tls-cert.pem") if front == "tls" else None
+        async with Console(stack.operator, video=1, audio=False, name="operator", tls_ca=trusted) as console:
             await console.take_seat()
             await _drive(console, WARM_UP)
             say(f"driving in peace for {seconds / 2:g} s")
             quiet = await _drive(console, seconds / 2)
             memory = memory_of(stack.console)
-            command = (*NICE, sys.executable, "-m", "bench.hostile.crowd", stack.observer, str(peers), str(seed))
+            command = (sys.executable, "-m", "bench.hostile.crowd", link, str(peers), str(seed), kind)
             async with running_process(*command) as (crowd, _):
-                say(f"{peers} misbehaving peers for {seconds:g} s")
+                say(f"{peers} misbehaving peers ({kind or 'all kinds'}, {front}) for {seconds:g} s")
                 used = stack.console.cpu_seconds()
                 disturbed = await _drive(console, seconds)
                 used = stack.console.cpu_seconds() - used
+                took = crowd.cpu_seconds()
                 seen = await crowd.ask("", CROWD_SECONDS)
                 memory_during = memory_of(stack.console)
-                places = await _peers(stack)
+                places = 0.0 if front == "tls" else await _peers(stack)
             say(f"driving in peace for {seconds / 2:g} s")
             await _drive(console, WARM_UP)
             quiet += await _drive(console, seconds / 2)
             await console.rest()
         return {
+            "kind": kind or "all",
+            "front": front,
             "peers": peers,
             "seconds": seconds,
             "quiet_ms": _figures(quiet),
@@ -53,12 +72,53 @@ async def hostile(peers: int, seconds: float, seed: int, say: Callable[[str], No
             "ratio": round(median(disturbed) / median(quiet), 3),
             "allowed": ALLOWED,
             "console_cpu_percent": round(100 * used / seconds, 1),
+            "crowd_cpu_seconds": round(took, 1),
             "memory_mib": {"before": memory, "among_them": memory_during, "after": memory_of(stack.console)},
             "peers_at_the_end": places,
-            "refused": await _refused(stack),
+            "refused": {} if front == "tls" else await _refused(stack),
             "crowd": seen,
             "machine": machine_facts() | {"busy_percent_before": round(before, 1)},
         }
+
+
+@asynccontextmanager
+async def _entry(stack: Stack, front: str) -> AsyncIterator[str]:
+    """The observer's link by which the crowd comes."""
+    if front != "caddy":
+        yield stack.observer
+        return
+    with TemporaryDirectory(prefix="lockstep-caddy-") as folder:
+        port, http_port = _free_port(), _free_port()
+        ports = {"LOCKSTEP_HTTPS_PORT": str(port), "LOCKSTEP_HTTP_PORT": str(http_port)}
+        site = {"LOCKSTEP_SITE": "localhost", "LOCKSTEP_PORT": str(urlsplit(stack.url).port)}
+        homes = dict.fromkeys(("HOME", "XDG_DATA_HOME", "XDG_CONFIG_HOME"), folder)
+        process = await asyncio.create_subprocess_exec(
+            *("caddy", "run", "--config", str(CADDYFILE), "--adapter", "caddyfile"),
+            env=os.environ | ports | site | homes,
+            stderr=asyncio.subprocess.DEVNULL,
+        )
+        try:
+            await _until_open(port)
+            yield stack.observer.replace(stack.url, f"https://localhost:{port}")
+        finally:
+            process.terminate()
+            await process.wait()
+
+
+def _free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        return int(free.getsockname()[1])
+
+
+async def _until_open(port: int) -> None:
+    async with asyncio.timeout(CROWD_SECONDS), httpx.AsyncClient(verify=False, trust_env=False) as http:
+        while True:
+            try:
+                await http.get(f"https://localhost:{port}/healthz")
+            except httpx.TransportError:
+                await asyncio.sleep(0.05)
+            else:
+                return
 
 
 async def _drive(console: Console, seconds: float) -> list[float]:

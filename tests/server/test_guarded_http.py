@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from server import body
 from server.front_door import PATIENCE as PATIENCE_OF_THE_DOOR
 from server.tls import self_signed
 from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console
@@ -136,20 +137,27 @@ async def test_a_body_that_was_announced_does_not_keep_a_connection_that_was_ans
         assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
 
 
-async def test_one_deadline_holds_for_head_and_body_together() -> None:
-    async with guarded_console(request_timeout=0.6) as (rig, port):
+async def test_one_deadline_holds_for_head_and_body_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of the body is counted from the first byte of the head."""
+    deadlines: list[float] = []
+    original = body.deadline
+
+    def spied(request: Any) -> float:
+        deadlines.append(original(request))
+        return deadlines[-1]
+
+    monkeypatch.setattr(body, "deadline", spied)
+    seconds = 100.0
+    async with guarded_console(request_timeout=seconds) as (rig, port):
         token = rig.token("observer")["Authorization"].encode()
         reader, writer = await _open(port, HEAD.replace(b"GET /healthz", b"POST /api/stop"))
-        await asyncio.sleep(0.3)  # of the deadline: this is what the client does, not what is waited for
-        writer.write(b"Authorization: " + token + b"\r\nContent-Length: 900\r\n\r\n")
-        said = asyncio.create_task(_said(reader))
-        for _ in range(800):
-            if said.done():
-                break
-            writer.write(b" ")
-            await asyncio.sleep(0.01)
-        assert b'"too_slow"' in await said
+        await eventually(lambda: len(rig.app.state.connection_places) == 1)
+        head_came_whole = asyncio.get_running_loop().time()
+        writer.write(b"Authorization: " + token + b"\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{}")
+        assert b"HTTP/1.1 " in await _said(reader)
         writer.close()
+        assert len(deadlines) == 1
+        assert deadlines[0] - seconds < head_came_whole
 
 
 async def test_who_does_not_read_its_answer_loses_the_connection() -> None:
