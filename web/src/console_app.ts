@@ -15,11 +15,14 @@ import { capHolds, cappedShare, viewDelay } from "./core/speed_cap";
 import { STALE_MS } from "./core/freshness";
 import { notePicture } from "./core/latency";
 import { noteShown } from "./core/command_gate";
-import { createRateMeter, noteHappening, rateOf } from "./core/samples";
+import { interlock, standingOf } from "./core/interlock";
+import { createRateMeter, noteHappening } from "./core/samples";
 import { parseServerMessage } from "./core/wire_parser";
 import { ARM_REFUSAL_WORDS } from "./core/words";
 import { Controls, type ControlSample } from "./input/controls";
 import { Disposal } from "./input/disposal";
+import { keepKeyboardFree } from "./input/pointer_focus";
+import { Ticker } from "./input/ticker";
 import { watchPage } from "./input/page_watch";
 import type { TouchSticks } from "./input/touch_sticks";
 import { AudioDesk } from "./media/audio_desk";
@@ -36,8 +39,6 @@ import { reportOf } from "./statistics";
 import { StopSender } from "./stop_sender";
 import { VoiceDesk } from "./voice_desk";
 import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, Welcome } from "./wire";
-
-const STALL_MS = 300; // without a tick, which comes every 10 ms
 
 export interface ConsoleAppEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;
@@ -70,12 +71,11 @@ export class ConsoleApp {
   firstPictureMs: number | null = null;
   private readonly reader = StampReader.isSupported() ? new StampReader() : null;
   readonly touch = new ContactFeeling(this);
+  readonly ticker: Ticker;
   private readonly disposal = new Disposal();
   private peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
   private heardMs = 0;
-  private readonly stalls = createRateMeter(6000);
-  private tickMs = Infinity;
   private readonly pulse = new Pulse({
     tell: (message) => this.tell("control", message),
     report: () => reportOf(this),
@@ -109,21 +109,18 @@ export class ConsoleApp {
       isArmed: () => this.isArmed(),
       answerClaim: (grant) => this.session.answerFirst(grant, performance.now()),
       lost: () => this.disarm("pad_lost"),
+      silent: () => this.disarm("pad_silent"),
       plugged: (words) => note(this.state, "info", words, Date.now()),
     });
     if (this.reader === null)
       note(this.state, "error", "This browser cannot read stamps: no picture passes the gate", Date.now());
     this.watchPage();
-    this.startTicking();
+    keepKeyboardFree(this.disposal);
+    this.ticker = new Ticker(this.disposal, (now) => this.tick(now));
   }
 
   isArmed(): boolean {
     return this.arming.state !== "disarmed";
-  }
-
-  /** Whether something keeps the page from its work, again and again. */
-  isHeldUp(now: number): boolean {
-    return rateOf(this.stalls, now) >= 0.5;
   }
 
   /** Whether the console is connected and speaks. */
@@ -148,7 +145,8 @@ export class ConsoleApp {
       connected: this.hears(now),
       robotUp: robotIsUp(state),
       holdsSeat: holdsSeat(state),
-      stopped: state.stop.stopped || this.stopping.isPending,
+      lockedOut: state.stop.locked_out !== "",
+      stopped: state.stop.stopped || this.stopping.outranks(state.stop, now),
       visible: !document.hidden,
       occupied: this.page.isOccupied(),
     };
@@ -161,6 +159,7 @@ export class ConsoleApp {
     }
     const refusal = arming.arm(this.arming, this.conditions(), this.controls.deadman);
     if (refusal !== null) note(this.state, "warning", ARM_REFUSAL_WORDS[refusal], Date.now());
+    else if (this.driver !== null) driver.driverArm(this.driver);
     this.page.armedChanged();
   }
 
@@ -175,11 +174,13 @@ export class ConsoleApp {
 
   stop(reason: string): void {
     this.stopping.stop(reason, performance.now());
-    this.disarm("stopped");
+    this.bar("stopped");
   }
 
-  reset(): void {
-    this.connection.send("stop", JSON.stringify({ type: "reset", by: "", number: this.state.stop.number }));
+  /** Nothing moves before the person arms again, not even by the neutral command that would let it. */
+  private bar(reason: arming.DisarmReason): void {
+    if (this.driver !== null) driver.driverBar(this.driver);
+    this.disarm(reason);
   }
 
   nextLayer(): void {
@@ -235,12 +236,6 @@ export class ConsoleApp {
     });
   }
 
-  private startTicking(): void {
-    const worker = new Worker(new URL("./input/tick_worker.ts", import.meta.url), { type: "module" });
-    worker.onmessage = () => this.tick(performance.now());
-    this.disposal.add(() => worker.terminate());
-  }
-
   private connectionClosed(): void {
     this.disarm("connection_lost");
     this.touch.forget();
@@ -262,7 +257,11 @@ export class ConsoleApp {
     }
     this.heardMs = performance.now();
     const { feedback, handOver } = this.state;
+    const standing = standingOf(this.state);
     applyMessage(this.state, parsed.message, Date.now());
+    this.stopping.took(parsed.message, this.state.stop, this.heardMs);
+    const forbidden = interlock(standing, this.state, parsed.message, this.driver?.unproven === true);
+    if (forbidden !== null) this.bar(forbidden);
     this.follow(parsed.message, feedback, this.heardMs);
     if (this.state.handOver !== handOver) this.handedOver();
   }
@@ -331,13 +330,10 @@ export class ConsoleApp {
   }
 
   private canCommand(): boolean {
-    const { operator, robotUp, holdsSeat: seated, stopped } = this.conditions();
-    return operator && robotUp && seated && !stopped;
+    return arming.mayCommand(this.conditions());
   }
 
   private tick(now: number): void {
-    if (now - this.tickMs > STALL_MS) noteHappening(this.stalls, now);
-    this.tickMs = now;
     const sample = this.controls.sample();
     const lost = arming.lostCondition(this.conditions(now));
     if (lost !== null) this.disarm(lost);
@@ -350,7 +346,7 @@ export class ConsoleApp {
     this.drive(now);
     this.room.listen();
     this.voice.step(now);
-    this.stopping.step(this.state.stop.stopped, now);
+    this.stopping.step(now);
     this.charts.step(now);
     this.touch.step(now);
     if (this.state.welcome !== null) this.pulse.step(now);

@@ -28,6 +28,7 @@ import "./style/pads.css";
 import "./style/layers.css";
 import "./style/record.css";
 import "./style/way_back.css";
+import "./style/forced_colors.css";
 import { readFragment } from "./core/fragment";
 import { installHook } from "./lockstep_hook";
 import { Page } from "./page";

@@ -14,6 +14,7 @@ import type { ConsoleApi } from "./rtc/console_api";
 import type { PeerOptions } from "./rtc/peer";
 import { SessionApi } from "./rtc/session_api";
 import { createAnnouncer } from "./ui/announcer";
+import { createAlarmStrip } from "./ui/alarm_strip";
 import { createArmPanel } from "./ui/arm_panel";
 import { createAuditSheet } from "./ui/audit_sheet";
 import { createAxisPanel } from "./ui/axis_panel";
@@ -115,6 +116,7 @@ export class Page {
       () => this.root.classList.toggle("shows-details"),
       () => this.countNews(),
     );
+    const alarm = createAlarmStrip(app);
     const banner = createBanner(app);
     const event = createEventPanel(app);
     const force = createForceGauge(app, false);
@@ -151,7 +153,9 @@ export class Page {
     const rail = h("aside", "rail", {}, event.element, tabs.element);
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
     this.root.append(
-      ...[bar.element, seat.element, banner.element, board.element, rail],
+      ...[bar.element, seat.element],
+      h("div", "strips", {}, alarm.element, banner.element),
+      ...[board.element, rail],
       ...[this.charts.element, this.sheets.element, deck, announcer.element],
     );
     addEventListener("keydown", (event) => {
@@ -163,6 +167,7 @@ export class Page {
       bar,
       record,
       seat,
+      alarm,
       banner,
       event,
       force,

@@ -66,6 +66,11 @@ export class SessionDesk {
     return first !== undefined;
   }
 
+  /** A supervisor's: whether STOP from that peer's link has an effect. */
+  silence(peer: string, silent: boolean): void {
+    this.tell({ type: "silence_stops", peer, silent });
+  }
+
   claims(now: number): Claim[] {
     return claimsAfter(this.state.seat, now - this.seatMs);
   }

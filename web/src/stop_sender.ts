@@ -1,55 +1,89 @@
-import type { ConsoleApi } from "./rtc/console_api";
+import { createResetOffer, resetNotSent, resetNumber, tookResetRefusal } from "./core/reset_offer";
+import {
+  createPress,
+  isBeingSaid,
+  isPast,
+  outranks,
+  stopDue,
+  stopFate,
+  tookStopAnswer,
+  tookStopState,
+  tookStopTaken,
+  type StopFate,
+  type StopPress,
+} from "./core/stop_press";
+import { stopAnswerOf, type ConsoleApi } from "./rtc/console_api";
 import type { Connection } from "./rtc/connection";
+import type { ServerMessage, StopState } from "./wire";
 
-const REPEAT_MS = 250;
-const GIVE_UP_MS = 10_000;
-
-/** Says STOP on every way there is, again and again until the robot reports that it is stopped. */
+/**
+ * STOP and its reset. Says the newest press on every way there is, again and again until the robot confirms it. A press takes the
+ * place of the one before: a robot that has the newer one is stopped for both.
+ */
 export class StopSender {
-  private sinceMs: number | null = null; // null: nothing pending
-  private nextMs = 0;
-  private nextHttpMs = 0;
-  private reason = "";
-  failed = false; // given up unconfirmed
+  readonly offer = createResetOffer();
+  private press: StopPress | null = null; // null: none, or it is done with
 
   constructor(
     private readonly api: ConsoleApi,
     private readonly connection: Connection,
   ) {}
 
-  get isPending(): boolean {
-    return this.sinceMs !== null;
+  /** What became of the newest press; null when there is nothing to tell. */
+  fate(now: number): StopFate | null {
+    return this.press === null ? null : stopFate(this.press, now);
+  }
+
+  /** Whether it is still said. */
+  isSaid(now: number): boolean {
+    return this.press !== null && isBeingSaid(this.press, now);
+  }
+
+  /** Whether a press may have stopped the robot although `stop` does not show it yet. */
+  outranks(stop: StopState, now: number): boolean {
+    return this.press !== null && outranks(this.press, stop, now);
   }
 
   stop(reason: string, now: number): void {
-    this.reason = reason;
-    this.sinceMs = now;
-    this.nextMs = this.nextHttpMs = now;
-    this.failed = false;
-    this.step(false, now);
+    this.press = createPress(crypto.getRandomValues(new Uint8Array(16)), reason, now);
+    this.step(now);
   }
 
-  /** Repeats while the robot does not report the stop. */
-  step(stopped: boolean, now: number): void {
-    if (this.sinceMs === null) return;
-    if (stopped && now > this.sinceMs) {
-      this.sinceMs = null;
-      this.failed = false;
-      return;
+  /** Resets the stop that is on screen, if it was there when the hand came to the button, at `heldMs`. */
+  reset(heldMs: number, now: number): void {
+    const number = resetNumber(this.offer, heldMs);
+    if (number === null) return;
+    const text = JSON.stringify({ type: "reset", by: "", number });
+    if (!this.connection.send("stop", text)) resetNotSent(this.offer, now);
+  }
+
+  /** `stop`: what holds with this message taken. */
+  took(message: ServerMessage, stop: StopState, now: number): void {
+    if (message.type === "refusal" && message.stop > 0) tookResetRefusal(this.offer, message, now);
+    const { press } = this;
+    if (press === null) return;
+    if (message.type === "stop_taken") tookStopTaken(press, message);
+    else if (message.type === "refusal" && message.reason === "silenced")
+      tookStopAnswer(press, { kind: "silenced" });
+    tookStopState(press, stop);
+    if (isPast(press, stop)) this.press = null;
+  }
+
+  /** To be called many times a second. */
+  step(now: number): void {
+    const { press } = this;
+    if (press === null) return;
+    const due = stopDue(press, now);
+    if (due.channels) {
+      const text = JSON.stringify({ type: "stop", by: "", reason: press.reason, press: press.id });
+      this.connection.send("stop", text);
+      this.connection.send("control", text);
     }
-    this.failed = now - this.sinceMs > GIVE_UP_MS;
-    if (this.failed) this.sinceMs = null;
-    else if (now >= this.nextMs) this.say(now);
+    if (due.http) void this.sayOverHttp(press);
   }
 
-  private say(now: number): void {
-    this.nextMs = now + REPEAT_MS;
-    const text = JSON.stringify({ type: "stop", by: "", reason: this.reason });
-    this.connection.send("stop", text);
-    this.connection.send("control", text);
-    if (now < this.nextHttpMs) return;
-    this.nextHttpMs = now + 4 * REPEAT_MS;
-    // A failure shows as a stop that is not confirmed; the next repeat comes anyway.
-    this.api.stop(this.reason).catch(() => undefined);
+  private async sayOverHttp(press: StopPress): Promise<void> {
+    const answer = await stopAnswerOf(this.api.stop(press.reason, press.id), press.id);
+    tookStopAnswer(press, answer);
   }
 }

@@ -6,6 +6,7 @@ export type ArmRefusal =
   | "not_connected"
   | "robot_down"
   | "no_seat"
+  | "locked_out"
   | "stopped"
   | "hidden"
   | "occupied"
@@ -17,11 +18,14 @@ export type DisarmReason =
   | "blur"
   | "hidden"
   | "pad_lost"
+  | "pad_silent"
   | "connection_lost"
   | "robot_down"
   | "seat_lost"
   | "occupied"
   | "stopped"
+  | "locked_out"
+  | "neutral_needed"
   | "taped_down";
 
 export interface ArmConditions {
@@ -29,6 +33,7 @@ export interface ArmConditions {
   readonly connected: boolean;
   readonly robotUp: boolean;
   readonly holdsSeat: boolean;
+  readonly lockedOut: boolean; // by somebody at the robot
   readonly stopped: boolean;
   readonly visible: boolean;
   readonly occupied: boolean; // the keyboard or the picture belongs to something else: a text field, a dialogue
@@ -55,6 +60,7 @@ export function armRefusal(arming: Arming, conditions: ArmConditions): ArmRefusa
   if (!conditions.connected) return "not_connected";
   if (!conditions.robotUp) return "robot_down";
   if (!conditions.holdsSeat) return "no_seat";
+  if (conditions.lockedOut) return "locked_out";
   if (conditions.stopped) return "stopped";
   if (!conditions.visible) return "hidden";
   if (conditions.occupied) return "occupied";
@@ -82,9 +88,15 @@ export function startAfresh(arming: Arming): void {
   if (arming.state === "disarmed") arming.reason = "start";
 }
 
+/** Whether the robot would execute a command of this page at all. */
+export function mayCommand({ operator, robotUp, holdsSeat, lockedOut, stopped }: ArmConditions): boolean {
+  return operator && robotUp && holdsSeat && !lockedOut && !stopped;
+}
+
 /** What the first condition that no longer holds means for one who is armed; null when all hold. */
 export function lostCondition(conditions: ArmConditions): DisarmReason | null {
   if (!conditions.connected) return "connection_lost";
+  if (conditions.lockedOut) return "locked_out";
   if (conditions.stopped) return "stopped";
   if (!conditions.robotUp) return "robot_down";
   if (!conditions.operator || !conditions.holdsSeat) return "seat_lost";

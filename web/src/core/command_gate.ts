@@ -11,6 +11,7 @@ export interface CommandGate {
   minIntervalMs: number; // between two events; 40
   event: number | null; // newest feedback; null before the first
   issue: number; // newest issue of that event
+  nonce: number; // of that issue: a command names it, as proof that it was seen
   inFlight: number | null; // the event sent and not yet answered
   lastSentMs: number; // -Infinity before the first
   shown: number | null; // stamp of the picture on screen
@@ -20,6 +21,7 @@ export interface CommandGate {
 export interface NextCommand {
   readonly event: number;
   readonly issue: number;
+  readonly nonce: number; // of that issue
 }
 
 export function createCommandGate(pacing: Pacing, tolerance: number, minIntervalMs: number): CommandGate {
@@ -29,6 +31,7 @@ export function createCommandGate(pacing: Pacing, tolerance: number, minInterval
     minIntervalMs,
     event: null,
     issue: 0,
+    nonce: 0,
     inFlight: null,
     lastSentMs: -Infinity,
     shown: null,
@@ -36,15 +39,17 @@ export function createCommandGate(pacing: Pacing, tolerance: number, minInterval
 }
 
 /** Takes a feedback; says whether it was news. */
-export function takeFeedback(gate: CommandGate, event: number, issue: number): boolean {
+export function takeFeedback(gate: CommandGate, event: number, issue: number, nonce = 0): boolean {
   if (gate.event === event) {
     if (issue <= gate.issue) return false;
     gate.issue = issue;
+    gate.nonce = nonce;
     return true;
   }
   if (gate.event !== null && !isNewer(event, gate.event)) return false;
   gate.event = event;
   gate.issue = issue;
+  gate.nonce = nonce;
   if (gate.inFlight !== null && !isNewer(gate.inFlight, event)) gate.inFlight = null;
   return true;
 }
@@ -76,7 +81,7 @@ export function gateState(gate: CommandGate, now: number): GateState {
 }
 
 export function nextCommand(gate: CommandGate): NextCommand | null {
-  return gate.event === null ? null : { event: eventAfter(gate.event), issue: gate.issue };
+  return gate.event === null ? null : { event: eventAfter(gate.event), issue: gate.issue, nonce: gate.nonce };
 }
 
 /**

@@ -19,6 +19,7 @@ import { requestAnswer, type SeatNews } from "./seat_news";
 import { handOver, type HandOver } from "./hand_over";
 import type { GateMode } from "./media_gate";
 import { isNewer } from "./serial";
+import { resetRefusalWords } from "./reset_words";
 import { sourceWords } from "./source_words";
 import { REFUSAL_WORDS } from "./words";
 
@@ -58,6 +59,7 @@ export interface ConsoleState {
   notes: SharedNote[]; // oldest first
   feedback: Feedback | null; // newest
   stop: StopState;
+  stopIsHeard: boolean; // on this connection; else it is of an earlier one
   roundTripMs: number | null;
   badMessages: number; // could not be read
 }
@@ -100,6 +102,7 @@ export function createConsoleState(): ConsoleState {
     notes: [],
     feedback: null,
     stop: NOT_STOPPED,
+    stopIsHeard: false,
     roundTripMs: null,
     badMessages: 0,
   };
@@ -118,6 +121,7 @@ export function forgetConnection(state: ConsoleState): void {
   state.recording = null;
   state.notes = [];
   state.feedback = null;
+  state.stopIsHeard = false;
   state.roundTripMs = null;
 }
 
@@ -158,7 +162,7 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       note(state, message.level, message.text, wallMs);
       return;
     case "stop_state":
-      state.stop = message.stop;
+      takeStop(state, message.stop);
       return;
     case "refusal":
       takeRefusal(state, message, wallMs);
@@ -212,7 +216,14 @@ function isNews(known: Feedback | null, feedback: Feedback): boolean {
 
 function takeFeedbackState(state: ConsoleState, feedback: Feedback): void {
   state.feedback = feedback;
-  state.stop = feedback.stop;
+  takeStop(state, feedback.stop);
+}
+
+/** Numbers only grow, and the two ways that tell of a stop overtake each other: what names an older one is late. */
+function takeStop(state: ConsoleState, stop: StopState): void {
+  if (state.stopIsHeard && stop.number < state.stop.number) return;
+  state.stop = stop;
+  state.stopIsHeard = true;
 }
 
 /** A failure is said once, in the log too. */
@@ -248,6 +259,10 @@ function takeRefusal(state: ConsoleState, refusal: Refusal, wallMs: number): voi
   const answer = requestAnswer(refusal, state.seat?.name ?? "");
   if (answer !== null) state.seatNews = { words: answer };
   if (refusal.reason === "seat_taken" && answer === null) return;
+  if (refusal.stop > 0) {
+    note(state, "warning", resetRefusalWords(refusal), wallMs);
+    return;
+  }
   note(state, "warning", answer ?? refusalWords(refusal), wallMs);
 }
 

@@ -52,6 +52,10 @@ export interface Intention {
 /**
  * Turns intentions into commands, rests and repeats of them. Holds no clock and no socket.
  *
+ * After a stop, a reset, a fault or another link the robot asks for a neutral command before one that moves. That
+ * command stands for a person's decision: none leaves after `driverBar` before `driverArm`, and then none that moves
+ * before it was answered.
+ *
  * While the path loses packets every command is followed by copies until its answer: a copy covers the loss of the
  * command and, being answered from the stored feedback, the loss of the answer too. When all were lost, the first
  * repeat comes early, and each repeat is a salvo: single repeats would wait out a row of lost packets one by one. On a
@@ -70,8 +74,10 @@ export interface Driver {
   lossyUntilMs: number; // -Infinity before the first loss
   readonly pings: number[]; // their round trips in ms, newest last; none of a command is shorter
   lastValues: readonly number[]; // sent last
-  nonce: number; // of the newest feedback's issue, which a command names; 0 before the first
   neutralOwed: boolean; // one neutral command is due after disarming
+  barred: boolean; // nothing but rests leaves until the person has armed
+  unproven: boolean; // armed, and no neutral command was answered since
+  flightIsNeutral: boolean; // what the event in flight was first sent with
   barrier: number | null; // events up to this one were voided by a rest: only neutral goes under their numbers
   rest: { event: number; sends: number; atMs: number; sinceMs: number } | null; // until the robot is at rest
 }
@@ -95,8 +101,10 @@ export function createDriver(
     lossyUntilMs: -Infinity,
     pings: [],
     lastValues: neutral,
-    nonce: 0,
     neutralOwed: false,
+    barred: true,
+    unproven: false,
+    flightIsNeutral: false,
     barrier: null,
     rest: null,
   };
@@ -111,8 +119,8 @@ export function driverFeedback(
 ): boolean {
   const { gate, rest } = driver;
   const flying = gate.inFlight;
-  if (!takeFeedback(gate, feedback.event, feedback.issue)) return false;
-  driver.nonce = feedback.nonce;
+  if (!takeFeedback(gate, feedback.event, feedback.issue, feedback.nonce)) return false;
+  if (flying !== null && gate.inFlight === null && driver.flightIsNeutral) driver.unproven = false;
   const sample = noteFeedback(driver.latency, feedback.event, now);
   if (sample !== null && flying === feedback.event) landed(driver, feedback.issue, sample, now);
   if (driver.barrier !== null && !isNewer(driver.barrier, feedback.event)) driver.barrier = null;
@@ -152,7 +160,7 @@ export function driverRefusal(driver: Driver, refusal: Refusal, armed: boolean):
   if (refusal.reason === "rested") driver.barrier = refusal.event;
   const mayRepeat =
     refusal.reason === "late" || refusal.reason === "rested" || refusal.reason === "out_of_order";
-  if (!armed && mayRepeat) driver.neutralOwed = true;
+  if (!armed && mayRepeat) driver.neutralOwed = !driver.barred;
 }
 
 /** The deadman was let go: brings the robot to rest at once, past the gate. */
@@ -163,17 +171,31 @@ export function driverRelease(driver: Driver, now: number): void {
   driver.barrier = event;
 }
 
-/** Disarmed: rest, one neutral, then silence. */
+/** The person has armed: a neutral command leaves, and what moves waits for its answer. */
+export function driverArm(driver: Driver): void {
+  driver.barred = false;
+  driver.unproven = true;
+}
+
+/** Disarmed: rest, one neutral unless that is barred, then silence. */
 export function driverDisarm(driver: Driver, now: number): void {
   driverRelease(driver, now);
-  driver.neutralOwed = true;
+  driver.unproven = false;
+  driver.neutralOwed = !driver.barred;
+}
+
+/** A stop, a reset, a fault, another link: what is under way is dropped, and the next command is the person's to give. */
+export function driverBar(driver: Driver): void {
+  if (driver.gate.inFlight !== null) noteCommandRefused(driver.latency, driver.gate.inFlight);
+  driver.gate.inFlight = null;
+  driver.neutralOwed = false;
+  driver.unproven = false;
+  driver.barred = true;
 }
 
 /** Nothing sent from here can be executed any more (seat lost, robot link down). */
 export function driverSilence(driver: Driver): void {
-  if (driver.gate.inFlight !== null) noteCommandRefused(driver.latency, driver.gate.inFlight);
-  driver.gate.inFlight = null;
-  driver.neutralOwed = false;
+  driverBar(driver);
   driver.rest = null;
 }
 
@@ -208,9 +230,10 @@ function restDue(driver: Driver, now: number): ClientMessage | null {
 
 function commandDue(driver: Driver, intention: Intention, now: number): ClientMessage | null {
   const next = nextCommand(driver.gate);
-  if (next === null) return null;
+  if (next === null || driver.barred) return null;
   const isVoided = driver.barrier !== null && !isNewer(next.event, driver.barrier);
-  const values = intention.armed && !isVoided ? intention.values : driver.neutral;
+  const mayMove = intention.armed && !isVoided && !driver.unproven;
+  const values = mayMove ? intention.values : driver.neutral;
   if (driver.gate.inFlight !== null) {
     if (now < Math.min(driver.repeatAtMs, driver.echoAtMs)) return null;
     if (now >= driver.repeatAtMs) noteSending(driver, driver.sends + 1, now);
@@ -221,9 +244,10 @@ function commandDue(driver: Driver, intention: Intention, now: number): ClientMe
     noteCommandSent(driver.latency, next.event, now);
     noteSending(driver, 1, now);
     driver.neutralOwed &&= intention.armed;
+    driver.flightIsNeutral = isSame(values, driver.neutral);
   }
   driver.lastValues = values;
-  return { type: "command", event: next.event, issue: next.issue, values, nonce: driver.nonce };
+  return { type: "command", ...next, values };
 }
 
 function noteSending(driver: Driver, sends: number, now: number): void {
@@ -260,6 +284,7 @@ function knowsFewCommands(driver: Driver): boolean {
 function wantsToSend(driver: Driver, armed: boolean, values: readonly number[], now: number): boolean {
   if (gateState(driver.gate, now) !== "open") return false;
   if (!armed) return driver.neutralOwed;
+  if (driver.unproven) return true;
   const idles = isSame(values, driver.neutral) && isSame(driver.lastValues, driver.neutral);
   return !idles || now - driver.gate.lastSentMs >= IDLE_INTERVAL_MS;
 }

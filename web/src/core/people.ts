@@ -25,6 +25,7 @@ export function sortPeople(
     if (person.peer === seat?.holder) return 0;
     if (person.peer === me) return 1;
     if (claims.has(person.peer)) return 2;
+    if (person.silenced) return 2.5; // it must not be forgotten among many
     if (person.role === "supervisor") return 3;
     return person.role === "operator" ? 4 : 5;
   };
@@ -35,6 +36,11 @@ export function sortPeople(
     leading: ranked.filter((each) => each.rank < 5).map((each) => each.person),
     watching: ranked.filter((each) => each.rank === 5).map((each) => each.person),
   };
+}
+
+/** Whether this peer's link may not stop the robot for now. */
+export function isSilenced(participants: readonly Participant[], peer: string | null): boolean {
+  return participants.some((person) => person.peer === peer && person.silenced);
 }
 
 export function summarise(people: readonly Participant[]): CrowdSummary {

@@ -8,11 +8,12 @@ export interface SeatWords {
 }
 
 /** What keeps a holder from driving now. */
-export type Obstacle = "silent" | "robot_down" | "stopped";
+export type Obstacle = "silent" | "robot_down" | "locked_out" | "stopped";
 
 const OBSTACLE_WORDS: Readonly<Record<Obstacle, string>> = {
   silent: "The console is silent, and frees the seat of somebody it does not hear",
   robot_down: "The robot cannot be reached",
+  locked_out: "Somebody at the robot has locked it",
   stopped: "Reset the robot, then arm to drive",
 };
 

@@ -2,15 +2,18 @@ import type { FleetRobot, StopReply } from "./fleet_answer";
 import { robotsWords } from "./fleet_order";
 
 const REPEAT_MS = 1000;
-const GIVE_UP_MS = 10_000;
+const DOUBT_AFTER_MS = 3000;
+const GIVE_UP_MS = 60_000;
 
-/** What became of a STOP at one robot. `told`: delivered, but the robot does not report it yet. */
-export type StopFate = "stopped" | "told" | "kept" | "asking";
+/** What became of a press at one robot. `stopped`: that robot confirmed this press; `kept`: it was not delivered. */
+export type StopFate = "stopped" | "kept" | "asking";
 
-/** One press of STOP ALL, until every robot reports that it is stopped or nobody waits any more. */
+/** One press of STOP ALL, until every robot has confirmed it or nobody waits any more. */
 export interface StopAll {
+  press: string; // its id, which every way to every robot carries
   pressedMs: number | null; // null: never pressed, or its answer was put away
   isOver: boolean; // nothing is repeated any more
+  isDoubtful: boolean; // some robot has not confirmed it for too long
   nextMs: number; // when it is said again
   answered: boolean; // by the console, at least once
   failure: string; // why the last try got no answer
@@ -18,13 +21,23 @@ export interface StopAll {
 }
 
 export function createStopAll(): StopAll {
-  return { pressedMs: null, isOver: true, nextMs: 0, answered: false, failure: "", fates: new Map() };
+  return {
+    press: "",
+    pressedMs: null,
+    isOver: true,
+    isDoubtful: false,
+    nextMs: 0,
+    answered: false,
+    failure: "",
+    fates: new Map(),
+  };
 }
 
 /** Takes effect at once, also while an earlier press is not confirmed yet. `names`: all that the page knows. */
-export function pressStopAll(stop: StopAll, names: readonly string[], now: number): void {
+export function pressStopAll(stop: StopAll, press: string, names: readonly string[], now: number): void {
+  stop.press = press;
   stop.pressedMs = now;
-  stop.isOver = false;
+  stop.isOver = stop.isDoubtful = false;
   stop.nextMs = now;
   stop.answered = false;
   stop.failure = "";
@@ -38,34 +51,31 @@ export function stepStopAll(stop: StopAll, now: number): boolean {
   const fates = [...stop.fates.values()];
   if (stop.answered && fates.every(({ fate }) => fate === "stopped")) stop.isOver = true;
   else if (now - stop.pressedMs > GIVE_UP_MS) stop.isOver = true;
+  else if (now - stop.pressedMs > DOUBT_AFTER_MS) stop.isDoubtful = true;
   if (stop.isOver || now < stop.nextMs) return false;
   stop.nextMs = now + REPEAT_MS;
   return true;
 }
 
-/** An answer to one try, by whatever way. What a robot reported since stays; what one way delivered is delivered. */
-export function tookStopReplies(stop: StopAll, replies: readonly StopReply[]): void {
-  if (stop.pressedMs === null) return;
+/** An answer about this press, by whatever way. What one way has confirmed stays confirmed. */
+export function tookStopReplies(stop: StopAll, press: string, replies: readonly StopReply[]): void {
+  if (stop.pressedMs === null || stop.press !== press) return;
   stop.answered = true;
   stop.failure = "";
-  for (const { name, delivered, detail } of replies) {
-    const known = stop.fates.get(name)?.fate;
-    if (known === "stopped" || (known === "told" && !delivered)) continue;
-    stop.fates.set(name, { fate: delivered ? "told" : "kept", detail });
-  }
+  for (const { name, delivered, detail } of replies)
+    if (stop.fates.get(name)?.fate !== "stopped")
+      stop.fates.set(name, { fate: delivered ? "stopped" : "kept", detail });
 }
 
-export function stopFailed(stop: StopAll, why: string): void {
-  stop.failure = why;
+export function stopFailed(stop: StopAll, press: string, why: string): void {
+  if (stop.press === press) stop.failure = why;
 }
 
-/** News of the robots that were asked for at `askedMs`: only what is newer than the press confirms it. */
-export function tookFleet(stop: StopAll, robots: readonly FleetRobot[], askedMs: number): void {
-  if (stop.pressedMs === null || stop.isOver || askedMs < stop.pressedMs) return;
-  for (const robot of robots) {
-    if (robot.link === "up" && robot.stopped) stop.fates.set(robot.name, { fate: "stopped", detail: "" });
-    else if (!stop.fates.has(robot.name)) stop.fates.set(robot.name, { fate: "asking", detail: "" });
-  }
+/** Robots that the page did not know when it was pressed. That one of them is stopped confirms no press. */
+export function tookFleet(stop: StopAll, robots: readonly FleetRobot[]): void {
+  if (stop.pressedMs === null || stop.isOver) return;
+  for (const { name } of robots)
+    if (!stop.fates.has(name)) stop.fates.set(name, { fate: "asking", detail: "" });
 }
 
 /** The answer is read. */
@@ -91,8 +101,9 @@ export function stopAllWords(stop: StopAll): StopWords | null {
     .filter(([, { fate }]) => fate !== "stopped")
     .map(([name, { fate, detail }]) => ({ name, detail: fateWords(fate, detail) }));
   const words = { stopped, missing };
-  if (!stop.answered && stop.isOver && stopped.length === 0)
-    return { tone: "bad", title: "STOP is not confirmed", ...words, advice: unansweredWords(stop.failure) };
+  const isLate = stop.isOver || stop.isDoubtful;
+  if (!stop.answered && isLate && stopped.length === 0)
+    return { tone: "bad", title: "STOP is not confirmed", ...words, advice: unansweredWords(stop) };
   if (missing.length === 0 && stop.answered)
     return {
       tone: "done",
@@ -105,7 +116,7 @@ export function stopAllWords(stop: StopAll): StopWords | null {
     };
   const counted = `${stopped.length} of ${robotsWords(all.length)} stopped`;
   const isKept = all.some(([, { fate }]) => fate === "kept");
-  if (!stop.isOver && !isKept) {
+  if (!isLate && !isKept) {
     const advice = stop.failure === "" ? "" : `${stop.failure} It is said again.`;
     return { tone: "pending", title: all.length === 0 ? "Saying STOP …" : `${counted} …`, ...words, advice };
   }
@@ -113,18 +124,21 @@ export function stopAllWords(stop: StopAll): StopWords | null {
     tone: "bad",
     title: counted,
     ...words,
-    advice: `${stop.failure === "" ? "" : `${stop.failure} `}Stop the others by their own emergency stops. Press again to say it once more.`,
+    advice: `${stop.failure === "" ? "" : `${stop.failure} `}Stop the others by their own emergency stops. ${nextWords(stop)}`,
   };
 }
 
 function fateWords(fate: StopFate, detail: string): string {
   if (fate === "asking") return "not answered yet";
-  if (fate === "told") return "delivered, not confirmed by the robot";
   return detail === ""
     ? "not delivered: it is kept and sent first when the robot is back"
     : `not delivered: ${detail}`;
 }
 
-function unansweredWords(failure: string): string {
-  return `${failure === "" ? "" : `${failure} `}Press again, and stop the robots by their own emergency stops.`;
+function nextWords(stop: StopAll): string {
+  return stop.isOver ? "Press again to say it once more." : "It is said again every second.";
+}
+
+function unansweredWords(stop: StopAll): string {
+  return `${stop.failure === "" ? "" : `${stop.failure} `}Stop the robots by their own emergency stops. ${nextWords(stop)}`;
 }

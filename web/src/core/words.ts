@@ -42,6 +42,7 @@ export const GATE_BLOCK_WORDS: Readonly<Record<GateBlock, string>> = {
   not_connected: "Not connected",
   console_silent: "The console is silent",
   robot_down: "The robot cannot be reached",
+  locked_out: "Somebody at the robot has locked it",
   stopped: "The robot is stopped",
   no_seat: "The control seat is not yours",
 };
@@ -51,6 +52,7 @@ export const ARM_REFUSAL_WORDS: Readonly<Record<ArmRefusal, string>> = {
   not_connected: "Not connected to the console",
   robot_down: "The robot cannot be reached",
   no_seat: "Get the control seat first",
+  locked_out: "Somebody at the robot has locked it",
   stopped: "The robot is stopped: reset it first",
   hidden: "The page is hidden",
   occupied: "Close what is open over the picture, or leave the text field, first",
@@ -63,11 +65,14 @@ export const DISARM_WORDS: Readonly<Record<DisarmReason, string>> = {
   blur: "Disarmed: the window lost focus",
   hidden: "Disarmed: the page was hidden",
   pad_lost: "Disarmed: the gamepad is gone",
+  pad_silent: "Disarmed: the gamepad fell silent. Is it in range, and charged?",
   connection_lost: "Disarmed: the connection was lost",
   robot_down: "Disarmed: the robot cannot be reached",
   seat_lost: "Disarmed: the control seat was lost",
   occupied: "Disarmed: you turned to a text field or a dialogue",
   stopped: "Disarmed: the robot was stopped",
+  locked_out: "Disarmed: somebody at the robot locked it",
+  neutral_needed: "Disarmed: the robot interrupted the motion. Arm to go on",
   taped_down: "Disarmed: hold-to-run was held a minute without change",
 };
 

@@ -1,7 +1,5 @@
 import { robotsNearby, type FleetRobot, type StopReply } from "../core/fleet_answer";
-import { ConsoleApi } from "../rtc/console_api";
-
-const LIMIT_MS = 3000;
+import { ConsoleApi, stopAnswerOf } from "../rtc/console_api";
 
 /**
  * Says STOP to other consoles' robots at those consoles, where one entry leads to them: it needs nothing between the
@@ -12,23 +10,21 @@ export class DirectStop {
 
   constructor(
     private readonly token: string,
-    private readonly delivered: (reply: StopReply) => void,
+    private readonly confirmed: (press: string, reply: StopReply) => void,
   ) {}
 
-  say(robots: readonly FleetRobot[], reason: string): void {
+  say(robots: readonly FleetRobot[], reason: string, press: string): void {
     for (const robot of robotsNearby(robots, document.baseURI))
-      if (!this.asking.has(robot.name)) void this.sayTo(robot, reason);
+      if (!this.asking.has(robot.name)) void this.sayTo(robot, reason, press);
   }
 
-  /** A refusal is not told: the console's own answer says more. */
-  private async sayTo({ name, url }: FleetRobot, reason: string): Promise<void> {
+  /** A refusal is not told: the console asks by its own way too, and its answer says more. */
+  private async sayTo({ name, url }: FleetRobot, reason: string, press: string): Promise<void> {
     this.asking.add(name);
     try {
       const api = new ConsoleApi(this.token, url);
-      await api.json("POST", "/api/stop", { reason }, AbortSignal.timeout(LIMIT_MS));
-      this.delivered({ name, delivered: true, detail: "" });
-    } catch {
-      // The console asks by its own way too, and names what failed.
+      const answer = await stopAnswerOf(api.stop(reason, press), press);
+      if (answer.kind === "taken") this.confirmed(press, { name, delivered: true, detail: "" });
     } finally {
       this.asking.delete(name);
     }

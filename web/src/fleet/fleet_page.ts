@@ -65,15 +65,17 @@ export class FleetPage {
     const audit = createFleetAudit(api);
     this.auditing = button("quiet-button fleet-audit", "Audit trail", () => this.sheets.open(audit));
     this.thumbnails = new Thumbnails(link.token ?? "", link);
-    const direct = new DirectStop(link.token ?? "", (reply) => tookStopReplies(this.stopping.stop, [reply]));
-    this.stopping = new FleetStop(api, (reason) => {
-      this.thumbnails.stop(reason);
-      direct.say(this.robots, reason);
+    const direct = new DirectStop(link.token ?? "", (press, reply) =>
+      tookStopReplies(this.stopping.stop, press, [reply]),
+    );
+    this.stopping = new FleetStop(api, (reason, press) => {
+      this.thumbnails.stop(reason, press);
+      direct.say(this.robots, reason, press);
     });
     this.poll = new FleetPoll(api, {
       answer: (answer, askedMs) => {
         tookAnswer(this.news, answer, askedMs, performance.now(), Date.now());
-        this.stopping.took(answer.robots, askedMs);
+        this.stopping.took(answer.robots);
         this.follow();
       },
       trouble: (trouble) => {

@@ -8,29 +8,30 @@ import {
   tookFleet,
   tookStopReplies,
 } from "../core/stop_all";
+import { pressId } from "../core/stop_press";
 import { ConsoleError, type ConsoleApi } from "../rtc/console_api";
 import { troubleWords } from "../rtc/session_api";
 
 const LIMIT_MS = 3000;
 
-/** Says STOP for every robot on every way there is, until all of them report it. */
+/** Says STOP for every robot on every way there is, until all of them have confirmed it. */
 export class FleetStop {
   readonly stop = createStopAll();
   private reason = "";
-  private presses = 0;
 
   /** `alsoSay`: on ways of its own, beside the one request to the console. */
   constructor(
     private readonly api: ConsoleApi,
-    private readonly alsoSay: (reason: string) => void,
+    private readonly alsoSay: (reason: string, press: string) => void,
   ) {}
 
   /** Takes effect at once. */
   press(reason: string, robots: readonly FleetRobot[], now: number): void {
     this.reason = reason;
-    this.presses += 1;
+    const press = pressId(crypto.getRandomValues(new Uint8Array(16)));
     pressStopAll(
       this.stop,
+      press,
       robots.map((robot) => robot.name),
       now,
     );
@@ -40,29 +41,28 @@ export class FleetStop {
   /** Says it again while somebody has not confirmed it. */
   step(now: number): void {
     if (!stepStopAll(this.stop, now)) return;
-    this.alsoSay(this.reason);
-    void this.say(this.presses);
+    const { press } = this.stop;
+    this.alsoSay(this.reason, press);
+    void this.say(this.reason, press);
   }
 
-  took(robots: readonly FleetRobot[], askedMs: number): void {
-    tookFleet(this.stop, robots, askedMs);
+  took(robots: readonly FleetRobot[]): void {
+    tookFleet(this.stop, robots);
   }
 
   putAway(): void {
     putAway(this.stop);
   }
 
-  /** The answer to an earlier press says nothing of this one. */
-  private async say(press: number): Promise<void> {
+  private async say(reason: string, press: string): Promise<void> {
+    const limit = AbortSignal.timeout(LIMIT_MS);
     try {
-      const limit = AbortSignal.timeout(LIMIT_MS);
-      const answer = await this.api.json("POST", "/api/fleet/stop", { reason: this.reason }, limit);
+      const answer = await this.api.json("POST", "/api/fleet/stop", { reason, press }, limit);
       const replies = parseStopReplies(answer);
-      if (press !== this.presses) return;
-      if (replies === null) stopFailed(this.stop, "The console’s answer cannot be read.");
-      else tookStopReplies(this.stop, replies);
+      if (replies === null) stopFailed(this.stop, press, "The console’s answer cannot be read.");
+      else tookStopReplies(this.stop, press, replies);
     } catch (error) {
-      if (press === this.presses) stopFailed(this.stop, failureWords(error));
+      stopFailed(this.stop, press, failureWords(error));
     }
   }
 }

@@ -13,8 +13,9 @@ export function createStopBar(stop: StopAll, events: StopBarEvents): Panel {
   const press = h(
     "button",
     "stop",
-    { type: "button", "aria-label": "Stop all robots", "aria-keyshortcuts": "Escape" },
+    { type: "button", "aria-keyshortcuts": "Escape" },
     h("span", "stop-name", {}, "STOP ALL"),
+    h("span", "unseen", {}, "robots"),
     words,
   );
   // Pressing takes effect at once, without waiting for the release.

@@ -97,8 +97,8 @@ export class Thumbnail {
   }
 
   /** STOP by this way too: it may be open where HTTP is not. */
-  stop(reason: string): void {
-    const text = JSON.stringify({ type: "stop", by: "", reason });
+  stop(reason: string, press: string): void {
+    const text = JSON.stringify({ type: "stop", by: "", reason, press });
     this.connection.send("stop", text);
     this.connection.send("control", text);
   }

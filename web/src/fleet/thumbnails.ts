@@ -45,8 +45,8 @@ export class Thumbnails {
     for (const tile of tiles) this.tell(tile);
   }
 
-  stop(reason: string): void {
-    for (const thumbnail of this.open.values()) thumbnail.stop(reason);
+  stop(reason: string, press: string): void {
+    for (const thumbnail of this.open.values()) thumbnail.stop(reason, press);
   }
 
   alarm(): void {

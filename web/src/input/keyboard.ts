@@ -1,4 +1,5 @@
 import { Disposal } from "./disposal";
+import { CONTROLS } from "./pointer_focus";
 
 export interface KeyboardEvents {
   stop(): void;
@@ -17,7 +18,6 @@ const ANSWER_KEYS: ReadonlyMap<string, boolean> = new Map([
   ["F9", false],
 ]);
 export const FIELDS = "input, textarea, select";
-const CONTROLS = "button, a, summary, [role=button]";
 
 /** Whether this key says STOP: everywhere, but that a field keeps the one that deletes in it. */
 export function isStopKey(event: KeyboardEvent): boolean {
@@ -32,7 +32,7 @@ export class Keyboard {
 
   constructor(private readonly events: KeyboardEvents) {
     this.disposal.listen(window, "keydown", (event) => this.down(event), { capture: true });
-    this.disposal.listen(window, "keyup", (event) => this.keys.delete(event.code), { capture: true });
+    this.disposal.listen(window, "keyup", (event) => this.up(event), { capture: true });
   }
 
   get deadman(): boolean {
@@ -75,6 +75,13 @@ export class Keyboard {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (this.events.isArmed() && !inField) this.drive(event);
     else this.idle(event, inField || (target?.matches(CONTROLS) ?? false));
+  }
+
+  /** Some browsers press a focused button when the space bar is let go, whatever became of the key's way down. */
+  private up(event: KeyboardEvent): void {
+    this.keys.delete(event.code);
+    const inField = event.target instanceof Element && event.target.matches(FIELDS);
+    if (this.events.isArmed() && !inField) event.preventDefault();
   }
 
   private drive(event: KeyboardEvent): void {

@@ -1,5 +1,6 @@
 import { choosePad } from "../core/pad_choice";
 import type { PadAction } from "../core/pad_layout";
+import { createPadSilence, notePadReport, type PadSilence } from "../core/pad_silence";
 import { readPad, type PadInputs, type SeenAtRest } from "../core/pad_mapping";
 import { padName, setupOf, type PadSetup } from "../core/pad_profile";
 import { speedShare } from "../core/pad_shaping";
@@ -10,6 +11,8 @@ export interface PadEvents {
   arm(): void;
   nextLayer(): void;
   lost(): void;
+  /** The one whose deadman is held reports no more: it is out of range, or out of power. */
+  silent(): void;
   /** A pad came or went, in words. */
   plugged(words: string): void;
 }
@@ -29,6 +32,7 @@ export interface PadState {
 interface Known {
   readonly id: string;
   readonly seen: SeenAtRest;
+  readonly silence: PadSilence;
   pressed: ReadonlySet<PadAction> | null; // null: not read yet, so nothing is a new press
 }
 
@@ -77,7 +81,16 @@ export class Pad {
     this.state = this.isSuspended ? null : state;
     const isOther = before?.gamepad.index !== state?.gamepad.index || before?.id !== state?.id;
     if (before?.ready === true && isOther) this.events.lost();
+    this.listen(pads, performance.now());
     if (!this.isSuspended) for (const each of states) this.tellPresses(each, each === state);
+  }
+
+  /** A pad out of range keeps what was held last. */
+  private listen(pads: readonly Gamepad[], now: number): void {
+    for (const pad of pads) {
+      const isSilent = notePadReport(this.knownOf(pad).silence, pad, now);
+      if (isSilent && pad.index === this.state?.gamepad.index && this.state.deadman) this.events.silent();
+    }
   }
 
   private read(gamepad: Gamepad): PadState {
@@ -111,7 +124,12 @@ export class Pad {
   private knownOf(gamepad: Gamepad): Known {
     const known = this.known.get(gamepad.index);
     if (known !== undefined && known.id === gamepad.id) return known;
-    const fresh: Known = { id: gamepad.id, seen: new Set(), pressed: null };
+    const fresh: Known = {
+      id: gamepad.id,
+      seen: new Set(),
+      silence: createPadSilence(),
+      pressed: null,
+    };
     this.known.set(gamepad.index, fresh);
     return fresh;
   }

@@ -1,6 +1,7 @@
 import { parseIceServers, type IceServer } from "../core/ice_servers";
 import { parseRelayAnswer, type RelayTicket } from "../core/relay";
 import { isRecord } from "../core/schema_check";
+import type { StopAnswer } from "../core/stop_press";
 
 /** What the console said instead of doing what it was asked. */
 export class ConsoleError extends Error {
@@ -116,12 +117,9 @@ export class ConsoleApi {
     if (location !== "") await this.fetch("DELETE", location, {}, undefined, undefined);
   }
 
-  async stop(reason: string): Promise<void> {
-    await this.json("POST", "/api/stop", { reason }, AbortSignal.timeout(3000));
-  }
-
-  async reset(): Promise<void> {
-    await this.json("POST", "/api/reset", {}, AbortSignal.timeout(3000));
+  /** `press`: id of the press that this is a saying of. */
+  async stop(reason: string, press: string): Promise<unknown> {
+    return await this.json("POST", "/api/stop", { reason, press }, AbortSignal.timeout(3000));
   }
 
   /** Path of the 3D scene, valid for a short time. */
@@ -182,6 +180,24 @@ export class ConsoleApi {
     if (!response.ok) throw await errorOf(response);
     return response;
   }
+}
+
+/** What an answer to `ConsoleApi.stop` says of that press; never raises. */
+export async function stopAnswerOf(answer: Promise<unknown>, press: string): Promise<StopAnswer> {
+  try {
+    const found = await answer;
+    if (!isRecord(found) || found["press"] !== press || typeof found["number"] !== "number")
+      return { kind: "unknown" };
+    return { kind: "taken", number: found["number"], kept: found["kept"] !== false };
+  } catch (error) {
+    return { kind: error instanceof ConsoleError ? refusedStop(error.error) : "unknown" };
+  }
+}
+
+function refusedStop(error: string): "waiting" | "doubtful" | "silenced" | "unknown" {
+  if (error === "link_down" || error === "robot_unreachable") return "waiting";
+  if (error === "unconfirmed") return "doubtful";
+  return error === "silenced" ? "silenced" : "unknown";
 }
 
 async function errorOf(response: Response): Promise<ConsoleError> {

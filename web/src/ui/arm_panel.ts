@@ -2,8 +2,10 @@ import { armRefusal } from "../core/arming";
 import { holdsSeat, isOperator } from "../core/console_state";
 import { actionName, type PadAction } from "../core/pad_layout";
 import { isStandard } from "../core/pad_mapping";
+import { warningSeconds } from "../core/start_warning";
 import { ARM_REFUSAL_WORDS, DISARM_WORDS } from "../core/words";
 import type { ConsoleApp } from "../console_app";
+import { focusedControl } from "../input/pointer_focus";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
 
 const STATE_WORDS = { disarmed: "Disarmed", armed: "Armed", driving: "Driving" } as const;
@@ -35,9 +37,14 @@ export function createArmPanel(app: ConsoleApp): Panel {
 }
 
 function armWords(app: ConsoleApp, now: number): string {
+  const warned = warningSeconds(app.state.feedback, app.measuredMs, now);
+  if (app.isArmed() && warned > 0) return `The robot warns first: ${warned} s`;
   if (app.arming.state === "driving") return "Let go to bring the robot to rest";
   if (app.arming.state === "armed") return `Hold ${deadmanName(app)} to move`;
   const refusal = armRefusal(app.arming, app.conditions(now));
+  const focused = focusedControl();
+  if (refusal === null && focused !== null && focused !== "Arm")
+    return `Enter and Space work “${focused}” now. Tab to Arm, or click the picture`;
   return refusal === null || refusal === "deadman_held"
     ? DISARM_WORDS[app.arming.reason]
     : ARM_REFUSAL_WORDS[refusal];

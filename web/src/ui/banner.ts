@@ -18,9 +18,7 @@ export function createBanner(app: ConsoleApp): Panel {
       const gateOff = gate !== "event";
       const words = gateOff
         ? `${GATE_OFF_WORDS[gate]}: pictures and sound may not match the robot's state`
-        : app.stopping.failed
-          ? "The robot did not confirm the STOP: use the hardware stop"
-          : coveredStop(app);
+        : coveredStop(app);
       setHidden(element, words === null);
       setData(element, "tone", gateOff ? "hazard" : "bad");
       setText(text, words ?? "");

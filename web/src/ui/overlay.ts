@@ -1,5 +1,6 @@
-import { mayDrive, robotIsUp } from "../core/console_state";
+import { robotIsUp } from "../core/console_state";
 import { ageWords, resumeWords } from "../core/freshness";
+import { mayReset, noteShownStop, resetNews, secondsToReset, whoResets } from "../core/reset_offer";
 import { END_WORDS, TROUBLE_WORDS, type LinkTrouble } from "../core/trouble";
 import type { ConsoleApp } from "../console_app";
 import type { LinkState } from "../rtc/connection";
@@ -11,28 +12,43 @@ export interface OverlayWords {
   readonly tone: "calm" | "bad" | "stopped";
   readonly title: string;
   readonly text: string;
+  readonly warning?: string; // what makes it graver
 }
+
+const NOT_KEPT =
+  "The robot could not save this stop: if it restarts, it may move again. Switch it off by its hardware stop before anyone goes near.";
 
 /** Says over the large view what is wrong, and offers the way out. */
 export function createOverlay(app: ConsoleApp): Panel {
   const title = h("strong", "plate-title");
   const text = h("p", "plate-text");
   const retry = button("wide-button", "Try now", () => app.connection.retryNow());
-  const reset = holdButton("reset", "Hold to reset", () => app.reset());
-  const plate = h("div", "plate", {}, title, text, retry, reset);
+  const reset = holdButton("reset", (heldMs) => app.stopping.reset(heldMs, performance.now()));
+  const warning = h("p", "plate-warning");
+  const news = h("p", "plate-news", { role: "status" });
+  const plate = h("div", "plate", {}, title, text, warning, retry, reset.element, news);
   const element = h("div", "overlay", {}, plate);
   return {
     element,
     update(now) {
       const words = overlayWords(app, now);
       setHidden(element, words === null);
+      const isStop = words?.tone === "stopped";
+      noteShownStop(app.stopping.offer, isStop ? app.state.stop : null, now);
       if (words === null) return;
       setData(element, "tone", words.tone);
       setText(title, words.title);
       setText(text, words.text);
       setHidden(text, words.text === "");
       setHidden(retry, app.link.kind !== "waiting");
-      setHidden(reset, words.tone !== "stopped" || !mayDrive(app.state));
+      setText(warning, words.warning ?? "");
+      setHidden(warning, words.warning === undefined);
+      setHidden(reset.element, !isStop || !mayReset(app.state) || app.state.stop.locked_out !== "");
+      const seconds = secondsToReset(app.stopping.offer, now);
+      reset.show(seconds === 0 ? "Hold to reset" : `Look first: reset in ${seconds} s`, seconds === 0);
+      const told = resetNews(app.stopping.offer, now);
+      setText(news, told);
+      setHidden(news, told === "");
     },
   };
 }
@@ -48,7 +64,7 @@ export function overlayWords(app: ConsoleApp, now: number): OverlayWords | null 
       text: `${detail === "" ? "" : `${sentence(detail)} `}The console keeps trying. Look after the robot and its bridge.`,
     };
   }
-  return app.state.stop.stopped ? stopWords(app) : null;
+  return app.state.stop.stopped || app.state.stop.locked_out !== "" ? stopWords(app) : null;
 }
 
 function linkWords(link: LinkState, now: number): OverlayWords {
@@ -82,13 +98,20 @@ function silentWords(app: ConsoleApp, now: number): OverlayWords {
 }
 
 function stopWords(app: ConsoleApp): OverlayWords {
-  const { by, reason } = app.state.stop;
+  const { by, reason, kept, locked_out: lock } = app.state.stop;
+  if (lock !== "") {
+    const next = "Nobody can drive or reset it from a page until that person unlocks it.";
+    return {
+      tone: "stopped",
+      title: "Locked",
+      text: `Somebody at the robot has locked it: ${lock}. ${next}`,
+    };
+  }
   const who = by === "" ? "The robot was stopped" : `By ${by}`;
   const why = reason === "" ? "" : `: ${reason}`;
-  const next = mayDrive(app.state)
-    ? "Reset moves nothing; arm again afterwards."
-    : "An operator or a supervisor can reset it.";
-  return { tone: "stopped", title: "Stopped", text: `${who}${why}. ${next}` };
+  const next = mayReset(app.state) ? "Reset moves nothing; arm again afterwards." : whoResets(app.state);
+  const words = { tone: "stopped", title: "Stopped", text: `${who}${why}. ${next}` } as const;
+  return kept ? words : { ...words, warning: NOT_KEPT };
 }
 
 function troubleWords(link: { why: LinkTrouble; detail: string }, next: string): OverlayWords {

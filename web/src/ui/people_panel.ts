@@ -64,10 +64,13 @@ export function createPeoplePanel(app: ConsoleApp, tools: PeopleTools): Panel {
     const { seat, welcome } = app.state;
     const claims = new Set(seat?.claims.map((claim) => claim.peer));
     const elements = people.map((person) => {
-      const row = rows.get(person.peer) ?? createPersonRow();
+      const row =
+        rows.get(person.peer) ?? createPersonRow((peer, silent) => app.session.silence(peer, silent));
       rows.set(person.peer, row);
       const drives = person.peer === seat?.holder;
-      row.show(person, { isMe: person.peer === welcome?.peer, drives, asks: claims.has(person.peer) });
+      const isMe = person.peer === welcome?.peer;
+      const maySilence = welcome?.role === "supervisor" && !isMe;
+      row.show(person, { isMe, drives, asks: claims.has(person.peer), maySilence });
       return row.element;
     });
     const isSame =

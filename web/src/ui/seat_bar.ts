@@ -72,6 +72,7 @@ export function createSeatBar(app: ConsoleApp): Panel {
 function obstacleOf(app: ConsoleApp, now: number): Obstacle | null {
   if (!app.hears(now)) return "silent";
   if (!robotIsUp(app.state)) return "robot_down";
+  if (app.state.stop.locked_out !== "") return "locked_out";
   return app.state.stop.stopped ? "stopped" : null;
 }
 

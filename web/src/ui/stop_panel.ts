@@ -1,3 +1,4 @@
+import { STOP_BUTTON_WORDS } from "../core/stop_words";
 import type { ConsoleApp } from "../console_app";
 import { h, setData, setText, type Panel } from "./dom";
 
@@ -7,8 +8,9 @@ export function createStopPanel(app: ConsoleApp): Panel {
   const element = h(
     "button",
     "stop",
-    { type: "button", "aria-label": "Stop the robot" },
+    { type: "button", "aria-keyshortcuts": "Escape" },
     h("span", "stop-name", {}, "STOP"),
+    h("span", "unseen", {}, "the robot"),
     words,
   );
   const press = (): void => app.stop("stop button");
@@ -21,20 +23,16 @@ export function createStopPanel(app: ConsoleApp): Panel {
   });
   return {
     element,
-    update() {
-      const stopped = app.state.stop.stopped;
-      setData(element, "state", app.stopping.isPending ? "pending" : stopped ? "stopped" : "ready");
-      setText(words, stopWords(app));
+    update(now) {
+      const fate = app.stopping.fate(now);
+      setData(element, "state", fate === null ? (app.state.stop.stopped ? "stopped" : "ready") : fate);
+      setText(words, fate === null ? restingWords(app) : STOP_BUTTON_WORDS[fate]);
     },
   };
 }
 
-function stopWords(app: ConsoleApp): string {
-  if (app.stopping.isPending) return "telling the robot…";
+/** Of a button that nobody has pressed lately. */
+function restingWords(app: ConsoleApp): string {
   if (app.state.stop.stopped) return "robot is stopped";
-  return app.stopping.failed
-    ? "NOT CONFIRMED: press again"
-    : document.documentElement.dataset["touch"] === "true"
-      ? ""
-      : "Esc";
+  return document.documentElement.dataset["touch"] === "true" ? "" : "Esc";
 }

@@ -54,7 +54,7 @@ export class ViewBoard {
   update(app: ConsoleApp, now: number): void {
     this.element.classList.toggle("is-locked", app.isArmed());
     this.followEpoch(app.state.robot?.epoch ?? null);
-    if (this.scene.hasSettled(now) && app.isHeldUp(now)) this.dropScene();
+    if (this.scene.hasSettled(now) && app.ticker.isHeldUp(now)) this.dropScene();
     const { robot } = app.state;
     if (robot !== null) this.scene.setPossible(robot.description.bodies.length > 0);
     this.scene.settle();

@@ -81,4 +81,20 @@ describe("the console's state", () => {
     expect(state).toMatchObject({ welcome: null, feedback: null, seat: null, robot: null });
     expect(state.stop.stopped).toBe(true);
   });
+
+  it("takes no older stop for the newest, but for the first of a connection", () => {
+    const state = createConsoleState();
+    applyMessage(state, { type: "stop_state", stop: stopOf({ number: 5 }), event: 3 }, 0);
+    applyMessage(state, feedbackOf(3, { stop: stopOf({ stopped: true, number: 4 }) }), 0);
+    expect(state.stop).toMatchObject({ stopped: false, number: 5 });
+    forgetConnection(state);
+    applyMessage(state, { type: "stop_state", stop: stopOf({ stopped: true, number: 1 }), event: 3 }, 0);
+    expect(state.stop).toMatchObject({ stopped: true, number: 1 });
+  });
+
+  it("logs what to do about a refused reset", () => {
+    const state = createConsoleState();
+    applyMessage(state, { ...refusalOf(0, "stale_reset"), stop: 5 }, 1);
+    expect(state.log[0]?.text).toMatch(/^Not reset: somebody pressed STOP again/);
+  });
 });

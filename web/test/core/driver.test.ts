@@ -1,6 +1,8 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import {
   createDriver,
+  driverArm,
+  driverBar,
   driverDisarm,
   driverFeedback,
   driverLoss,
@@ -22,8 +24,15 @@ let driver: Driver;
 
 beforeEach(() => {
   driver = createDriver("feedback", 4, 0, NEUTRAL);
+  proven(driver);
   driverFeedback(driver, feedbackOf(1), true, 0);
 });
+
+/** As one that was armed and whose neutral command was answered. */
+function proven(fresh: Driver): void {
+  driverArm(fresh);
+  fresh.unproven = false;
+}
 
 function commands(messages: ClientMessage[]): ClientMessage[] {
   return messages.filter((message) => message.type === "command");
@@ -219,4 +228,60 @@ describe("refusals", () => {
     driverRefusal(driver, refusalOf(2, "rested"), true);
     expect(commands(driverStep(driver, MOVING, true, 300))).toMatchObject([{ event: 2, values: NEUTRAL }]);
   });
+});
+
+describe("the neutral command that lets the robot move", () => {
+  it("does not leave before the person has armed, whatever was owed", () => {
+    driverStep(driver, MOVING, true, 0);
+    driverBar(driver);
+    driverDisarm(driver, 1);
+    for (let now = 1; now < 3000; now += 10)
+      expect(commands(driverStep(driver, DISARMED, true, now))).toEqual([]);
+    driverRefusal(driver, refusalOf(2, "late"), false);
+    driverFeedback(driver, feedbackOf(2), true, 3000);
+    expect(commands(driverStep(driver, DISARMED, true, 3001))).toEqual([]);
+  });
+
+  it("does not leave from a page that has just connected", () => {
+    const fresh = createDriver("feedback", 4, 0, NEUTRAL);
+    driverFeedback(fresh, feedbackOf(1), true, 0);
+    driverDisarm(fresh, 0);
+    expect(commands(driverStep(fresh, DISARMED, true, 0))).toEqual([]);
+  });
+
+  it("leaves at once on arming, and nothing that moves leaves before its answer", () => {
+    driverBar(driver);
+    driverArm(driver);
+    expect(commands(driverStep(driver, MOVING, true, 0))).toMatchObject([{ event: 2, values: NEUTRAL }]);
+    expect(commands(driverStep(driver, MOVING, true, 100))).toMatchObject([{ event: 2, values: NEUTRAL }]);
+    driverFeedback(driver, feedbackOf(1, { issue: 2 }), true, 110);
+    expect(driver.unproven).toBe(true);
+    driverFeedback(driver, feedbackOf(2), true, 120);
+    expect(commands(driverStep(driver, MOVING, true, 120))).toMatchObject([{ event: 3, values: [1, 0] }]);
+  });
+
+  it("is not the moving one that was in flight when the person disarmed and armed again", () => {
+    driverStep(driver, MOVING, true, 0);
+    driverDisarm(driver, 1);
+    driverArm(driver);
+    driverFeedback(driver, feedbackOf(2), true, 5);
+    expect(commands(driverStep(driver, MOVING, true, 5))).toMatchObject([{ event: 3, values: NEUTRAL }]);
+  });
+
+  it("goes again when it was refused as late", () => {
+    driverBar(driver);
+    driverArm(driver);
+    driverStep(driver, MOVING, true, 0);
+    driverRefusal(driver, refusalOf(2, "late"), true);
+    expect(commands(driverStep(driver, MOVING, true, 1))).toMatchObject([{ event: 2, values: NEUTRAL }]);
+  });
+});
+
+it("a command names the nonce of the issue that it answers, its repeats that of the newest", () => {
+  driverFeedback(driver, feedbackOf(1, { issue: 2, nonce: 77 }), true, 1);
+  expect(driverStep(driver, MOVING, true, 1)).toMatchObject([{ issue: 2, nonce: 77 }]);
+  driverFeedback(driver, feedbackOf(1, { issue: 3, nonce: 78 }), true, 2);
+  expect(driverStep(driver, MOVING, true, 101)).toMatchObject([{ issue: 3, nonce: 78 }]);
+  driverFeedback(driver, feedbackOf(2, { nonce: 79 }), true, 102);
+  expect(driverStep(driver, MOVING, true, 102)).toMatchObject([{ event: 3, issue: 1, nonce: 79 }]);
 });

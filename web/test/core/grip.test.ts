@@ -11,6 +11,7 @@ const READY: ArmConditions = {
   connected: true,
   robotUp: true,
   holdsSeat: true,
+  lockedOut: false,
   stopped: false,
   visible: true,
   occupied: false,

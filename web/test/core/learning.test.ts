@@ -29,6 +29,7 @@ let driver: Driver;
 
 beforeEach(() => {
   driver = createDriver("feedback", 4, 0, [0]);
+  driver.barred = false; // as after arming
   driverFeedback(driver, feedbackOf(1), true, 0);
 });
 
@@ -105,6 +106,7 @@ it("a refused command is echoed no more", () => {
 it("a command that was in flight when the seat went is no sample when its number is used again", () => {
   driverStep(driver, MOVING, true, 0);
   driverSilence(driver);
+  driver.barred = false;
   command(10_000, 40);
   expect(driver.repeat.smoothedMs).toBe(40);
 });

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { crowdWords, personWords, sortPeople, summarise } from "../../src/core/people";
+import { crowdWords, isSilenced, personWords, sortPeople, summarise } from "../../src/core/people";
 import type { Participant } from "../../src/wire";
 import { seatOf } from "../messages";
 
@@ -75,5 +75,15 @@ describe("people", () => {
     expect(personWords(person("a", "A", "observer", watching))).toBe(
       "40 ms RTT · 25 % lost · low tier · no stamps",
     );
+  });
+
+  it("whose STOP is silenced stand among those who lead, and know it of themselves", () => {
+    const silenced = person("o3", "Bo", "observer", { silenced: true });
+    expect(sortPeople([...ALL, silenced], null, "me").leading).toContain(silenced);
+    expect([isSilenced([silenced], "o3"), isSilenced([...ALL], "me"), isSilenced([silenced], null)]).toEqual([
+      true,
+      false,
+      false,
+    ]);
   });
 });

@@ -15,24 +15,30 @@ import { robotOf } from "./fleets";
 const STOPPED = { stopped: true, stop_by: "Ann" };
 const replies = (...names: string[]) => names.map((name) => ({ name, delivered: true, detail: "" }));
 
+const PRESS = "ab12";
+
 function pressed(...names: string[]): StopAll {
   const stop = createStopAll();
-  pressStopAll(stop, names, 1000);
+  pressStopAll(stop, PRESS, names, 1000);
   return stop;
 }
 
 describe("STOP ALL", () => {
-  it("is said at once and again every second until all robots report it", () => {
+  it("is said at once and again every second until all robots confirm it", () => {
     const stop = pressed("a", "b");
     expect([stepStopAll(stop, 1000), stepStopAll(stop, 1500), stepStopAll(stop, 2000)]).toEqual([
       true,
       false,
       true,
     ]);
-    tookStopReplies(stop, replies("a", "b"));
-    tookFleet(stop, [robotOf("a", STOPPED), robotOf("b")], 2100);
+    tookStopReplies(stop, PRESS, replies("a"));
+    expect(stopAllWords(stop)).toMatchObject({
+      tone: "pending",
+      title: "1 of 2 robots stopped …",
+      missing: [{ name: "b", detail: "not answered yet" }],
+    });
     expect(stepStopAll(stop, 3000)).toBe(true);
-    tookFleet(stop, [robotOf("a", STOPPED), robotOf("b", STOPPED)], 3100);
+    tookStopReplies(stop, PRESS, replies("b"));
     expect(stepStopAll(stop, 4000)).toBe(false);
     expect(stopAllWords(stop)).toMatchObject({
       tone: "done",
@@ -41,39 +47,28 @@ describe("STOP ALL", () => {
     });
   });
 
-  it("is not confirmed by what was asked before it was pressed", () => {
+  it("is not confirmed by robots that were stopped already, nor by the answer to another press", () => {
     const stop = pressed("a");
-    tookStopReplies(stop, replies("a"));
-    tookFleet(stop, [robotOf("a", STOPPED)], 999);
-    expect(stopAllWords(stop)).toMatchObject({
-      tone: "pending",
-      missing: [{ name: "a", detail: "delivered, not confirmed by the robot" }],
-    });
+    tookFleet(stop, [robotOf("a", STOPPED)]);
+    tookStopReplies(stop, "cd34", replies("a"));
+    stopFailed(stop, "cd34", "The console does not answer.");
+    expect(stopAllWords(stop)).toMatchObject({ tone: "pending", stopped: [], advice: "" });
   });
 
-  it("stays delivered when another way did not deliver it", () => {
+  it("stays confirmed when another way did not get through", () => {
     const stop = pressed("a");
-    tookStopReplies(stop, replies("a"));
-    tookStopReplies(stop, [{ name: "a", delivered: false, detail: "not confirmed: the board is silent" }]);
-    expect(stopAllWords(stop)?.missing).toEqual([
-      { name: "a", detail: "delivered, not confirmed by the robot" },
-    ]);
+    tookStopReplies(stop, PRESS, replies("a"));
+    tookStopReplies(stop, PRESS, [{ name: "a", delivered: false, detail: "the board is silent" }]);
+    expect(stopAllWords(stop)?.stopped).toEqual(["a"]);
   });
 
-  it("is not confirmed by a robot whose link is down", () => {
-    const stop = pressed("a");
-    tookFleet(stop, [robotOf("a", { ...STOPPED, link: "down" })], 1100);
-    expect(stopAllWords(stop)?.stopped).toEqual([]);
-  });
-
-  it("says at once to which it was not delivered, why, and what to do", () => {
+  it("says at once which robots it did not reach, why, and what to do", () => {
     const stop = pressed("a", "b", "c");
-    tookStopReplies(stop, [
+    tookStopReplies(stop, PRESS, [
       ...replies("a"),
       { name: "b", delivered: false, detail: "no answer from hall-b" },
       { name: "c", delivered: false, detail: "" },
     ]);
-    tookFleet(stop, [robotOf("a", STOPPED)], 1200);
     const words = stopAllWords(stop);
     expect(words).toMatchObject({ tone: "bad", title: "1 of 3 robots stopped", stopped: ["a"] });
     expect(words?.missing).toEqual([
@@ -83,31 +78,40 @@ describe("STOP ALL", () => {
     expect(words?.advice).toContain("emergency stops");
   });
 
-  it("gives up after ten seconds and says that nobody confirmed it", () => {
+  it("says after three seconds that nobody confirmed it, goes on for a minute, and then asks to press again", () => {
     const stop = pressed("a");
-    stopFailed(stop, "The console does not answer.");
+    stopFailed(stop, PRESS, "The console does not answer.");
     expect(stopAllWords(stop)).toMatchObject({
       tone: "pending",
       advice: "The console does not answer. It is said again.",
     });
-    expect(stepStopAll(stop, 11_001)).toBe(false);
+    expect(stepStopAll(stop, 4001)).toBe(true);
     expect(stopAllWords(stop)).toMatchObject({ tone: "bad", title: "STOP is not confirmed" });
-    expect(stopAllWords(stop)?.advice).toMatch(/^The console does not answer\. Press again/);
+    expect(stopAllWords(stop)?.advice).toMatch(/^The console does not answer\. Stop the robots by their own/);
+    expect(stepStopAll(stop, 61_001)).toBe(false);
+    expect(stopAllWords(stop)?.advice).toContain("Press again");
+  });
+
+  it("names after three seconds the robot that has not confirmed it", () => {
+    const stop = pressed("a", "b");
+    tookStopReplies(stop, PRESS, replies("a"));
+    stepStopAll(stop, 4001);
+    expect(stopAllWords(stop)).toMatchObject({ tone: "bad", title: "1 of 2 robots stopped", stopped: ["a"] });
   });
 
   it("counts a robot that the page did not know before", () => {
     const stop = pressed();
-    tookStopReplies(stop, replies("a"));
-    tookFleet(stop, [robotOf("a", STOPPED), robotOf("new")], 1100);
+    tookStopReplies(stop, PRESS, replies("a"));
+    tookFleet(stop, [robotOf("a", STOPPED), robotOf("new")]);
     expect(stopAllWords(stop)).toMatchObject({ tone: "pending", title: "1 of 2 robots stopped …" });
   });
 
-  it("keeps a confirmation against a later answer, and forgets all with the next press", () => {
+  it("forgets all with the next press", () => {
     const stop = pressed("a");
-    tookFleet(stop, [robotOf("a", STOPPED)], 1100);
-    tookStopReplies(stop, [{ name: "a", delivered: false, detail: "link down" }]);
+    tookStopReplies(stop, PRESS, replies("a"));
     expect(stopAllWords(stop)?.tone).toBe("done");
-    pressStopAll(stop, ["a"], 5000);
+    pressStopAll(stop, "ef56", ["a"], 5000);
+    tookStopReplies(stop, PRESS, replies("a"));
     expect(stopAllWords(stop)).toMatchObject({ tone: "pending", stopped: [] });
   });
 
@@ -115,7 +119,7 @@ describe("STOP ALL", () => {
     const stop = pressed("a");
     putAway(stop);
     expect([stopAllWords(stop), stepStopAll(stop, 2000)]).toEqual([null, false]);
-    tookStopReplies(stop, replies("a"));
+    tookStopReplies(stop, PRESS, replies("a"));
     expect(stopAllWords(stop)).toBeNull();
   });
 });

@@ -1,0 +1,28 @@
+"""What axe-core finds on a page."""
+
+from pathlib import Path
+
+from playwright.async_api import Page
+
+__all__ = ["findings"]
+
+AXE = Path(__file__).parents[2] / "web" / "node_modules" / "axe-core" / "axe.min.js"
+# Animations are over before colours are measured; a frame of another origin has a page of its own.
+RUN = """async () => {
+  await Promise.all(document.getAnimations().map((each) => each.effect.getTiming().iterations === Infinity
+    ? each.cancel() : each.finished.catch(() => undefined)));
+  const { violations } = await axe.run(document, {
+    iframes: false,
+    rules: { "label-content-name-mismatch": { enabled: true } },
+  });
+  return violations.flatMap(({ id, nodes }) => nodes.map(({ target, failureSummary }) =>
+    `${id}: ${target.join(" ")}: ${failureSummary.replaceAll("\\n", " ")}`));
+}"""
+
+
+async def findings(page: Page) -> list[str]:
+    """Each rule that something on the page breaks now, and what."""
+    if not await page.evaluate("'axe' in window"):
+        await page.evaluate(AXE.read_text())
+    found: list[str] = await page.evaluate(RUN)
+    return found
