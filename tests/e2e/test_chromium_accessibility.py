@@ -54,10 +54,7 @@ async def _locked(console: ConsolePage) -> None:
 
 
 async def _unconfirmed(console: ConsolePage) -> None:
-    await console.page.evaluate(
-        "void (window.tamper = (_, m) => m.type === 'stop_taken' ? null : m.stop?.press"
-        " ? { ...m, stop: { ...m.stop, press: '' } } : m)"
-    )
+    await console.page.evaluate("void (window.mute = 'stop')")
     await console.page.route("**/api/stop", lambda route: route.abort())
     await console.page.keyboard.press("Escape")
     await console.page.locator(".alarm").get_by_text("has not confirmed your STOP").wait_for()
@@ -81,8 +78,8 @@ async def _people_and_silencing(console: ConsolePage) -> None:
     people = [peer | figures, peer | figures | silenced]
     await say(console, "session", {"type": "participants", "participants": people})
     await _tab(console, "People")
-    await console.page.get_by_role("button", name="Silence STOP…").click()
-    await console.page.get_by_text("will have no effect for ten minutes").wait_for()
+    await console.page.get_by_role("listitem").filter(has_text="Bo").get_by_role("button", name="Silence STOP…").click()
+    await console.page.get_by_text("STOP from Bo’s link will have no effect").wait_for()
 
 
 async def _notes(console: ConsolePage) -> None:
@@ -124,11 +121,11 @@ SUPERVISOR: tuple[State, ...] = (_ready, _notes, _people_and_silencing, _charts,
 DRIVING: tuple[State, ...] = (_ready, _armed, _warns, _stopped, _not_kept_and_refused, _locked, _unconfirmed, _silenced)
 
 
-async def _through(console: ConsolePage, states: tuple[State, ...]) -> list[str]:
+async def _through(console: ConsolePage, states: tuple[State, ...], *without: str) -> list[str]:
     found: list[str] = []
     for state in states:
         await state(console)
-        found += [f"{state.__name__}: {each}" for each in await findings(console.page)]
+        found += [f"{state.__name__}: {each}" for each in await findings(console.page, *without)]
         assert await in_view(console.page, "STOP the robot"), state.__name__
         wider = await console.page.evaluate("document.documentElement.scrollWidth - innerWidth")
         assert wider <= 0, f"{state.__name__} is wider than the screen by {wider} px"
@@ -159,7 +156,8 @@ async def test_at_200_percent_and_on_a_phone_all_states_fit_and_axe_finds_nothin
 
 async def test_in_forced_colours_axe_finds_nothing_and_stop_keeps_its_edge(stack: Stack, chromium: Browser) -> None:
     async with open_tampered(chromium, stack.operator, forced_colors="active") as console:
-        assert await _through(console, DRIVING) == []
+        # The person's colours take the place of ours when they are drawn; axe-core computes with those that it reads.
+        assert await _through(console, DRIVING, "color-contrast") == []
         edge = "(element) => getComputedStyle(element).borderTopStyle"
         for part in (".stop", ".plate", ".alarm"):
             assert await console.page.locator(part).evaluate(edge) == "solid", part

@@ -67,8 +67,8 @@ export class Page {
   private drawnMs = 0;
 
   constructor(api: ConsoleApi, options: PeerOptions, name: string | null) {
-    const left = h("div", "stick left", { "aria-label": "Left stick" });
-    const right = h("div", "stick right", { "aria-label": "Right stick" });
+    const left = h("div", "stick left", { role: "group", "aria-label": "Left stick" });
+    const right = h("div", "stick right", { role: "group", "aria-label": "Right stick" });
     this.board = new ViewBoard(this.scene(api));
     this.app = new ConsoleApp(api, options, name, new TouchSticks(left, right), {
       canvas: (info) => this.board.canvas(info),

@@ -36,7 +36,7 @@ function put(next: View): void {
     "Lockstep",
   );
   document.body.replaceChildren(
-    h("div", "recordings", {}, h("div", "bar recordings-bar", {}, home), next.element),
+    h("div", "recordings", {}, h("header", "bar recordings-bar", {}, home), next.element),
   );
 }
 

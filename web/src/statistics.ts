@@ -5,11 +5,12 @@ import type { GateMode } from "./core/media_gate";
 import { meanGap, takeLag, type MediumCounts } from "./core/medium_counts";
 import { quantile, rateOf } from "./core/samples";
 import { staleness } from "./core/staleness";
+import type { StopFate } from "./core/stop_press";
 import { GATE_BLOCK_WORDS, GATE_WORDS } from "./core/words";
 import type { ConsoleApp } from "./console_app";
 import type { VideoStream } from "./media/video_stream";
 import type { SoundStream } from "./media/sound_stream";
-import type { Report, StreamInfo, StreamReport } from "./wire";
+import type { Report, StopState, StreamInfo, StreamReport } from "./wire";
 
 /** One stream in `window.lockstep.stats()`. */
 export interface StreamStatistics {
@@ -57,7 +58,8 @@ export interface Statistics {
   readonly event_rate: number;
   readonly speed_share: number; // of full speed that the cap leaves
   readonly limits: readonly string[]; // that slow the robot now
-  readonly stop: { readonly stopped: boolean; readonly by: string; readonly reason: string };
+  readonly stop: StopState;
+  readonly stop_press: StopFate | null; // what became of the newest press on this page; null: nothing to tell
   readonly stale: string | null; // why the large view must not be trusted
   readonly at_rest: boolean | null;
   readonly axes: Readonly<Record<string, number | null>>; // measured; null where that is not known
@@ -109,6 +111,7 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
     speed_share: app.speedShare,
     limits: state.feedback?.limits ?? [],
     stop: { ...state.stop },
+    stop_press: app.stopping.fate(now),
     stale: main === undefined ? null : stalenessOf(app, main, now),
     at_rest: state.feedback?.at_rest ?? null,
     axes: axesOf(app),
