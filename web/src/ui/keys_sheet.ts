@@ -23,7 +23,7 @@ const ALWAYS: readonly Line[] = [
 
 /** Everything that keys do, those of the connected robot among it. */
 export function createKeysSheet(app: ConsoleApp): SheetContent {
-  const element = h("div", "sheet-body keys");
+  const element = h("div", "sheet-body keys", { tabindex: "0", role: "region", "aria-label": "Keys" });
   return {
     name: "keys-sheet",
     title: "Keys",
