@@ -147,6 +147,7 @@ async def test_stop_works_while_a_dialogue_is_open_and_says_so_above_it(stack: S
     ):
         await operator.until("s.connected && s.seat && s.seat.mine")
         await operator.page.get_by_role("tab", name="People").click()
+        await operator.page.get_by_text("Dee", exact=True).wait_for()
         await operator.page.get_by_role("button", name="Invite…").click()
         dialogue = operator.page.get_by_role("dialog")
         await dialogue.get_by_label("Name").fill("half written")

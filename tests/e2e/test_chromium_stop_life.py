@@ -96,7 +96,7 @@ async def test_a_hand_that_is_on_reset_does_not_release_the_stop_that_another_pa
         await operator.page.keyboard.press("Escape")
         await operator.until("s.stop.stopped && s.stop_press === 'confirmed'")
         first = (await operator.stats())["stop"]["number"]
-        await observer.page.get_by_text("who has control, or a supervisor can reset it").wait_for()
+        await observer.page.locator(".plate").get_by_text("who has control, or a supervisor can reset it").wait_for()
         assert await _hold_button(observer).count() == 0
         await _hold_button(operator).wait_for()
         await _press_down(operator, _hold_button(operator))

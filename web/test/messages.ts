@@ -63,6 +63,7 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     watchdog: null,
     body_twists: [],
     hold: 0.3,
+    watchdog: null,
     max_event_age: 2,
     max_event_rate: 25,
   };
