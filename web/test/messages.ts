@@ -63,7 +63,6 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     watchdog: null,
     body_twists: [],
     hold: 0.3,
-    watchdog: null,
     max_event_age: 2,
     max_event_rate: 25,
   };
