@@ -37,8 +37,8 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
         await console.until(f"s.connected && s.epoch !== {epoch!r} && s.streams.overview?.rendered > 3", 60)
         assert (await console.stats())["event"] < 10, "references start anew with the epoch"
         await console.until("s.stop.stopped && s.stop.reason.includes('did not end in order')")
-        async with Console(stack.operator, video=False, audio=False) as operator:
-            await operator.reset()
+        async with Console(stack.supervisor, video=False, audio=False) as supervisor:
+            await supervisor.reset()
         await console.until("!s.stop.stopped && s.seat && s.seat.mine")
         await console.arm()
         await console.drive_forward()
