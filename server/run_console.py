@@ -54,10 +54,10 @@ async def run_console(
             return
         settings = _with_addresses(settings, addresses)
         application = _application(settings, state)
-        if certificate is not None:
-            application.state.house.metrics.certificate_end.set(ends_at(certificate))
         http = guarded_by(settings, application)
         async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
+            if certificate is not None:
+                application.state.house.metrics.certificate_end.set(ends_at(certificate))
             _calm_garbage_collection()
             background = [tasks.create_task(bridge.watch()) for bridge in bridges.values()]
             url = listening_url(settings, listener)
