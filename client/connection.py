@@ -97,6 +97,7 @@ class Connection:
         self._heard_at = self._loop.time()
         self._running: asyncio.Task[None] | None = None
         self._relay: RelayMedia | None = None
+        self._beside = ""  # the relay that it was sent to
         self._peer: Peer | WatchLine = self._new_peer()
         self.session = Session(lambda channel, message: self._peer.send(channel, message), self._until)
 
@@ -121,15 +122,16 @@ class Connection:
     async def open(self) -> None:
         """Connect; returns when the robot is known. Raises SignallingRefused or ConnectFailed."""
         deadline = self._loop.time() + self.options.connect_seconds
-        ticket = await self._peer.relay_ticket() if self.options.through_relay else None
-        if ticket is not None:
-            await self._go_through(ticket)
+        where = await self._peer.relay_ticket() if self.options.through_relay else None
+        wanted = {"video": self.options.video, "audio": int(self.options.audio)}
+        if where is not None:
+            await self._go_beside(where)
         sections = await self._negotiate(deadline)
-        if isinstance(self._peer, Peer) and self._relay is None:
+        if isinstance(self._peer, Peer) and where is None:
             self.media.prepare(self._peer, sections, self.options.decode)
         await self._peer.connect(deadline - self._loop.time())
-        if self._relay is not None:
-            await self._relay.connect()
+        if where is not None:
+            await self._watch_through(wanted, deadline)
         self._heard_at = self._loop.time()
         self._peer.send("session", Rename(name=self.options.name))
         self._running = self._loop.create_task(self._run(), name="console connection")
@@ -141,16 +143,28 @@ class Connection:
         except ConsoleLost as error:
             raise ConnectFailed(error.detail) from error
 
-    async def _go_through(self, ticket: RelayTicket) -> None:
-        """Media and feedback come from the relay; everything else goes by a line to the console."""
-        wanted = {"video": self.options.video, "audio": int(self.options.audio)}
-        relay = self._relay = RelayMedia(ticket, self._received_from_relay)
+    async def _go_beside(self, where: RelayTicket) -> None:
+        """Media and feedback come from a relay; everything else goes by a line to the console."""
+        self._beside = where.relay
         self.options = options = replace(self.options, video=0, audio=False, carrier="trailer")
         self.media = Reception("trailer", options.tolerance, options.gate, self._rendered)
         await self._peer.close()
-        self._peer = WatchLine(options.link, ticket.relay, options.tls_ca, self._received, options.silence_seconds)
+        self._peer = WatchLine(options.link, where.relay, options.tls_ca, self._received, options.silence_seconds)
+
+    async def _watch_through(self, wanted: dict[str, int], deadline: float) -> None:
+        """The console tells what lets into the relay only to whoever is connected."""
+        try:
+            async with asyncio.timeout_at(deadline):
+                await self._until(lambda: self.session.welcome is not None)
+        except TimeoutError:
+            raise ConnectFailed("connected, but the console said nothing") from None
+        ticket = await self._peer.relay_ticket(self.welcome.peer)
+        if ticket is None:
+            raise ConnectFailed("no relay carries the session now")
+        relay = self._relay = RelayMedia(ticket, self._received_from_relay)
         first = [each for kind in wanted for each in [s for s in ticket.streams if s.kind == kind][: wanted[kind]]]
-        self.media.prepare(relay, await relay.negotiate(lambda stream: stream in first), options.decode)
+        self.media.prepare(relay, await relay.negotiate(lambda stream: stream in first), self.options.decode)
+        await relay.connect()
 
     async def _negotiate(self, deadline: float) -> list[Section]:
         """Try again while the console does not reach its robot, and without a line where no WebSocket passes."""
@@ -165,7 +179,7 @@ class Connection:
                     raise
             await self._peer.close()
             await asyncio.sleep(wait)
-            self._peer = self._new_peer(self.relay)
+            self._peer = self._new_peer(self._beside)
 
     async def _run(self) -> None:
         """The session: returns when the connection ended or was closed."""

@@ -141,9 +141,9 @@ class Peer:
             self.ended.set()
             self._stepped.set()
 
-    async def relay_ticket(self) -> RelayTicket | None:
+    async def relay_ticket(self, peer: str = "") -> RelayTicket | None:
         """Where the console wants this observer to watch; raises as `negotiate`."""
-        return await self._whep.relay()
+        return await self._whep.relay(peer)
 
     async def negotiate(self) -> list[Section]:
         """Offer, and take the answer: its media sections.
@@ -224,6 +224,8 @@ class Peer:
             ConnectFailed: no other path within `seconds`; the old one is as it was.
         """
         first = read_sections(self._answer)[0]
+        if self._ice_servers:  # their credentials may have ended
+            self._ice_servers = await self._whep.ice_servers()
         policy = RTCIceTransportPolicy.RELAY if self._relay_only else RTCIceTransportPolicy.ALL
         restart = IceRestart(self._pc, RTCIceGatherer(self._ice_servers, policy), self._gather_on)
         try:

@@ -60,9 +60,9 @@ class WatchLine:
         self._answer_due: asyncio.TimerHandle | None = None
         self._closing = False
 
-    async def relay_ticket(self) -> RelayTicket | None:
+    async def relay_ticket(self, peer: str = "") -> RelayTicket | None:
         """Raises as `Whep.offer`."""
-        return await self._whep.relay()
+        return await self._whep.relay(peer)
 
     async def negotiate(self) -> list[Section]:
         """Open the line. There are no media sections.

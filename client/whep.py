@@ -93,9 +93,12 @@ class Whep:
             raise SignallingRefused(response.status_code, "", "not a list of ICE servers") from error
         return [RTCIceServer(each.urls, each.username, each.credential) for each in found]
 
-    async def relay(self) -> RelayTicket | None:
-        """Where the console wants this observer to watch; None: with itself. Raises as `offer`."""
-        response = await self._request("GET", self._base + "/api/relay")
+    async def relay(self, peer: str = "") -> RelayTicket | None:
+        """Where the console wants this observer to watch; None: with itself. Raises as `offer`.
+
+        Only `peer`, which is connected, is told what lets it in.
+        """
+        response = await self._request("GET", f"{self._base}/api/relay{f'?peer={peer}' if peer else ''}")
         try:
             return _relay_answer.decode(response.content).relay
         except msgspec.DecodeError as error:

@@ -8,16 +8,17 @@ from fastapi import APIRouter, Depends, Request, Response
 from robot_bridge.protocol.console import Participant, Seat, StreamInfo, StreamOffer
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Feedback, PressId, StopNumber, StopState, Text
-from server.access import Identity
+from server.access import Right
 from server.body import read_json
 from server.json_answer import json_answer
+from server.scene_proxy import scene_query
 from server.services import authorized, services, takes_stops
 from server.stop_presses import new_press
 
 __all__ = ["Delivered", "Health", "Released", "ResetRequest", "ScenePath", "SessionInfo", "StopRequest", "router"]
 
 router = APIRouter()
-Caller = Annotated[Identity, Depends(authorized)]
+Caller = Annotated[Right, Depends(authorized)]
 
 
 class LinkInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -57,11 +58,11 @@ class ResetRequest(msgspec.Struct, frozen=True):
 
 
 class Health(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer of GET /healthz. `degraded`: the console runs, the robot cannot be reached."""
+    """Answer of GET /healthz. `degraded`: the console runs, but the robot cannot be reached or nobody gets in."""
 
     status: str
     robot_link: str
-    detail: str = ""
+    links: str  # "ok"; "unreadable": which links are revoked is unknown, so nobody gets in
 
 
 class ScenePath(msgspec.Struct, frozen=True):
@@ -113,7 +114,7 @@ async def session(request: Request, caller: Caller) -> Response:
 async def stop(request: Request) -> Response:
     """Anyone with a token, also while the robot's session has failed."""
     robot = takes_stops(request)
-    caller = robot.access.bearer(request.headers.get("authorization"))
+    caller = robot.access.bearer_to_stop(request.headers.get("authorization"))
     wanted = await read_json(request, StopRequest)
     stopped = await robot.stop(new_press(caller.actor, "http", wanted.reason, wanted.press))
     if not stopped.outcome.delivered:
@@ -137,16 +138,19 @@ async def scene(request: Request, caller: Caller) -> Response:
     here = services(request)
     here.scene_or_error()
     root = str(request.scope.get("root_path", ""))
-    base = f"{str(request.base_url).replace('http', 'ws', 1).rstrip('/')}{root}"
-    ticket = here.access.issue_ticket(caller.token_id)
-    return json_answer(ScenePath(f"{root}/scene/?websocket={base}/scene/ws/{ticket}&darkMode&hideViserLogo"))
+    ticket = here.access.issue_ticket(caller.identity)
+    return json_answer(ScenePath(f"{root}/scene/{ticket}/?{scene_query(request, ticket)}"))
 
 
 @router.get("/healthz")
 async def healthz(request: Request) -> Response:
-    robot = services(request).console.robot
+    """For anyone, so it says no address and no reason; the log does."""
+    here = services(request)
+    up, readable = here.console.robot.up, not here.state.invitations.trouble
     health = Health(
-        status="ok" if robot.up else "degraded", robot_link="up" if robot.up else "down", detail=robot.detail
+        status="ok" if up and readable else "degraded",
+        robot_link="up" if up else "down",
+        links="ok" if readable else "unreadable",
     )
     return json_answer(health)
 

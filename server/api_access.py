@@ -1,7 +1,6 @@
 """The HTTP API of invitations and of the audit (docs/console-api.md)."""
 
 import asyncio
-import time
 from collections.abc import Callable
 from typing import Annotated, TypeVar
 
@@ -9,7 +8,7 @@ import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from robot_bridge.protocol.console import Role
-from server.access import MAX_ROBOTS, Identity, RobotName, require_role
+from server.access import MAX_ROBOTS, HasRole, Identity, Right, RobotName, require_role
 from server.audit import AuditRecord
 from server.body import read_json
 from server.errors import NotAllowed, StateUnavailable
@@ -21,7 +20,7 @@ from server.state_dir import StateDirUnusable
 __all__ = ["AuditPage", "InvitationInfo", "InvitationList", "InvitationRequest", "NewInvitation", "router"]
 
 router = APIRouter()
-Caller = Annotated[Identity, Depends(authorized)]
+Caller = Annotated[Right, Depends(authorized)]
 
 Result = TypeVar("Result")
 DEFAULT_SECONDS = 8 * 3600.0
@@ -75,7 +74,7 @@ class AuditPage(msgspec.Struct, frozen=True, kw_only=True):
 async def invitations(request: Request, caller: Caller) -> Response:
     here = services(request)
     _require_inviter(caller)
-    found = here.state.invitations.known.visible(caller)
+    found = here.state.invitations.known.visible(caller.identity)
     return _json(
         InvitationList(
             invitations=[_info(here, each) for each in found],
@@ -89,12 +88,14 @@ async def invite(request: Request, caller: Caller) -> Response:
     here = services(request)
     wanted = await read_json(request, InvitationRequest)
     _require_inviter(caller)
-    now = time.time()
     robots = _wanted_robots(here, wanted)
+    by = caller.actor
     made = await _update(
-        here, lambda known: known.invite(caller, wanted.role, wanted.name, wanted.seconds, now, robots)
+        here,
+        caller.identity,
+        lambda known, by, now: known.invite(by, wanted.role, wanted.name, wanted.seconds, now, robots),
     )
-    here.house.enforce([made], caller.actor)
+    here.house.enforce([made], by)
     base = here.settings.public_url or str(request.base_url).rstrip("/")
     if made.robots == (here.robot,):
         base += str(request.scope.get("root_path", ""))  # to this robot, past the overview
@@ -107,9 +108,9 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     """It, and all that was invited with it, ends at once; so do the peers that are here with them."""
     here = services(request)
     _require_inviter(caller)
-    now = time.time()
-    revoked = await _update(here, lambda known: known.revoke(caller, invitation_id, now))
-    here.house.enforce(revoked, caller.actor)
+    by = caller.actor
+    revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
+    here.house.enforce(revoked, by)
     return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
 
 
@@ -128,10 +129,16 @@ async def audit(
     return _json(AuditPage(records=found, last=log.next_number - 1, trouble=log.trouble))
 
 
-async def _update(here: Services, change: Callable[[Invitations], Result]) -> Result:
-    """Waits for the disk in a thread."""
+async def _update(here: Services, by: Identity, change: Callable[[Invitations, Identity, float], Result]) -> Result:
+    """What `by` changes. Waits for the disk in a thread, and looks at the link of `by` when its turn has come."""
+    store = here.state.invitations
+
+    def work(known: Invitations) -> Result:
+        store.check(by, known)
+        return change(known, by, store.now())
+
     try:
-        return await asyncio.to_thread(here.state.invitations.update, change)
+        return await asyncio.to_thread(store.update, work)
     except StateDirUnusable as error:
         raise StateUnavailable(f"nothing was changed: {error.reason}") from error
 
@@ -142,7 +149,7 @@ def _wanted_robots(here: Services, wanted: InvitationRequest) -> tuple[str, ...]
     return (here.robot,) if here.robot else ()
 
 
-def _require_inviter(caller: Identity) -> None:
+def _require_inviter(caller: HasRole) -> None:
     if not may_invite(caller.role):
         raise NotAllowed("observers invite nobody")
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import msgspec
 from fastapi import APIRouter, Depends, Request, Response
 
-from server.access import Identity
+from server.access import Identity, Right
 from server.ice_servers import IceServers, ice_servers
 from server.services import authorized, services
 from server.settings import Settings
@@ -17,11 +17,13 @@ router = APIRouter()
 
 
 @router.get("/api/ice")
-async def ice(request: Request, caller: Annotated[Identity, Depends(authorized)]) -> Response:
-    body = msgspec.json.encode(servers_for(services(request).settings, caller.token_id))
+async def ice(request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
+    body = msgspec.json.encode(servers_for(services(request).settings, caller.identity))
     return Response(body, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
-def servers_for(settings: Settings, user: str) -> IceServers:
-    """What `user` may use from now on; the name shows in the TURN server's log."""
-    return ice_servers(settings.stun, settings.turn, settings.turn_key, settings.turn_seconds, user, time.time())
+def servers_for(settings: Settings, user: Identity) -> IceServers:
+    """What `user` may use from now on; the link's id shows in the TURN server's log."""
+    now = time.time()  # of the TURN server's clock
+    seconds = min(settings.turn_seconds, max(0.0, user.expires - now))
+    return ice_servers(settings.stun, settings.turn, settings.turn_key, seconds, user.token_id, now)

@@ -13,8 +13,9 @@ from fastapi.responses import FileResponse, StreamingResponse
 from robot_bridge.protocol.console import RecordingState
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.serial import MAX_EVENT, event_gap
-from server.access import Identity, require_role
+from server.access import Right, require_role
 from server.body import read_json
+from server.ending_response import EndingResponse
 from server.errors import (
     BadParameter,
     ConsoleError,
@@ -87,22 +88,22 @@ def _service(request: Request) -> RecordingService:
     return found
 
 
-async def _caller(request: Request) -> Identity:
+async def _caller(request: Request) -> Right:
     return _service(request).access.bearer(request.headers.get("authorization"))
 
 
-Caller = Annotated[Identity, Depends(_caller)]
+Caller = Annotated[Right, Depends(_caller)]
 
 
-def _right(request: Request, caller: Identity) -> RecordingReaderRight:
+def _right(request: Request, caller: Right) -> RecordingReaderRight:
     """What the caller may read."""
-    everything = _service(request).opens_all
-    return (
-        RecordingReaderRight(caller.role, None) if everything else RecordingReaderRight.of(caller.role, caller.issued)
-    )
+    identity = caller.identity
+    if _service(request).opens_all:
+        return RecordingReaderRight(identity.role, None)
+    return RecordingReaderRight.of(identity.role, identity.issued)
 
 
-def _told_audit(request: Request, caller: Identity, what: str, recording_id: str) -> None:
+def _told_audit(request: Request, caller: Right, what: str, recording_id: str) -> None:
     _service(request).audit.record("recording", caller.actor, what, recording_id)
 
 
@@ -203,7 +204,8 @@ async def records(
     _service(request).audit.again("reading", actor, recording_id)
     # The response closes the iterator, and that the file, also when whoever asked is gone.
     body = _bounded(reader, first, last, topics, decodable, right)
-    return StreamingResponse(body, media_type="application/octet-stream", headers={"Cache-Control": "no-store"})
+    answer = StreamingResponse(body, media_type="application/octet-stream", headers={"Cache-Control": "no-store"})
+    return EndingResponse(answer, caller)
 
 
 @router.post("/api/recordings/{recording_id}/ticket")
@@ -215,7 +217,7 @@ async def ticket(request: Request, caller: Caller, recording_id: str) -> Respons
     await _with_reader(request, recording_id, lambda reader, entry: right.check_reads(entry.started))
     _service(request).audit.record("recording", actor, "downloaded", recording_id)
     root = request.scope.get("root_path", "")
-    permission = _service(request).access.issue_file_ticket(recording_id, caller.token_id)
+    permission = _service(request).access.issue_file_ticket(recording_id, caller.identity)
     return _json(FileTicket(f"{root}/api/recordings/{recording_id}/file?ticket={permission}"))
 
 
@@ -223,13 +225,13 @@ async def ticket(request: Request, caller: Caller, recording_id: str) -> Respons
 async def download(request: Request, recording_id: str, ticket: str = "") -> Response:
     """Of a running recording what is there now; `lockstep export` and other tools take that too."""
     access = _service(request).access
-    right, caller = None, None
+    right = None
     if ticket:  # whose making was audited, and checked against the link
-        access.verify_file_ticket(ticket, recording_id)
+        caller = access.verify_file_ticket(ticket, recording_id)
     else:
         caller = await _caller(request)
-        require_role(caller, "operator", "supervisor")
         right = _right(request, caller)
+    require_role(caller, "operator", "supervisor")
 
     def read(reader: RecordingReader, entry: RecordingEntry) -> Path:
         if right is not None:
@@ -237,26 +239,28 @@ async def download(request: Request, recording_id: str, ticket: str = "") -> Res
         return reader.path
 
     path = await _with_reader(request, recording_id, read)
-    if caller is not None:
+    if not ticket:
         _told_audit(request, caller, "downloaded", recording_id)
-    return FileResponse(
+    answer = FileResponse(
         path, media_type="application/x-mcap", filename=path.name, headers={"Cache-Control": "no-store"}
     )
+    return EndingResponse(answer, caller)
 
 
 @router.delete("/api/recordings/{recording_id}")
 async def delete(request: Request, caller: Caller, recording_id: str) -> Response:
     require_role(caller, "supervisor")
+    actor = caller.actor  # also for the audit, should the link end meanwhile
     library = _service(request).library
     try:
         await asyncio.to_thread(library.delete, recording_id)
     except OSError as error:
         raise RecordingFailed(error.strerror or str(error)) from error
-    _told_audit(request, caller, "deleted", recording_id)
+    _service(request).audit.record("recording", actor, "deleted", recording_id)
     return _json(await _list(request, library, caller))
 
 
-async def _list(request: Request, library: Library, caller: Identity) -> RecordingList:
+async def _list(request: Request, library: Library, caller: Right) -> RecordingList:
     right = _right(request, caller)
     found = await asyncio.to_thread(library.entries)
     return RecordingList(state=library.state(), recordings=[each for each in found if right.sees(each.ended)])

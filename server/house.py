@@ -1,24 +1,28 @@
 """What all robots of one console have in common: who may come in, how often anybody may ask, and how many fit."""
 
 import asyncio
-import time
 from typing import Protocol
 
+import structlog
 from prometheus_client import Counter
 
 from server.access import Identity
 from server.audit import Actor
-from server.errors import TooManyPeers
 from server.faults import Faults
 from server.guard import Guard
 from server.invitations import Invitation
 from server.link_warden import LinkWarden
+from server.places import check_place
 from server.state import ConsoleState
+from server.state_dir import StateDirUnusable
 
 __all__ = ["House", "HouseMetrics"]
 
+log = structlog.get_logger(__name__)
+
 COMMAND_LINE = Actor("command line")
-CHECK_SECONDS = 1.0  # how long a link that was revoked by another process still works
+CHECK_SECONDS = 0.5  # how long a link that was revoked by another process, or has expired, still works at most
+KEEP_SECONDS = 60.0  # between two times that the time is written down
 
 
 class HouseMetrics(Protocol):
@@ -54,17 +58,28 @@ class House:
         self._reserved = reserved
 
     async def run(self) -> None:
-        """Until cancelled: act on what other processes have changed about the links."""
+        """Until cancelled: act on what other processes have changed about the links, and on links that expire."""
+        store, loop = self.state.invitations, asyncio.get_running_loop()
+        looked = store.now()
+        keep_at = loop.time()
         while True:
             await asyncio.sleep(CHECK_SECONDS)
             try:
-                self.enforce(self.state.invitations.refresh(), COMMAND_LINE)
+                self.enforce(store.refresh(), COMMAND_LINE)
+                now = store.now()
+                expired = any(looked < each.expires <= now for each in store.known.all)
+                looked = now
+                if expired or loop.time() >= keep_at:
+                    keep_at = loop.time() + KEEP_SECONDS
+                    await asyncio.to_thread(store.keep_time)
+            except StateDirUnusable as error:
+                log.error("what time it is cannot be written down", detail=str(error))
             except Exception as error:
                 self.metrics.faults.caught("links", error)
 
     def enforce(self, changed: list[Invitation], by: Actor) -> None:
         """Act, at every robot, on what `by` has invited or revoked, and on what has expired."""
-        now = time.time()
+        now = self.state.invitations.now()
         for warden in self.wardens:
             warden.enforce(changed, by, now)
 
@@ -76,8 +91,6 @@ class House:
         """Raises TooManyPeers when there is no place for another peer at any robot."""
         if self._max_peers is None:
             return
-        bound = self._max_peers
-        if identity.role == "observer":
-            bound = max(1, bound - self._reserved)
-        if sum(warden.peers.taken for warden in self.wardens) >= bound:
-            raise TooManyPeers(f"all {bound} places of this console are taken")
+        held = sum(warden.peers.taken_by(identity.token_id) for warden in self.wardens)
+        taken = sum(warden.peers.taken for warden in self.wardens)
+        check_place(identity.role, held, taken, self._max_peers, self._reserved)

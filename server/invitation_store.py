@@ -8,7 +8,10 @@ from typing import TypeVar
 import msgspec
 import structlog
 
+from server.access import Identity
+from server.errors import LinkExpired, LinkRevoked
 from server.invitations import Invitation, Invitations
+from server.link_clock import LinkClock
 from server.state_dir import StateDamaged, StateDir, StateDirUnusable
 
 __all__ = ["InvitationStore"]
@@ -17,6 +20,8 @@ log = structlog.get_logger(__name__)
 
 FILE = "invitations.json"
 ELSEWHERE = "revoked-elsewhere.json"
+SEEN = "newest-time.json"
+BEHIND_SECONDS = 60.0  # that a clock may be behind the newest time without a word
 MAX_ELSEWHERE = 5000  # links that other consoles revoked; those that would end first are forgotten first
 Result = TypeVar("Result")
 
@@ -29,15 +34,23 @@ class _Elsewhere(msgspec.Struct, frozen=True):
     revoked: dict[str, float] = {}  # id of a link: when it would have expired
 
 
+class _Seen(msgspec.Struct, frozen=True):
+    seen: float  # s since 1970: the newest time that any process saw
+
+
 _file = msgspec.json.Decoder(_File)
 _elsewhere = msgspec.json.Decoder(_Elsewhere)
+_seen = msgspec.json.Decoder(_Seen)
 
 
 class InvitationStore:
     """`is_revoked` answers from memory; `refresh` brings the memory up to date, which costs one `stat`.
 
+    What is forgotten is written after the time by which it had ended, so no clock that is wrong later revives it.
+
     Attributes:
         on_revoked: called, from any thread, when there may be more revoked links
+        trouble: why the list cannot be read at present, so that nobody knows which links are revoked; "" when it can
 
     Raises:
         StateDirUnusable, StateDamaged: it cannot be read, or not be understood.
@@ -47,10 +60,33 @@ class InvitationStore:
         self._directory = directory
         self._busy = threading.Lock()
         self.on_revoked: Callable[[], None] = _ignore
+        self.trouble = ""
+        seen = self._read_seen()
+        self._clock = LinkClock(seen, _steady())
         self._version = directory.version(FILE)
+        if self._version is None and seen:
+            raise StateDamaged(directory.path / FILE, "it is gone; who removes it removes signing.key too")
         self._known = self._read()
         self._elsewhere = self._read_elsewhere()
         self._revoked = self._known.revoked()
+        if seen > time.time() + BEHIND_SECONDS:
+            log.warning("this machine's clock is behind; links end by the newest time that was seen", seen=seen)
+
+    def now(self) -> float:
+        """The time by which links end, s since 1970; it never runs backwards."""
+        return self._clock.at(time.time(), _steady())
+
+    def check(self, identity: Identity, known: Invitations) -> None:
+        """Within a change of `known`: raises LinkExpired or LinkRevoked when the link of `identity` is good no more."""
+        if identity.expires <= self.now():
+            raise LinkExpired("this link has expired; ask for a new one")
+        if self.is_revoked(identity.token_id) or identity.token_id in known.revoked():
+            raise LinkRevoked("this link was revoked")
+
+    def keep_time(self) -> None:
+        """Blocks: write down what time it is, for the next run."""
+        with self._busy, self._directory.locked():
+            self._write_seen()
 
     @property
     def known(self) -> Invitations:
@@ -59,6 +95,10 @@ class InvitationStore:
 
     def is_revoked(self, invitation_id: str) -> bool:
         return invitation_id in self._revoked or invitation_id in self._elsewhere
+
+    def has_ended(self, link: str, expires: float) -> bool:
+        """Whether the link of this id, which expires then, is good no more."""
+        return self.is_revoked(link) or self.now() >= expires
 
     def revoked_links(self) -> dict[str, float]:
         """All that is known to be revoked, here and elsewhere, and when each would have expired."""
@@ -76,43 +116,55 @@ class InvitationStore:
         """Blocks: write down what `revoked_elsewhere` was told, and end what was invited with those links."""
         with self._busy, self._directory.locked():
             known = {**self._read_elsewhere(), **self._elsewhere}
-            kept = _newest({link: expires for link, expires in known.items() if expires > time.time()})
+            now = self._write_seen()
+            kept = _newest({link: expires for link, expires in known.items() if expires > now})
             self._directory.write(ELSEWHERE, msgspec.json.encode(_Elsewhere(kept)))
         if all(each.by_link not in kept or each.revoked_at is not None for each in self._known.all):
             return []
-        return self.update(lambda invitations: _end_those_of(invitations, kept))
+        return self.update(lambda invitations: _end_those_of(invitations, kept, now))
 
     def update(self, change: Callable[[Invitations], Result]) -> Result:
         """Applies `change` to what is on disk now and writes it back; nothing is written when it raises."""
         with self._busy, self._directory.locked():
-            known = self._read()
+            known = self._read_known()
             result = change(known)
-            known.prune(time.time())
+            known.prune(self._write_seen())
             data = msgspec.json.format(msgspec.json.encode(_File(known.all)), indent=1)
             self._directory.write(FILE, data)
             self._take(known, self._directory.version(FILE))
         return result
 
     def refresh(self) -> list[Invitation]:
-        """What another process has added or revoked since. While the file cannot be read, what is known stands."""
+        """What another process has added or revoked since. While the list cannot be read, `trouble` says why."""
         if not self._busy.acquire(blocking=False):
             return []  # our own change is under way in a thread
         try:
-            return self._refresh()
+            found = self._refresh()
         except StateDirUnusable as error:
-            log.error("the invitations cannot be read; the known ones stand", detail=str(error))
+            if error.reason != self.trouble:
+                log.error("it cannot be read which links are revoked; nobody is let in", detail=str(error))
+            self.trouble = error.reason
             return []
         finally:
             self._busy.release()
+        if self.trouble:
+            log.warning("it can be read again which links are revoked")
+            self.trouble = ""
+        return found
 
     def _refresh(self) -> list[Invitation]:
         version = self._directory.version(FILE)
-        if version is None or version == self._version:
+        if version == self._version and not self.trouble:
             return []
-        self._version = version
         before = {step for each in self._known.all for step in _steps(each)}
-        self._take(self._read(), version)
+        self._take(self._read_known(), version)
         return [step for each in self._known.all for step in _steps(each) if step not in before]
+
+    def _read_known(self) -> Invitations:
+        """As `_read`, when this run has seen the file before."""
+        if self._version is not None and self._directory.version(FILE) is None:
+            raise StateDamaged(self._directory.path / FILE, "it is gone")
+        return self._read()
 
     def _take(self, known: Invitations, version: tuple[int, int] | None) -> None:
         self._version = version
@@ -128,6 +180,21 @@ class InvitationStore:
             path = self._directory.path / FILE
             raise StateDamaged(path, f"not understood: {error}; who removes it removes signing.key too") from error
 
+    def _read_seen(self) -> float:
+        data = self._directory.read(SEEN)
+        try:
+            return 0.0 if data is None else _seen.decode(data).seen
+        except (msgspec.DecodeError, UnicodeError) as error:
+            raise StateDamaged(self._directory.path / SEEN, f"not understood: {error}") from error
+
+    def _write_seen(self) -> float:
+        """The time, once it is on disk."""
+        self._clock.saw(self._read_seen())
+        now = self.now()
+        if self._directory.version(FILE) is not None:  # so whoever finds the time knows that there was a list
+            self._directory.write(SEEN, msgspec.json.encode(_Seen(now)))
+        return now
+
     def _read_elsewhere(self) -> dict[str, float]:
         data = self._directory.read(ELSEWHERE)
         try:
@@ -136,9 +203,13 @@ class InvitationStore:
             raise StateDamaged(self._directory.path / ELSEWHERE, f"not understood: {error}") from error
 
 
-def _end_those_of(invitations: Invitations, links: Mapping[str, float]) -> list[Invitation]:
+def _steady() -> float:
+    """Counts also while the machine sleeps, where the system can tell."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
+
+
+def _end_those_of(invitations: Invitations, links: Mapping[str, float], now: float) -> list[Invitation]:
     """Revoke what was invited with `links`."""
-    now = time.time()
     ours = [each.id for each in invitations.all if each.by_link in links and each.revoked_at is None]
     return [ended for link in ours for ended in invitations.revoke(None, link, now)]
 

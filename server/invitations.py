@@ -24,6 +24,7 @@ from server.names import clean_name
 __all__ = ["MAX_SECONDS", "Invitation", "Invitations", "may_invite"]
 
 MAX_LIVE = 500
+MAX_KEPT = 5000  # with those that ended lately
 MIN_SECONDS = 60.0
 MAX_SECONDS = 366 * 24 * 3600.0
 SHOWN_AFTER_END = 24 * 3600.0  # s that an ended one stays in the list
@@ -99,6 +100,8 @@ class Invitations:
             raise BadParameter(f"a link is good for {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
         if sum(each.is_good(now) for each in self._known.values()) >= MAX_LIVE:
             raise TooManyInvitations(f"there are {MAX_LIVE} already; revoke some first")
+        if by is not None and len(self._known) >= MAX_KEPT:
+            raise TooManyInvitations(f"{MAX_KEPT} are remembered, most of which ended; make one on the command line")
         expires = now + seconds if by is None else min(now + seconds, by.expires)
         return self._add(
             Invitation(

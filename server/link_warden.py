@@ -8,7 +8,11 @@ from server.invitation_store import InvitationStore
 from server.invitations import Invitation
 from server.peers import Peers
 
-__all__ = ["LinkWarden"]
+__all__ = ["UNKNOWN_SECONDS", "LinkWarden"]
+
+# For how long who is here may stay while nobody can know which links are revoked. Newcomers are refused at once; a disk
+# that is away for a moment should not take the robot out of somebody's hands.
+UNKNOWN_SECONDS = 10.0
 
 
 class LinkWarden:
@@ -19,7 +23,8 @@ class LinkWarden:
         self._audit = audit
         self._invitations = invitations
         self._robot = robot
-        self._changed = asyncio.Event()  # replaced whenever something was revoked
+        self._looked = asyncio.Event()  # replaced at every look
+        self._trouble_since: float | None = None
 
     def enforce(self, changed: list[Invitation], by: Actor, now: float) -> None:
         """Act on what `by` has invited or revoked, and on what has expired. `now` is s since 1970."""
@@ -27,19 +32,32 @@ class LinkWarden:
             if each.concerns(self._robot):
                 kind: AuditKind = "invitation" if each.revoked_at is None else "revocation"
                 self._audit.record(kind, by, each.role, f"{each.name} ({each.id})")
+        unknown = self._unknown_for(now)
         for peer in self.peers:
-            if self._invitations.is_revoked(peer.identity.token_id):
+            if unknown > UNKNOWN_SECONDS:
+                peer.end("links unreadable")
+            elif self._invitations.is_revoked(peer.identity.token_id):
                 peer.end("link revoked")
             elif now >= peer.identity.expires:
                 peer.end("link expired")
-        self._changed.set()
-        self._changed = asyncio.Event()
+        self._looked.set()
+        self._looked = asyncio.Event()
 
     def connected(self, link: str) -> int:
         """Peers that are here with the link of this id."""
         return sum(peer.identity.token_id == link for peer in self.peers)
 
-    async def revoked(self, link: str) -> None:
-        """Returns when the link with this id is revoked."""
-        while not self._invitations.is_revoked(link):
-            await self._changed.wait()
+    async def ended(self, link: str, expires: float) -> None:
+        """Returns when the link with this id is revoked or has expired, at the next look at the latest."""
+        while not self._invitations.has_ended(link, expires):
+            if self._unknown_for(self._invitations.now()) > UNKNOWN_SECONDS:
+                return
+            await self._looked.wait()
+
+    def _unknown_for(self, now: float) -> float:
+        """How long nobody has known which links are revoked, in s."""
+        if not self._invitations.trouble:
+            self._trouble_since = None
+            return 0.0
+        self._trouble_since = now if self._trouble_since is None else self._trouble_since
+        return now - self._trouble_since

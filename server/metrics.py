@@ -73,6 +73,9 @@ class Metrics:
         self.free_bytes = Gauge(
             "lockstep_recording_free_bytes", "Free space where recordings are written", registry=registry
         )
+        self.links_unreadable = Gauge(
+            "lockstep_links_unreadable", "1 while nobody gets in: which links are revoked is unknown", registry=registry
+        )
         self.audit_failing = Gauge("lockstep_audit_failing", "1 while the log cannot be written", registry=registry)
         self.audit_lost = Counter("lockstep_audit_lost", "Audit records that were never written", registry=registry)
         self.audit_failures = Counter("lockstep_audit_failures", "Failed writes of the audit log", registry=registry)

@@ -32,7 +32,7 @@ class NetworkSettings(BaseSettings):
     turn: NameList = ()  # "turn:turn.example.org:3478?transport=udp"
     turn_secret: SecretStr = SecretStr("")  # shared with the TURN server (coturn: static-auth-secret)
     turn_secret_file: Path | None = None  # instead of the above
-    turn_seconds: Annotated[float, Field(ge=60, le=86400 * 7)] = 12 * 3600.0  # that a credential is good for
+    turn_seconds: Annotated[float, Field(ge=60, le=600)] = 600.0  # that a credential is good for, unless its link ends
     relay_console: bool = False  # the console asks STUN and TURN for addresses of its own too
 
     @field_validator("allowed_hosts", "tls_names", "stun", "turn", mode="before")

@@ -272,6 +272,10 @@ class Peer(ABC):
         elif now - self._heard_at >= self._silence_seconds:
             self.end("silent")
 
+    async def abandon(self) -> None:
+        """Instead of `run`: it was never admitted."""
+        await self._close()
+
     async def _close(self) -> None:
         try:
             async with asyncio.timeout(CLOSE_TIMEOUT):

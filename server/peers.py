@@ -11,11 +11,12 @@ import structlog
 from robot_bridge.protocol.console import Participant, Participants, ServerMessage, encode_console_message
 from server.access import Identity
 from server.channels import ChannelName
-from server.errors import NotFound, ShuttingDown, TooManyPeers, TooManyRequests
+from server.errors import NotFound, ShuttingDown, TooManyRequests
 from server.feedback_fanout import FeedbackReceiver
 from server.metrics import Metrics
 from server.names import unique_names
 from server.peer import Peer
+from server.places import check_place
 from server.request_turns import RequestTurns
 from server.watcher import Watcher
 from server.webrtc_peer import WebRtcPeer
@@ -77,6 +78,11 @@ class Peers:
         """Places that are taken by peers that get media from here, and by those that are being negotiated."""
         return sum(not peer.relay for peer in self._sessions) + self._reserved.total()
 
+    def taken_by(self, token_id: str) -> int:
+        """Of the `taken` places, those of one link."""
+        here = sum(not peer.relay and peer.identity.token_id == token_id for peer in self._sessions)
+        return here + self._reserved[token_id]
+
     @property
     def thumbnails(self) -> int:
         """Of these, small pictures on somebody's overview: no participants."""
@@ -104,13 +110,13 @@ class Peers:
 
     @contextmanager
     def place(self, identity: Identity, *, relayed: bool = False, thumbnail: bool = False) -> Iterator[None]:
-        """Keeps a place while a peer is being negotiated. The last ones are not for observers.
+        """Keeps a place while a peer is being negotiated; `check_place` says who gets one.
 
         `relayed`: it has its media from a relay; such peers cost little, and are counted by themselves; as are those
         that get a `thumbnail`.
 
         Raises:
-            TooManyPeers: all places are taken.
+            TooManyPeers: there is no place for this link.
             TooManyRequests: so many peers of this link have not connected yet.
             ShuttingDown: the console ends.
         """
@@ -118,11 +124,10 @@ class Peers:
             raise ShuttingDown("the console is shutting down")
         limits, token_id = self._limits, identity.token_id
         bound = limits.max_relayed if relayed else limits.max_thumbnails if thumbnail else limits.max_peers
-        if identity.role == "observer" and not thumbnail:
-            bound = max(1, bound - limits.reserved_places)
-        here = sum((bool(peer.relay), peer.thumbnail) == (relayed, thumbnail) for peer in self._sessions)
-        if here + self._reserved.total() >= bound:
-            raise TooManyPeers(f"all {bound} places are taken")
+        alike = [peer for peer in self._sessions if (bool(peer.relay), peer.thumbnail) == (relayed, thumbnail)]
+        held = sum(peer.identity.token_id == token_id for peer in alike) + self._reserved[token_id]
+        taken = len(alike) + self._reserved.total()
+        check_place(identity.role, held, taken, bound, 0 if thumbnail else limits.reserved_places)
         for check in () if relayed else self.further_bounds:
             check(identity)
         waiting = sum(peer.identity.token_id == token_id and not peer.connected for peer in self._sessions)

@@ -101,7 +101,7 @@ async def _session(
         lambda what, detail: console.audit.record("recording", what=what, detail=detail),
     )
     engines = relay_engines(settings, media, house.state.signing_key(settings) + robot)
-    relays = RelayDesk(settings, engines, lambda: console.peers)
+    relays = RelayDesk(settings, engines, lambda: console.peers, house.state.invitations.has_ended)
     console = Console(settings, metrics, RelayedMedia(media, relays), scene, audit, clock, recorder, stops=stops)
     console.peers.relays.append(relays)
     console.peers.further_bounds.append(house.check_room)

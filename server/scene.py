@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -11,11 +12,13 @@ import viser
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback
+from server.access import SceneTicket
 from server.commanded_path import CommandedPath
 from server.errors import SceneUnavailable
 from server.kinematics import Pose
 from server.metrics import Metrics
 from server.scene_model import SceneModel
+from server.scene_page import ScenePage, read_scene_page
 from server.scene_scale import SceneScale
 
 __all__ = ["SceneView"]
@@ -23,6 +26,8 @@ __all__ = ["SceneView"]
 log = structlog.get_logger(__name__)
 
 STOP_TIMEOUT = 5.0  # s
+LINK_PART = 4  # one link gets this part of the places
+RESERVED_PART = 5  # this part is not for observers
 
 
 class SceneView:
@@ -44,6 +49,8 @@ class SceneView:
         self._feedback: Feedback | None = None  # not shown yet
         self._path: CommandedPath | None = None
         self._viewers = 0
+        self._of_link: Counter[str] = Counter()
+        self._page: ScenePage | None = None
         self._news = asyncio.Event()
 
     def configure(self, description: RobotDescription) -> None:
@@ -63,21 +70,37 @@ class SceneView:
         if self._viewers:
             self._news.set()
 
+    @property
+    def page(self) -> ScenePage:
+        """Raises SceneUnavailable before `start`."""
+        if self._page is None:
+            raise SceneUnavailable("the 3D scene has not started")
+        return self._page
+
     @contextmanager
-    def viewer(self) -> Iterator[None]:
-        """While entered, somebody watches.
+    def viewer(self, ticket: SceneTicket) -> Iterator[None]:
+        """While entered, somebody watches. One link gets a quarter of the places, observers not the last ones.
 
         Raises:
             SceneUnavailable: too many do.
         """
-        if self._viewers >= self._max_viewers:
-            raise SceneUnavailable(f"all {self._max_viewers} places are taken")
+        bound = self._max_viewers
+        if ticket.role == "observer":
+            bound = max(1, bound - max(1, bound // RESERVED_PART))
+        if self._viewers >= bound:
+            raise SceneUnavailable(f"all {bound} places are taken")
+        own = max(1, self._max_viewers // LINK_PART)
+        if self._of_link[ticket.link] >= own:
+            raise SceneUnavailable(f"one link opens {own} scenes at most")
+        self._of_link[ticket.link] += 1
         self._viewers += 1
         self._metrics.scene_viewers.set(self._viewers)
         self._news.set()
         try:
             yield
         finally:
+            self._of_link[ticket.link] -= 1
+            self._of_link += Counter()  # forgets those that have none
             self._viewers -= 1
             self._metrics.scene_viewers.set(self._viewers)
 
@@ -88,6 +111,7 @@ class SceneView:
         logging.getLogger("websockets.server").setLevel(logging.ERROR)
         self._server = await asyncio.to_thread(_start_viser)
         self.port = self._server.get_port()
+        self._page = await asyncio.to_thread(read_scene_page, self.port)
 
     async def run(self) -> None:
         """Until cancelled."""

@@ -1,12 +1,13 @@
-"""Reverse proxy for viser: /scene/ is its client, /scene/ws/TICKET its WebSocket.
+"""The 3D scene: /scene/TICKET/ is viser's client, from memory, /scene/ws/TICKET its WebSocket, passed on.
 
-Only camera movements pass from the viewer to viser. Its protocol knows much more (one message opens a tunnel to the
-public Internet), and none of that is a viewer's business.
+The client runs what recordings and messages tell it to, so it has no rights here: its page is sandboxed into an origin
+that is nobody's (`SCENE_POLICY`), and takes no parameter but those that the console gives it. Only camera movements
+pass from the viewer to viser. Its protocol knows much more (one message opens a tunnel to the public Internet), and
+none of that is a viewer's business.
 """
 
 import asyncio
 
-import httpx
 import msgspec
 import structlog
 from fastapi import APIRouter, Request, Response, WebSocket
@@ -15,12 +16,13 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from server.errors import ConsoleError, NotFound, SceneUnavailable
+from server.access import SceneTicket
+from server.errors import BadParameter, ConsoleError, NotFound
 from server.scene import SceneView
 from server.security import check_origin
 from server.services import services
 
-__all__ = ["HOOK", "is_allowed", "router"]
+__all__ = ["is_allowed", "router", "scene_query"]
 
 log = structlog.get_logger(__name__)
 
@@ -33,39 +35,57 @@ POLICY_VIOLATION = 1008
 GOING_AWAY = 1001
 UNSUPPORTED_DATA = 1003
 
-# The page around the frame puts its gate into it before viser's own script runs (web/src/ui/scene_frame.ts).
-HOOK = b"<head><script>window.parent.lockstepScene?.(window)</script>"
+OPAQUE = "null"  # as a browser names the origin of a sandboxed page (HTML 7.1.1)
+FLAGS = ("darkMode", "hideViserLogo")  # for viser's client, without a value
 
 router = APIRouter()
 
 
+@router.get("/scene/{ticket}/")
+async def client(request: Request, ticket: str) -> Response:
+    """viser's client for whoever has a ticket."""
+    here = services(request)
+    here.access.verify_ticket(ticket)
+    _check_query(request, ticket)
+    page = here.scene_or_error().page
+    headers = {"Cache-Control": "no-store", "Vary": "Accept-Encoding"}
+    if "gzip" not in request.headers.get("accept-encoding", ""):
+        return Response(page.plain, media_type="text/html", headers=headers)
+    return Response(page.packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"})
+
+
 @router.get("/scene/{path:path}")
-async def client(request: Request, path: str) -> Response:
-    """viser's client: static files, which need no ticket."""
-    scene = services(request).scene_or_error()
-    try:
-        async with httpx.AsyncClient(timeout=UPSTREAM_TIMEOUT, trust_env=False) as upstream:
-            answer = await upstream.get(
-                f"http://127.0.0.1:{scene.port}/{path}", headers={"Accept-Encoding": "identity"}
-            )
-    except httpx.HTTPError as error:
-        raise SceneUnavailable("the 3D scene does not answer") from error
-    if answer.status_code != 200:
-        raise NotFound("no such file")
-    kind = answer.headers.get("content-type", "application/octet-stream")
-    content = answer.content.replace(b"<head>", HOOK, 1) if kind.startswith("text/html") else answer.content
-    return Response(content, media_type=kind, headers={"Cache-Control": "no-cache"})
+async def nothing(path: str) -> Response:
+    raise NotFound("no such file")
+
+
+def scene_query(request: Request, ticket: str) -> str:
+    """What viser's client is told about where its stream is and how it looks."""
+    root = str(request.scope.get("root_path", ""))
+    base = str(request.base_url.replace(path="")).replace("http", "ws", 1).rstrip("/")
+    return "&".join((f"websocket={base}{root}/scene/ws/{ticket}", *FLAGS))
+
+
+def _check_query(request: Request, ticket: str) -> None:
+    """Raises BadParameter unless it is what `scene_query` says: one parameter of viser's loads any script."""
+    known = dict.fromkeys(FLAGS, "") | dict([scene_query(request, ticket).partition("&")[0].split("=", 1)])
+    for name, value in request.query_params.multi_items():
+        if name not in known:
+            raise BadParameter(f"the 3D scene takes no {name[:40]!r}")
+        if value != known[name]:
+            raise BadParameter(f"the 3D scene takes no other {name!r}")
 
 
 @router.websocket("/scene/ws/{ticket}")
 async def stream(websocket: WebSocket, ticket: str) -> None:
     here = services(websocket)
     try:
-        check_origin(websocket.headers, here.settings.allowed_origins)
-        link = here.access.verify_ticket(ticket)
+        valid = here.access.verify_ticket(ticket)
+        if websocket.headers.get("origin") != OPAQUE:
+            check_origin(websocket.headers, here.settings.allowed_origins)
         scene = here.scene_or_error()
-        with scene.viewer():
-            await _join(websocket, scene, link)
+        with scene.viewer(valid):
+            await _join(websocket, scene, valid)
     except ConsoleError as error:
         here.metrics.bad_input.labels("scene", type(error).__name__).inc()
         await websocket.close(POLICY_VIOLATION)
@@ -93,7 +113,7 @@ def _subprotocols(websocket: WebSocket) -> list[Subprotocol]:
     return [Subprotocol(each) for each in offered if each.startswith("viser-v")][:1]
 
 
-async def _join(websocket: WebSocket, scene: SceneView, link: str) -> None:
+async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> None:
     subprotocols = _subprotocols(websocket)
     try:
         upstream = await connect(
@@ -114,15 +134,15 @@ async def _join(websocket: WebSocket, scene: SceneView, link: str) -> None:
         await websocket.accept(subprotocol=upstream.subprotocol)
         up = asyncio.create_task(_viewer_to_scene(websocket, upstream))
         down = asyncio.create_task(_scene_to_viewer(websocket, upstream))
-        revoked = asyncio.create_task(services(websocket).warden.revoked(link))
+        ended = asyncio.create_task(services(websocket).warden.ended(ticket.link, ticket.ends))
         try:
-            await asyncio.wait((up, down, revoked), return_when=asyncio.FIRST_COMPLETED)
-            if revoked.done():
+            await asyncio.wait((up, down, ended), return_when=asyncio.FIRST_COMPLETED)
+            if ended.done():
                 await websocket.close(POLICY_VIOLATION)
         finally:
-            for task in (up, down, revoked):
+            for task in (up, down, ended):
                 task.cancel()
-            await asyncio.gather(up, down, revoked, return_exceptions=True)
+            await asyncio.gather(up, down, ended, return_exceptions=True)
 
 
 async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> None:

@@ -1,5 +1,6 @@
 """Security headers, and the check where a request comes from."""
 
+import re
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -8,7 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from server.errors import OriginRefused
 from server.robot_paths import below_robot
 
-__all__ = ["PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "check_origin"]
+__all__ = ["PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "check_origin", "scene_policy"]
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 
@@ -19,12 +20,16 @@ PAGE_POLICY = (
     "frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-# viser's client is one HTML file: inline script, WebAssembly, workers and fonts from data and blob URLs.
+# viser's client is one HTML file: inline script, script made from text, WebAssembly, workers and fonts from data and
+# blob URLs. So it is in an origin of its own that has no storage, no token and no rights (`sandbox` without
+# allow-same-origin), and speaks with its stream alone.
 SCENE_POLICY = (
-    "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; worker-src 'self' blob: data:; "
-    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
-    "connect-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+    "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; "
+    "worker-src blob: data:; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
+    "connect-src {stream}; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
+
+HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)  # what may stand in a policy
 
 HEADERS = {
     "Referrer-Policy": "no-referrer",
@@ -58,7 +63,7 @@ class SecurityHeaders:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        policy = SCENE_POLICY if below_robot(scope["path"]).startswith("/scene/") else self._page_policy
+        policy = scene_policy(scope) if below_robot(scope["path"]).startswith("/scene/") else self._page_policy
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -69,6 +74,13 @@ class SecurityHeaders:
             await send(message)
 
         await self._app(scope, receive, send_with_headers)
+
+
+def scene_policy(scope: Scope) -> str:
+    """That of the 3D scene; its stream is where its page came from."""
+    host = Headers(scope=scope).get("host", "")
+    scheme = "wss" if scope["scheme"] == "https" else "ws"
+    return SCENE_POLICY.format(stream=f"{scheme}://{host}" if HOST.fullmatch(host) else "'none'")
 
 
 def check_origin(headers: Headers, allowed: tuple[str, ...]) -> None:

@@ -10,7 +10,7 @@ from typing import Protocol
 from fastapi import Request
 from starlette.requests import HTTPConnection
 
-from server.access import Access, Identity
+from server.access import Access, Right
 from server.audit_log import AuditLog
 from server.console import Console
 from server.errors import RobotFailed, SceneUnavailable
@@ -77,6 +77,7 @@ class Services:
     def collect(self) -> None:
         """Bring into the metrics what is counted elsewhere."""
         self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
+        self.metrics.links_unreadable.set(bool(self.state.invitations.trouble))
         self.metrics.collect_audit(self.audit.lost, self.audit.failures)
         self.metrics.recording_failed.set(self.recorder.state().state == "failed")
         self.metrics.free_bytes.set(free_bytes(self.recorder.shelf.directory))
@@ -112,6 +113,6 @@ def takes_stops(connection: HTTPConnection) -> TakesStops:
     return services(connection) if keeper is None else keeper
 
 
-async def authorized(request: Request) -> Identity:
-    """Who asks. Raises AccessError."""
+async def authorized(request: Request) -> Right:
+    """What whoever asks may do. Raises AccessError, StateUnavailable."""
     return services(request).access.bearer(request.headers.get("authorization"))

@@ -8,9 +8,10 @@ import structlog
 
 from server.access import Access
 from server.evidence.signer import Signer, evidence_signer
+from server.invitation_store import FILE as INVITATIONS
 from server.invitation_store import InvitationStore
 from server.settings import Settings
-from server.state_dir import StateDamaged, StateDir, StateDirUnusable, default_state_dir
+from server.state_dir import KEY_FILE, StateDamaged, StateDir, StateDirUnusable, default_state_dir
 
 __all__ = ["ConsoleState", "open_state", "robot_directory", "robot_place", "state_path"]
 
@@ -46,7 +47,8 @@ def open_state(settings: Settings, *, fall_back: bool = False) -> ConsoleState:
     """The state directory that the settings name.
 
     Args:
-        fall_back: when that cannot be made or written, use a new one that nobody finds again
+        fall_back: when that cannot be made or written, and holds nothing yet, use a new one that nobody finds again.
+            One that links were given from is never passed over: another key would refuse all of them
 
     Raises:
         StateDirUnusable: it cannot be used.
@@ -58,15 +60,30 @@ def open_state(settings: Settings, *, fall_back: bool = False) -> ConsoleState:
     except StateDamaged:
         raise
     except StateDirUnusable as error:
-        if not fall_back:
+        if not fall_back or _is_used(path):
             raise
         log.error("nothing is remembered: links and the audit log end with this console", detail=str(error))
     return _open(settings, Path(tempfile.mkdtemp(prefix="lockstep-")))
+
+
+def _is_used(path: Path) -> bool:
+    """Whether links may have been given from there; also when nobody can tell."""
+    try:
+        return any((path / name).exists() for name in (KEY_FILE, INVITATIONS))
+    except OSError:
+        return True
 
 
 def _open(settings: Settings, path: Path) -> ConsoleState:
     directory = StateDir(path)
     secret = settings.secret.get_secret_value() if settings.secret is not None else directory.signing_key()
     invitations = InvitationStore(directory)
-    access = Access(secret, settings.token_seconds, settings.scene_ticket_seconds, invitations.is_revoked)
+    access = Access(
+        secret,
+        settings.token_seconds,
+        settings.scene_ticket_seconds,
+        invitations.is_revoked,
+        trouble=lambda: invitations.trouble,
+        now=invitations.now,
+    )
     return ConsoleState(directory, invitations, access, evidence_signer(directory))

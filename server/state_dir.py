@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["StateDamaged", "StateDir", "StateDirUnusable", "default_state_dir"]
+__all__ = ["KEY_FILE", "StateDamaged", "StateDir", "StateDirUnusable", "default_state_dir"]
 
 KEY_FILE = "signing.key"
 KEY_BYTES = 32  # RFC 7518 3.2: an HS256 key is at least as long as the hash
@@ -105,7 +105,7 @@ class StateDir:
     def locked(self) -> Iterator[None]:
         """Only one process at a time is inside, for what reads, changes and writes."""
         with _named(self.path / "lock"):
-            handle = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            handle = self._lock_file("lock")
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX)
             except OSError:
@@ -122,7 +122,7 @@ class StateDir:
         for number in range(1, MAX_LOGS + 1):
             stem = name if number == 1 else f"{name}-{number}"
             with _named(self.path / f"{stem}.lock"):
-                handle = os.open(self.path / f"{stem}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+                handle = self._lock_file(f"{stem}.lock")
                 try:
                     fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
@@ -135,11 +135,31 @@ class StateDir:
             return
         raise StateDirUnusable(self.path, f"{MAX_LOGS} consoles write logs here already")
 
+    def _lock_file(self, name: str) -> int:
+        """Opened. Of a name that somebody else put a link at, nothing is opened."""
+        path, flags = self.path / name, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW
+        while True:
+            try:
+                handle = os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o600)
+            except FileExistsError:
+                with suppress(FileNotFoundError):
+                    return os.open(path, flags)
+            else:
+                self._hand_over(handle)
+                return handle
+
+    def _hand_over(self, handle: int) -> None:
+        """To the owner of the directory a new file that root has made: a console that is not root's has to read it."""
+        owner = os.stat(self.path)
+        if os.geteuid() == 0 and owner.st_uid != 0:
+            os.fchown(handle, owner.st_uid, owner.st_gid)
+
     def _temporary(self, data: bytes) -> str:
         """A file of this directory with `data`, safely on disk."""
         handle, name = tempfile.mkstemp(dir=self.path, prefix=".new-")  # mode 0600
         try:
             with open(handle, "wb") as file:
+                self._hand_over(file.fileno())
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())

@@ -6,7 +6,7 @@ import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
-from server.access import Identity, require_role
+from server.access import Right, require_role
 from server.errors import ConsoleError, NotFound, RobotUnreachable
 from server.json_answer import json_answer
 from server.security import check_origin
@@ -28,12 +28,13 @@ class WatchTicket(msgspec.Struct, frozen=True):
 @router.post("/api/watch")
 async def invite(
     request: Request,
-    identity: Annotated[Identity, Depends(authorized)],
+    caller: Annotated[Right, Depends(authorized)],
     relay: Annotated[str, Query(pattern=r"^\d{1,3}$")],
 ) -> Response:
     """Admit an observer that has its media from `relay`. Its place is free again when no line comes in time."""
     here = services(request)
-    require_role(identity, "observer")
+    require_role(caller, "observer")
+    identity = caller.identity
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(identity.token_id)
@@ -46,10 +47,10 @@ async def invite(
 
 
 @router.delete("/watch/{ticket}")
-async def decline(ticket: str, request: Request, identity: Annotated[Identity, Depends(authorized)]) -> Response:
+async def decline(ticket: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
     """Give a ticket back that cannot be used, as behind a proxy that lets no WebSocket pass."""
     watcher = services(request).console.peers.by_ticket(ticket)
-    if watcher.identity.token_id != identity.token_id:
+    if watcher.identity.token_id != caller.token_id:
         raise NotFound("no such ticket")
     watcher.end("deleted")
     return Response(status_code=200)

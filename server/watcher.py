@@ -32,7 +32,10 @@ CLOSE_CODES = {
     "shutdown": GOING_AWAY,
     "new epoch": SERVICE_RESTART,
     "internal error": INTERNAL_ERROR,
-    **dict.fromkeys(("link revoked", "link expired", "bad messages", "too much", "does not read"), POLICY_VIOLATION),
+    **dict.fromkeys(
+        ("link revoked", "link expired", "links unreadable", "bad messages", "too much", "does not read"),
+        POLICY_VIOLATION,
+    ),
 }
 
 

@@ -10,7 +10,7 @@ from aiortc import RTCIceCandidate, RTCIceGatherer, RTCIceServer, RTCPeerConnect
 from aiortc.sdp import SessionDescription, candidate_from_sdp, candidate_to_sdp
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
-from server.access import Identity
+from server.access import Identity, Right
 from server.api_ice import servers_for
 from server.body import read_text
 from server.data_transport_private import tune_data_transport
@@ -54,7 +54,7 @@ router = APIRouter()
 @router.post("/whep")
 async def create(
     request: Request,
-    identity: Annotated[Identity, Depends(authorized)],
+    caller: Annotated[Right, Depends(authorized)],
     stamp: Literal["trailer"] | None = None,
     relay: Annotated[str, Query(pattern=r"^\d{0,3}$")] = "",
     view: Literal["thumbnail"] | None = None,
@@ -68,17 +68,18 @@ async def create(
     here = services(request)
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
-    here.guard.offer(identity.token_id)  # before it costs anything
+    here.guard.offer(caller.token_id)  # before it costs anything
     text = await read_text(request, SDP, here.settings.max_sdp_bytes)
     offer = answerable(prepare_offer(text, max(MAX_SECTIONS, len(here.media.offers) + FURTHER_SECTIONS)))
-    ice = servers_for(here.settings, identity.token_id)
+    identity = caller.identity
+    ice = servers_for(here.settings, identity)
     thumbnail = view == "thumbnail"
     if thumbnail:
         identity = identity._replace(role="observer")
     relayed = bool(relay) and not thumbnail and identity.role == "observer" and here.relays.arrived(relay)
     with here.console.peers.place(identity, relayed=relayed, thumbnail=thumbnail):
         peer, answer = await _negotiate(
-            here, identity, offer.text, ice, trailer=stamp == "trailer", thumbnail=thumbnail
+            here, caller, identity, offer.text, ice, trailer=stamp == "trailer", thumbnail=thumbnail
         )
         peer.relay = relay if relayed else ""
         here.console.peers.admit(peer)
@@ -105,16 +106,17 @@ async def nothing_to_get() -> Response:
 
 
 @router.patch("/whep/{resource}")
-async def patch(resource: str, request: Request, identity: Annotated[Identity, Depends(authorized)]) -> Response:
+async def patch(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
     """More candidates (RFC 8840), or an ICE restart, which says `If-Match: *` (RFC 9725 4.3.1, 4.3.3)."""
     here = services(request)
-    peer = _own(here, resource, identity)
+    peer = _own(here, resource, caller)
     peer.take_request()
     expected = _precondition(request, peer.ice.tag)
     text = await read_text(request, FRAGMENT, here.settings.max_sdp_bytes)
     first = SessionDescription.parse(peer.pc.remoteDescription.sdp).media[0]
     fragment = parse_fragment(text, first.rtp.muxId)
     candidates = candidates_of(fragment)
+    _own(here, resource, caller)  # it may have ended while the body came
     if fragment.username in ("", peer.ice.username):
         for candidate in candidates:
             if not await peer.ice.add_candidate(candidate):
@@ -162,22 +164,23 @@ def _candidate(each: FragmentCandidate) -> RTCIceCandidate:
 
 
 @router.delete("/whep/{resource}")
-async def delete(resource: str, request: Request, identity: Annotated[Identity, Depends(authorized)]) -> Response:
-    _own(services(request), resource, identity).end("deleted")
+async def delete(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
+    _own(services(request), resource, caller).end("deleted")
     return Response(status_code=200)
 
 
-def _own(here: Services, resource: str, identity: Identity) -> WebRtcPeer:
+def _own(here: Services, resource: str, caller: Right) -> WebRtcPeer:
     """The peer of this resource; somebody else's is as good as none."""
     peer = here.console.peers.by_resource(resource)
-    if peer.identity.token_id != identity.token_id:
+    if peer.identity.token_id != caller.token_id:
         raise NotFound("no such WHEP resource")
     return peer
 
 
 async def _negotiate(
-    here: Services, identity: Identity, offer: str, ice: IceServers, *, trailer: bool, thumbnail: bool
+    here: Services, caller: Right, identity: Identity, offer: str, ice: IceServers, *, trailer: bool, thumbnail: bool
 ) -> tuple[WebRtcPeer, str]:
+    """`identity`: as whom `caller` takes part."""
     # No STUN server unless asked for: our host candidates are a setting, the peer's address is learnt from its checks.
     own_servers = for_aiortc(ice) if here.settings.relay_console else []
     pc = create_peer_connection(own_servers)
@@ -186,6 +189,11 @@ async def _negotiate(
             with _offers_fault():
                 await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
             peer = await _answering_peer(here, identity, offer, pc, own_servers, trailer=trailer, thumbnail=thumbnail)
+            try:
+                caller.identity  # noqa: B018  raises when the link has ended meanwhile
+            except ConsoleError:
+                await peer.abandon()
+                raise
     except BaseException as error:
         await _discard(here, pc)
         if isinstance(error, TimeoutError):

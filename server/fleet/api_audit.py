@@ -5,7 +5,7 @@ from typing import Annotated
 import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from server.access import Identity, require_role
+from server.access import Right, require_role
 from server.board.board import SharedRecord
 from server.fleet.fleet import Fleet, fleet_caller, fleet_of
 from server.json_answer import json_answer
@@ -28,14 +28,15 @@ class FleetAudit(msgspec.Struct, frozen=True, kw_only=True):
 @router.get("/api/fleet/audit")
 async def audit(
     request: Request,
-    caller: Annotated[Identity, Depends(fleet_caller)],
+    caller: Annotated[Right, Depends(fleet_caller)],
     limit: Annotated[int, Query(ge=1, le=MAX_RECORDS)] = 100,
 ) -> Response:
     """The newest `limit` records of the robots that the supervisor's link is good for."""
     require_role(caller, "supervisor")
     here = fleet_of(request)
-    shared = await here.board.audit(MAX_RECORDS if caller.robots else limit)
-    found = {_key(each): each for each in (*shared.records, *_own(here, limit)) if here.may(caller, each.robot)}
+    shared = await here.board.audit(MAX_RECORDS if caller.identity.robots else limit)
+    identity = caller.identity
+    found = {_key(each): each for each in (*shared.records, *_own(here, limit)) if here.may(identity, each.robot)}
     records = sorted(found.values(), key=lambda each: each.record.time)
     return json_answer(FleetAudit(records=records[-limit:], complete=shared.complete, detail=shared.detail))
 

@@ -8,7 +8,7 @@ import msgspec
 from fastapi import APIRouter, Depends, Request, Response
 
 from robot_bridge.protocol.console import Role
-from server.access import Identity
+from server.access import Right
 from server.api import StopRequest
 from server.board.board import BoardState
 from server.board.tile import Tile
@@ -23,7 +23,7 @@ __all__ = ["FleetHealth", "FleetInfo", "FleetReadiness", "FleetStop", "RobotTile
 router = APIRouter()
 
 
-Caller = Annotated[Identity, Depends(fleet_caller)]
+Caller = Annotated[Right, Depends(fleet_caller)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,18 +73,18 @@ class FleetStop(msgspec.Struct, frozen=True, kw_only=True):
 
 class RobotHealth(msgspec.Struct, frozen=True, kw_only=True):
     robot_link: Literal["up", "down"]
-    detail: str
 
 
 class FleetHealth(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer of GET /healthz. `degraded`: the console runs, some robot cannot be reached."""
+    """Answer of GET /healthz. `degraded`: the console runs, but some robot cannot be reached or nobody gets in."""
 
     status: Literal["ok", "degraded"]
+    links: Literal["ok", "unreadable"]  # "unreadable": which links are revoked is unknown, so nobody gets in
     robots: dict[str, RobotHealth]
 
 
 class FleetReadiness(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer of GET /readyz. A robot that is away does not make a console unready."""
+    """Answer of GET /readyz, 503 unless ready. A robot that is away does not make a console unready."""
 
     ready: bool
     unreachable: list[str]  # names of robots
@@ -98,7 +98,7 @@ async def fleet(request: Request, caller: Caller) -> Response:
         FleetInfo(
             you=You(caller.role, caller.name),
             time=round(time.time(), 3),
-            robots=[RobotTile(**vars(tile), role_may_drive=may_drive) for tile in here.tiles(caller)],
+            robots=[RobotTile(**vars(tile), role_may_drive=may_drive) for tile in here.tiles(caller.identity)],
             consoles=here.board.state,
             notices=_notices(here.board.state),
         )
@@ -111,7 +111,7 @@ async def stop(request: Request, caller: Caller) -> Response:
     here = fleet_of(request)
     wanted = await read_json(request, StopRequest)
     press = new_press(caller.actor, "http", wanted.reason, wanted.press)
-    stopped = await here.stop_all(caller, press)
+    stopped = await here.stop_all(caller.identity, press)
     if not stopped:
         raise LinkOtherRobot("this link is good for none of the robots here")
     return json_answer(FleetStop(press=press.id, robots=[_stopped(each) for each in stopped]))
@@ -119,16 +119,20 @@ async def stop(request: Request, caller: Caller) -> Response:
 
 @router.get("/healthz")
 async def healthz(request: Request) -> Response:
-    robots = _health(fleet_of(request))
-    well = all(each.robot_link == "up" for each in robots.values())
-    return json_answer(FleetHealth(status="ok" if well else "degraded", robots=robots))
+    """For anyone, so it says no address and no reason; the log does."""
+    here = fleet_of(request)
+    robots = _health(here)
+    well = here.lets_in and all(each.robot_link == "up" for each in robots.values())
+    links: Literal["ok", "unreadable"] = "ok" if here.lets_in else "unreadable"
+    return json_answer(FleetHealth(status="ok" if well else "degraded", links=links, robots=robots))
 
 
 @router.get("/readyz")
 async def readyz(request: Request) -> Response:
-    robots = _health(fleet_of(request))
+    here = fleet_of(request)
+    robots = _health(here)
     away = [name for name, each in robots.items() if each.robot_link == "down"]
-    return json_answer(FleetReadiness(ready=True, unreachable=away))
+    return json_answer(FleetReadiness(ready=here.lets_in, unreachable=away), 200 if here.lets_in else 503)
 
 
 @router.get("/metrics")
@@ -139,10 +143,7 @@ async def metrics(request: Request) -> Response:
 
 
 def _health(here: Fleet) -> dict[str, RobotHealth]:
-    return {
-        tile.name: RobotHealth(robot_link="up" if tile.link == "up" else "down", detail=tile.detail or tile.trouble)
-        for tile in here.own_tiles()
-    }
+    return {tile.name: RobotHealth(robot_link="up" if tile.link == "up" else "down") for tile in here.own_tiles()}
 
 
 def _stopped(each: Stopped) -> StoppedRobot:

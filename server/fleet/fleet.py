@@ -10,7 +10,7 @@ from typing import NamedTuple
 import structlog
 from starlette.requests import HTTPConnection, Request
 
-from server.access import Access, Identity
+from server.access import Access, Identity, Right
 from server.audit import Actor, AuditRecord
 from server.board.board import Board, StopAnswer
 from server.board.memory_board import MemoryBoard
@@ -87,11 +87,17 @@ class Fleet:
 
     # who may
 
-    def caller(self, connection: HTTPConnection) -> Identity:
-        """Whose link a request brings. Raises AccessError."""
+    def caller(self, connection: HTTPConnection) -> Right:
+        """The right that a request brings. Raises AccessError, StateUnavailable; to stop, the first only."""
         if self._door is None:
             raise TypeError("the fleet is not running")
-        return self._door.bearer(connection.headers.get("authorization"))
+        bearer = self._door.bearer_to_stop if connection.scope["path"].endswith("/stop") else self._door.bearer
+        return bearer(connection.headers.get("authorization"))
+
+    @property
+    def lets_in(self) -> bool:
+        """False while nobody knows which links are revoked."""
+        return self._house is None or not self._house.state.invitations.trouble
 
     def may(self, identity: Identity, name: str) -> bool:
         """Whether that link is good for that robot."""
@@ -210,6 +216,6 @@ def fleet_of(connection: HTTPConnection) -> Fleet:
     return found
 
 
-async def fleet_caller(connection: Request) -> Identity:
+async def fleet_caller(connection: Request) -> Right:
     """Who asks the fleet. Raises AccessError."""
     return fleet_of(connection).caller(connection)

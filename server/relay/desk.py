@@ -6,13 +6,14 @@ import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractAsyncContextManager
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import structlog
 
 from robot_bridge.protocol.console import encode_console_message
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Media, Pong
+from server.access import Identity
 from server.backoff import Backoff
 from server.media.errors import MediaError
 from server.relay.errors import RelayError
@@ -33,8 +34,11 @@ HEARTBEAT_SECONDS = 0.4  # between two messages on the feedback channel, also wh
 BACKOFF, BACKOFF_CAP = 0.1, 2.0  # s
 DISTRUST_SECONDS = 30.0  # that a relay which failed is tried after the others
 HEALTHY_SECONDS = 10.0
-NEW_EPOCH, REVOKED, UNWATCHED = "new epoch", "a link was revoked", "nobody watches"
-OWN_REASONS = (NEW_EPOCH, REVOKED, UNWATCHED)  # to end a publication; no relay's fault
+LOOK_SECONDS = 0.25  # between two looks at who may still watch
+STRAY_SECONDS = 60.0  # after which whoever has a key and no line to the console is thought to watch on without it
+RENEW_SECONDS = 600.0  # between two publications for the sake of those
+NEW_EPOCH, ENDED, UNWATCHED, STRAY = "new epoch", "a link ended", "nobody watches", "somebody left with a key"
+OWN_REASONS = (NEW_EPOCH, ENDED, UNWATCHED, STRAY)  # to end a publication; no relay's fault
 HEARTBEAT = encode_console_message(Pong(id=0))
 
 
@@ -46,7 +50,14 @@ class RelayedPeer(Protocol):
     @property
     def role(self) -> str: ...
     @property
-    def ended(self) -> str: ...
+    def identity(self) -> Identity: ...
+
+
+class _Holder(NamedTuple):
+    """Somebody who was handed the key of the present publication."""
+
+    expires: float  # their link, s since 1970
+    seen_at: float  # when one of their peers was here last, s on the monotonic clock
 
 
 class RelayDesk:
@@ -57,21 +68,25 @@ class RelayDesk:
         settings: RelaySettings,
         engines: Mapping[EngineName, Engine],
         peers: Callable[[], Iterable[RelayedPeer]],
+        has_ended: Callable[[str, float], bool],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        """`has_ended`: whether the link of this id, which expires then, is good no more."""
         self.stations = [
             Station(str(number), url, settings.relay_public[number] if settings.relay_public else url.address)
             for number, url in enumerate(settings.relay_urls)
         ]
         self._engines = engines
         self._peers = peers
+        self._has_ended = has_ended
         self._clock = clock
         self._handout = Handout(settings.observers_direct)
         self._publication: Publication | None = None
         self._wanted = asyncio.Event()
         self._asked_at = float("-inf")  # when somebody last asked for a relay
         self._changed = asyncio.Event()  # replaced whenever a station became live or was lost
-        self._watching: set[RelayedPeer] = set()  # at the last look
+        self._holders: dict[str, _Holder] = {}  # of the present publication's key, by link
+        self._published_at = float("-inf")
 
     # What the console tells
 
@@ -92,7 +107,7 @@ class RelayDesk:
     # What observers ask
 
     async def ticket(self, peer: RelayedPeer | None, lost: str) -> JanusTicket | LiveKitTicket | None:
-        """Where one more observer watches; None: directly.
+        """Where one more observer watches; None: directly. It holds a key, see `key`.
 
         Args:
             peer: who asks again, because what it watched is gone
@@ -113,6 +128,17 @@ class RelayDesk:
         choice = self._handout.choose(now, direct, watching)
         station = next((each for each in usable if each.name == choice), None)
         return None if station is None else self._engine(station).ticket(station)
+
+    def key(self, peer: RelayedPeer) -> JanusTicket | LiveKitTicket | None:
+        """What lets `peer` into the relay that it was admitted for; None: that does not carry the session now.
+
+        Its link is remembered: when that ends, the key is good no more.
+        """
+        station = next((each for each in self.stations if each.live and each.name == peer.relay), None)
+        if station is None:
+            return None
+        self._holders[peer.identity.token_id] = _Holder(peer.identity.expires, self._clock())
+        return self._engine(station).ticket(station)
 
     def arrived(self, relay: str) -> bool:
         """A peer that watches there is connected to the console; False: there is no such relay."""
@@ -173,6 +199,8 @@ class RelayDesk:
         """From here into one relay, and from there into the others; returns when it ended or nobody watches."""
         async with self._engine(origin).publish(origin, secrets.randbits(52) | 1) as publication:
             self._publication = publication
+            self._holders.clear()
+            self._published_at = self._clock()
             self._live(origin, publication)
             try:
                 await self._while_wanted(publication, origin)
@@ -201,23 +229,28 @@ class RelayDesk:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _watch(self, publication: Publication) -> None:
-        """Ends it when nobody watches any more, or when a link was revoked."""
+        """Ends it when nobody watches any more, or when somebody who has its key may not watch any more."""
         quiet_since = self._clock()
         while True:
-            await asyncio.sleep(1.0)
-            if self._shut_out():
-                publication.end(REVOKED)
+            await asyncio.sleep(LOOK_SECONDS)
+            if any(self._has_ended(link, each.expires) for link, each in self._holders.items()):
+                publication.end(ENDED)
+            if self._has_strays():
+                publication.end(STRAY)
             if self._in_demand():
                 quiet_since = self._clock()
             elif self._clock() - quiet_since > LINGER_SECONDS:
                 self._wanted.clear()
                 publication.end(UNWATCHED)
 
-    def _shut_out(self) -> bool:
-        """Whether somebody who watched through a relay may not watch any more."""
-        gone = any(each.ended in ("link revoked", "link expired") for each in self._watching)
-        self._watching = {each for each in self._peers() if each.relay}
-        return gone
+    def _has_strays(self) -> bool:
+        """Whether somebody may watch without being a participant; not more often than once in a while."""
+        now = self._clock()
+        here = {each.identity.token_id for each in self._peers() if each.relay}
+        for link in here & self._holders.keys():
+            self._holders[link] = self._holders[link]._replace(seen_at=now)
+        gone = any(now - each.seen_at > STRAY_SECONDS for each in self._holders.values())
+        return gone and now - self._published_at > RENEW_SECONDS
 
     async def _beat(self, publication: Publication) -> None:
         """Observers tell a relay that hangs from a robot that is silent."""

@@ -10,8 +10,10 @@ from client import Console
 from client.aiortc_private import transport_of
 from client.errors import ConnectFailed
 from client.peer import Peer
+from client.whep import Whep
+from server.access import Identity
 from server.ice_servers import turn_credential
-from tests.server.rig import running_rig
+from tests.server.rig import eventually, running_rig
 from tests.support.turn_server import TURN_SECRET, running_turn_server
 
 
@@ -60,6 +62,48 @@ async def test_expired_and_forged_credentials_are_refused(tmp_path: Path, monkey
                 async with Console(link, relay_only=True, connect_seconds=1.5):
                     pass
         assert turn.says("401"), "and it was the credential that it refused"
+
+
+async def test_a_session_outlives_the_credentials_that_it_began_with_and_a_restart_brings_new_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float] = []
+    good = Whep.ice_servers
+
+    async def short_lived(whep: Whep) -> list[RTCIceServer]:
+        asked.append(time.time())
+        if len(asked) > 1:
+            return await good(whep)
+        username, credential = turn_credential(TURN_SECRET, "ann", int(time.time()) + 3)
+        return [RTCIceServer([turn.uri], username, credential)]
+
+    monkeypatch.setattr("client.whep.Whep.ice_servers", short_lived)
+    async with (
+        running_turn_server(tmp_path, "--max-allocate-lifetime=5") as turn,
+        running_rig(turn=turn.uri, turn_secret=TURN_SECRET, ice_hosts="127.0.0.1") as rig,
+        Console(f"{rig.url}/#token={rig.access.issue('operator', 'operator')}", relay_only=True) as console,
+    ):
+        await console.take_seat()
+        forward = [0.1] * len(console.description.axes)
+        await console.drive([0.0] * len(forward))
+        # Each allocation is renewed after four seconds; the second time long after its credentials' end.
+        await eventually(lambda: turn.log.read_text().count("refreshed") >= 2, 20.0)
+        assert time.time() > asked[0] + 3
+        await console.drive(forward)
+        await console.restart_ice()
+        assert len(asked) == 2
+        await console.drive(forward)
+        await console.rest()
+
+
+async def test_credentials_end_with_the_link_that_they_are_for() -> None:
+    settings = {"turn": "turn:127.0.0.1:9", "turn_secret": TURN_SECRET}
+    async with running_rig(**settings) as rig:
+        soon = time.time() + 90
+        token = rig.access.sign(Identity("observer", "x", "id", soon), time.time())
+        for header, ends in ((token, soon), (rig.access.issue("observer", "y"), time.time() + 600)):
+            told = (await rig.http.get("/api/ice", headers={"Authorization": f"Bearer {header}"})).json()
+            assert told["expires"] == pytest.approx(ends, abs=5)
 
 
 async def test_the_console_can_be_reached_by_a_relay_of_its_own_and_says_which_servers_there_are(

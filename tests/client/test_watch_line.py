@@ -117,7 +117,7 @@ async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
     async with running_rig(**RELAYED) as rig:
         link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
         connection = Connection(_options(link))
-        connection._relay = _Relay()  # type: ignore[assignment]
+        connection._beside = "0"
         await connection._peer.close()
         connection._peer = WatchLine(link, "0", None, connection._received, PATIENCE)
         try:
@@ -197,10 +197,6 @@ async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate
         finally:
             await line.close()
             await doubting.close()
-
-
-class _Relay:
-    name = "0"
 
 
 def _options(link: ConsoleLink) -> ConnectionOptions:

@@ -4,11 +4,13 @@ import pytest
 from playwright.async_api import Browser
 
 from bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
+from server.scene_page import HOOK
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
 
-SCENE = '<input style="margin: 30vh 30vw">'  # takes the focus as viser does
+# Takes the focus as viser does.
+SCENE = f'<html>{HOOK.decode()}</head><input style="margin: 30vh 30vw"></html>'
 
 
 async def _stopped(console: ConsolePage) -> None:

@@ -165,9 +165,9 @@ class TestPeer:
             await opened.wait()
 
 
-async def eventually(state: Callable[[], bool]) -> None:
+async def eventually(state: Callable[[], bool], seconds: float = PATIENCE) -> None:
     """Returns once `state` holds; for metrics and other values that have no event to wait for."""
-    async with asyncio.timeout(PATIENCE):
+    async with asyncio.timeout(seconds):
         while not state():  # noqa: ASYNC110
             await asyncio.sleep(0.01)
 

@@ -134,7 +134,7 @@ async def test_every_answer_carries_the_security_headers() -> None:
 
 async def test_health_and_metrics_need_no_token() -> None:
     async with running_rig() as rig:
-        assert (await rig.http.get("/healthz")).json() == {"status": "ok", "robot_link": "up", "detail": ""}
+        assert (await rig.http.get("/healthz")).json() == {"status": "ok", "robot_link": "up", "links": "ok"}
         text = (await rig.http.get("/metrics")).text
         assert "lockstep_robot_link_up 1.0" in text
         assert "lockstep_event 1.0" in text

@@ -3,6 +3,7 @@
 import asyncio
 import re
 import time
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
@@ -171,6 +172,102 @@ async def test_revoking_closes_the_peers_at_once_and_the_link_says_so_by_name() 
         assert not other.closed.is_set()
         kinds = await _kinds(rig)
         assert kinds.index("invitation") < kinds.index("revocation") < len(kinds)
+
+
+class _LateBody:
+    """A request whose body comes when it is let go."""
+
+    def __init__(self, rig: Rig, token: dict[str, str], method: str, path: str, body: bytes, kind: str) -> None:
+        self._rig, self._method, self._path, self._body = rig, method, path, body
+        self._headers = {**token, "Content-Type": kind, "Content-Length": str(len(body))}
+        self.begun, self.go_on = asyncio.Event(), asyncio.Event()
+
+    async def answer(self) -> httpx.Response:
+        return await self._rig.http.request(
+            self._method, self._path, headers=self._headers, content=self._parts(), timeout=PATIENCE
+        )
+
+    async def _parts(self) -> AsyncIterator[bytes]:
+        yield self._body[:-1]
+        self.begun.set()
+        await self.go_on.wait()
+        yield self._body[-1:]
+
+
+LATE = [
+    ("POST", "/api/invitations", b'{"role": "operator"}', "application/json"),
+    ("POST", "/api/recordings", b'{"name": "x"}', "application/json"),
+    ("POST", "/api/stop", b'{"reason": "x"}', "application/json"),
+    ("POST", "/whep", b"v=0", "application/sdp"),
+]
+
+
+@pytest.mark.parametrize(("method", "path", "body", "kind"), LATE, ids=[each[1] for each in LATE])
+async def test_a_request_that_was_begun_before_its_link_was_revoked_has_no_effect_after_that(
+    method: str, path: str, body: bytes, kind: str
+) -> None:
+    async with running_rig() as rig:
+        made = (await _invite(rig, "supervisor", role="operator")).json()
+        if path == "/whep":
+            peer = TestPeer()
+            peer.pc.createDataChannel("session")
+            body = (await peer.offer()).encode()
+            await peer.close()
+        late = _LateBody(rig, _bearer(made["link"]), method, path, body, kind)
+        async with asyncio.TaskGroup() as tasks:
+            asked = tasks.create_task(late.answer())
+            await late.begun.wait()
+            await eventually(lambda: rig.count("lockstep_bad_input_total") == 0)
+            known = len(rig.services.state.invitations.known.all)
+            await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
+            late.go_on.set()
+        answer = asked.result()
+        assert (answer.status_code, answer.json()["error"]) == (401, "link_revoked")
+        assert len(rig.services.state.invitations.known.all) == known
+        assert not rig.services.console.clock.stop.stopped
+        assert len(rig.services.console.peers) == 0
+
+
+async def test_an_expired_link_invites_nobody_though_its_request_began_before() -> None:
+    async with running_console(NOWHERE) as rig:
+        token = rig.access.sign(Identity("operator", "x", "id", time.time() + 1.5), time.time())
+        late = _LateBody(rig, {"Authorization": f"Bearer {token}"}, *LATE[0])
+        async with asyncio.TaskGroup() as tasks:
+            asked = tasks.create_task(late.answer())
+            await late.begun.wait()
+            await eventually(lambda: rig.services.state.invitations.now() > jwt_end(token))
+            late.go_on.set()
+        assert asked.result().json()["error"] == "link_expired"
+        assert rig.services.state.invitations.known.all == []
+
+
+def jwt_end(token: str) -> float:
+    end: float = jwt.decode(token, options={"verify_signature": False})["exp"]
+    return end
+
+
+async def test_while_the_list_of_links_cannot_be_read_nobody_gets_in_and_everybody_can_still_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.link_warden.UNKNOWN_SECONDS", 1.0)
+    async with running_rig(state_dir=tmp_path) as rig, rig.peer("operator") as peer:
+        await _invite(rig, "operator")
+        good = (tmp_path / "invitations.json").read_bytes()
+        rig.services.state.directory.write("invitations.json", b"rubbish")
+        await eventually(lambda: bool(rig.services.state.invitations.trouble))
+        refused = await rig.http.get("/api/session", headers=rig.token("supervisor"))
+        assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
+        assert "lockstep_links_unreadable 1.0" in (await rig.http.get("/metrics")).text
+        assert (await rig.http.get("/healthz")).json()["status"] == "degraded"
+        stopped = await rig.http.post("/api/stop", headers=rig.token("observer"))
+        assert stopped.status_code == 200
+        async with asyncio.timeout(PATIENCE):
+            await peer.closed.wait()
+        await eventually(lambda: rig.count("lockstep_peers_ended_total", why="links unreadable") == 1)
+        rig.services.state.directory.write("invitations.json", good)
+        await eventually(lambda: not rig.services.state.invitations.trouble)
+        assert (await rig.http.get("/api/session", headers=rig.token("observer"))).status_code == 200
+        assert "lockstep_links_unreadable 0.0" in (await rig.http.get("/metrics")).text
 
 
 async def test_what_another_process_revokes_ends_here_within_seconds_and_is_recorded(tmp_path: Path) -> None:

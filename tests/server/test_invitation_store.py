@@ -5,6 +5,7 @@ import pytest
 import structlog
 
 from server.access import Identity
+from server.errors import LinkExpired, LinkRevoked
 from server.invitation_store import ELSEWHERE, FILE, InvitationStore
 from server.invitations import Invitation, Invitations
 from server.state_dir import StateDamaged, StateDir
@@ -65,6 +66,7 @@ def test_a_damaged_file_stops_the_start_and_not_a_console_that_runs(directory: S
         assert store.refresh() == []
     assert [line["log_level"] for line in logs] == ["error"], "said once"
     assert store.is_revoked(made.id)
+    assert store.trouble.startswith("not understood")
     with pytest.raises(StateDamaged, match="signing.key"):
         InvitationStore(directory)
 
@@ -76,6 +78,11 @@ def test_a_file_that_vanishes_revives_no_link(directory: StateDir) -> None:
     (directory.path / FILE).unlink()
     assert store.refresh() == []
     assert store.is_revoked(made.id)
+    assert store.trouble == "it is gone"
+    with pytest.raises(StateDamaged, match="gone"):
+        store.update(_invite)
+    with pytest.raises(StateDamaged, match="signing.key"):
+        InvitationStore(directory)
 
 
 def test_while_a_thread_changes_it_the_console_does_not_take_the_change_for_another_ones(directory: StateDir) -> None:
@@ -139,3 +146,93 @@ def test_a_damaged_list_of_links_revoked_elsewhere_stops_the_start(directory: St
     directory.write(ELSEWHERE, b'{"revoked": [')
     with pytest.raises(StateDamaged):
         InvitationStore(directory)
+
+
+def test_a_list_that_can_be_read_again_is_believed_again(directory: StateDir) -> None:
+    store, other = InvitationStore(directory), InvitationStore(directory)
+    made = store.update(_invite)
+    good = (directory.path / FILE).read_bytes()
+    directory.write(FILE, b"rubbish")
+    store.refresh()
+    assert store.trouble
+    directory.write(FILE, good)
+    assert store.refresh() == []
+    assert not store.trouble
+    assert other.refresh() == [made]
+
+
+class _Wall:
+    """The machine's clock, wrong by as much as is set."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.ahead = 0.0
+        true = time.time
+        monkeypatch.setattr("server.invitation_store.time.time", lambda: true() + self.ahead)
+
+
+YEAR = 365 * 24 * HOUR
+
+
+def test_a_start_with_a_clock_ahead_and_then_right_again_revives_no_revoked_link(
+    directory: StateDir, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall = _Wall(monkeypatch)
+    store = InvitationStore(directory)
+    made = store.update(_invite)
+    store.update(lambda known: known.revoke(None, made.id, time.time()))
+    wall.ahead = YEAR
+    wrong = InvitationStore(directory)
+    wrong.update(_invite)
+    assert made.id not in {each.id for each in wrong.known.all}, "it has ended for so long that it is forgotten"
+    wall.ahead = 0.0
+    again = InvitationStore(directory)
+    assert again.is_revoked(made.id) or again.now() > made.expires
+    with pytest.raises((LinkExpired, LinkRevoked)):
+        again.check(made.identity, again.known)
+
+
+def test_a_clock_that_goes_back_revives_no_expired_link(directory: StateDir, monkeypatch: pytest.MonkeyPatch) -> None:
+    wall = _Wall(monkeypatch)
+    store = InvitationStore(directory)
+    made = store.update(_invite)
+    wall.ahead = 2 * HOUR
+    with pytest.raises(LinkExpired):
+        store.check(made.identity, store.known)
+    wall.ahead = -YEAR
+    with pytest.raises(LinkExpired):
+        store.check(made.identity, store.known)
+    store.keep_time()
+    again = InvitationStore(directory)
+    assert again.now() > made.expires, "over a restart neither"
+    fresh = again.update(lambda known: known.invite(None, "observer", "Bob", HOUR, again.now()))
+    assert fresh.is_good(again.now()), "links can still be given"
+
+
+def test_links_revoked_elsewhere_stay_revoked_whatever_a_clock_says(
+    directory: StateDir, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall = _Wall(monkeypatch)
+    store = InvitationStore(directory)
+    store.update(_invite)
+    end = time.time() + HOUR
+    store.revoked_elsewhere({"far": end})
+    store.keep_revoked_elsewhere()
+    wall.ahead = YEAR
+    InvitationStore(directory).keep_revoked_elsewhere()
+    wall.ahead = 0.0
+    again = InvitationStore(directory)
+    assert again.is_revoked("far") or again.now() > end
+
+
+def test_whoever_was_revoked_while_their_request_waited_changes_nothing(directory: StateDir) -> None:
+    store, other = InvitationStore(directory), InvitationStore(directory)
+    ann = store.update(lambda known: known.invite(None, "operator", "Ann", HOUR, time.time()))
+    other.update(lambda known: known.revoke(None, ann.id, time.time()))
+    assert not store.is_revoked(ann.id), "it does not know yet"
+
+    def invite(known: Invitations) -> None:
+        store.check(ann.identity, known)
+        pytest.fail("nobody may come this far")
+
+    with pytest.raises(LinkRevoked):
+        store.update(invite)

@@ -2,6 +2,9 @@
 
 import asyncio
 import json
+import time
+from contextlib import AsyncExitStack
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -12,7 +15,9 @@ from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
-from server.scene_proxy import HOOK, is_allowed
+from server.access import Identity
+from server.scene_page import HOOK
+from server.scene_proxy import is_allowed
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 
 VERSION = Subprotocol(f"viser-v{viser.__version__}")
@@ -32,9 +37,19 @@ async def test_the_client_is_served_and_its_stream_shows_the_robot() -> None:
         page = await rig.http.get(path)
         assert page.status_code == 200
         assert "text/html" in page.headers["content-type"]
-        # The page around it has to get at it before any script of viser's.
+        # The gate has to be there before any script of viser's.
         assert page.text.index(HOOK.decode()) < page.text.index("<script ")
-        assert "frame-ancestors 'self'" in page.headers["content-security-policy"]
+        policy = page.headers["content-security-policy"].split("; ")
+        assert policy[0] == "sandbox allow-scripts", "an origin that is nobody's"
+        assert f"connect-src {rig.url.replace('http', 'ws')}" in policy
+        assert "frame-ancestors 'self'" in policy
+        console = (await rig.http.get("/")).headers["content-security-policy"]
+        assert "sandbox" not in console
+        assert "unsafe-eval" not in console, "nothing of that beside a token"
+        packed = await rig.http.get(path, headers={"Accept-Encoding": "gzip"})
+        assert (packed.headers["content-encoding"], packed.text) == ("gzip", page.text)
+        plain = await rig.http.get(path, headers={"Accept-Encoding": "identity"})
+        assert ("content-encoding" in plain.headers, plain.text) == (False, page.text)
         assert address.startswith(rig.url.replace("http", "ws"))
         async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None) as websocket:
             heard = b""
@@ -76,12 +91,81 @@ async def test_a_viewer_whose_link_is_revoked_is_shown_nothing_more() -> None:
             await connect(address, subprotocols=[VERSION], proxy=None)
 
 
-async def test_only_so_many_may_watch() -> None:
-    async with running_rig(scene=True, max_scene_viewers=1) as rig:
+async def _scene_with(rig: Rig, token: dict[str, str]) -> str:
+    path: str = (await rig.http.post("/api/scene", headers=token)).json()["path"]
+    return path.split("websocket=")[1].split("&")[0]
+
+
+async def test_a_scene_that_is_open_ends_when_its_link_expires_and_no_other_opens(tmp_path: Path) -> None:
+    async with running_rig(scene=True, state_dir=tmp_path) as rig:
+        token = rig.access.sign(Identity("observer", "x", "id", time.time() + 2.5), time.time())
+        headers = {"Authorization": f"Bearer {token}"}
+        path = (await rig.http.post("/api/scene", headers=headers)).json()["path"]
+        address = path.split("websocket=")[1].split("&")[0]
+        async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None) as websocket:
+            async with asyncio.timeout(PATIENCE):
+                await websocket.wait_closed()
+            assert websocket.close_code == 1008
+        with pytest.raises(websockets.InvalidStatus):
+            await connect(address, subprotocols=[VERSION], proxy=None)
+        assert (await rig.http.get(path)).json()["error"] == "link_expired"
+
+
+async def test_the_page_of_the_scene_needs_a_ticket() -> None:
+    async with running_rig(scene=True) as rig:
+        path, _ = await _scene_url(rig)
+        token = rig.access.issue("operator", "x")
+        for wrong in (path.replace("/scene/", "/scene/x", 1), f"/scene/{token}/"):
+            answer = await rig.http.get(wrong)
+            assert (answer.status_code, answer.json()["error"]) == (401, "unauthorized")
+        for none in ("/scene/", "/scene"):
+            assert (await rig.http.get(none)).status_code == 404
+
+
+@pytest.mark.parametrize(
+    "further",
+    [
+        "playbackPath=data:application/octet-stream;base64,AAAA",
+        "websocket=wss://evil.example/",
+        "darkMode=x",
+        "initialCameraPosition=0",
+        "showStats",
+    ],
+)
+async def test_the_page_of_the_scene_takes_no_parameter_but_those_that_the_console_gives_it(further: str) -> None:
+    async with running_rig(scene=True) as rig:
+        path, _ = await _scene_url(rig)
+        answer = await rig.http.get(f"{path}&{further}")
+        assert (answer.status_code, answer.json()["error"]) == (422, "bad_parameter")
+
+
+async def test_the_origin_that_is_nobodys_opens_the_stream_with_a_ticket_and_nothing_else() -> None:
+    async with running_rig(scene=True) as rig:
         _, address = await _scene_url(rig)
-        async with connect(address, subprotocols=[VERSION], proxy=None):
-            with pytest.raises(websockets.InvalidStatus):
-                await connect(address, subprotocols=[VERSION], proxy=None)
+        opaque = websockets.Origin("null")
+        async with connect(address, subprotocols=[VERSION], proxy=None, origin=opaque):
+            pass
+        with pytest.raises(websockets.InvalidStatus):
+            await connect(address + "x", subprotocols=[VERSION], proxy=None, origin=opaque)
+        refused = await rig.http.post("/api/stop", headers=rig.token("operator") | {"Origin": "null"})
+        assert (refused.status_code, refused.json()["error"]) == (403, "origin_refused")
+
+
+async def test_only_so_many_may_watch_and_one_link_cannot_take_all_places() -> None:
+    async with running_rig(scene=True, max_scene_viewers=8) as rig:
+        links = [rig.token("observer") for _ in range(4)]
+        async with AsyncExitStack() as open_ones:
+            for number, link in enumerate(links):
+                for _ in range(2 if number < 3 else 1):  # then only places that are not for observers are left
+                    address = await _scene_with(rig, link)
+                    await open_ones.enter_async_context(connect(address, subprotocols=[VERSION], proxy=None))
+                with pytest.raises(websockets.InvalidStatus):
+                    await connect(await _scene_with(rig, link), subprotocols=[VERSION], proxy=None)
+            operator = await _scene_with(rig, rig.token("operator"))
+            await open_ones.enter_async_context(connect(operator, subprotocols=[VERSION], proxy=None))
+        await eventually(lambda: rig.count("lockstep_scene_viewers") == 0)
+        async with connect(await _scene_with(rig, links[0]), subprotocols=[VERSION], proxy=None):
+            pass
 
 
 async def test_a_viewer_can_move_the_camera_and_nothing_else() -> None:

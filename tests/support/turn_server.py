@@ -26,8 +26,8 @@ class TurnServer:
 
 
 @asynccontextmanager
-async def running_turn_server(directory: Path) -> AsyncIterator[TurnServer]:
-    """Started, answering on UDP and TCP, ended on leaving."""
+async def running_turn_server(directory: Path, *further: str) -> AsyncIterator[TurnServer]:
+    """Started, answering on UDP and TCP, ended on leaving. `further`: options of coturn."""
     executable = shutil.which("turnserver")
     if executable is None:
         raise RuntimeError("coturn is not installed: make test installs Debian's coturn")
@@ -37,6 +37,7 @@ async def running_turn_server(directory: Path) -> AsyncIterator[TurnServer]:
         *("--use-auth-secret", f"--static-auth-secret={TURN_SECRET}", "--realm=lockstep.test", "--fingerprint"),
         *("--allow-loopback-peers", "--no-tls", "--no-dtls", "--no-cli", "--verbose"),
         *(f"--log-file={log}", "--simple-log", f"--pidfile={directory / 'turn.pid'}", f"--userdb={directory / 'db'}"),
+        *further,
     ]
     with (directory / "turn.out").open("wb") as output:
         process = await asyncio.create_subprocess_exec(*command, stdout=output, stderr=output)

@@ -94,7 +94,7 @@ export class Page {
         return sceneDue(this.app.room.context("video"), video?.gate.shown ?? null);
       },
       context: () => this.app.room.context("video"),
-      onkey: (event) => this.app.controls.keyboard.foreign(event),
+      onkey: (key) => this.app.controls.keyboard.foreign(key),
     });
   }
 

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
+from server.access import Identity
 from server.relay.desk import RelayDesk
 from server.relay.errors import RelayError
 from server.relay.publication import Publication, Watched
@@ -53,13 +54,18 @@ class Relays:
 
 
 class Watching:
-    relay, role, ended = "0", "observer", ""
+    relay, role = "0", "observer"
+    identity = Identity("observer", "", "link", 1000.0)
+
+
+def _good(link: str, expires: float) -> bool:
+    return False
 
 
 async def test_of_two_relays_that_failed_lately_the_one_that_failed_just_now_is_not_tried_first() -> None:
     relays, now = Relays(), [100.0]
     settings = RelaySettings(relay=("janus:ws://a.example/1", "janus:ws://b.example/1"), observers_direct=0)
-    desk = RelayDesk(settings, {"janus": relays}, lambda: [Watching()], lambda: now[0])
+    desk = RelayDesk(settings, {"janus": relays}, lambda: [Watching()], _good, lambda: now[0])
     asked = asyncio.create_task(desk.ticket(None, ""))
     running = asyncio.create_task(desk.run())
     try:

@@ -12,8 +12,8 @@ from livekit.api import TokenVerifier
 
 from robot_bridge.protocol.carriers import split_trailer
 from server.relay import desk
-from server.relay.desk import REVOKED
-from tests.server.rig import Rig, running_rig
+from server.relay.desk import ENDED
+from tests.server.rig import Rig, TestPeer, running_rig
 from tests.support.livekit_stand_in import KEY, SECRET, LiveKitStandIn, livekit_stand_in
 
 pytestmark = pytest.mark.timeout(120)
@@ -30,6 +30,21 @@ async def _ticket(rig: Rig, lost: str = "") -> dict[str, Any]:
             found: dict[str, Any] | None = answer.json()["relay"]
             if found is not None:
                 return found
+
+
+async def _with_token(rig: Rig) -> dict[str, Any]:
+    """As an observer that is connected gets it."""
+    peer, known = TestPeer(), set(rig.services.console.peers)
+    try:
+        await peer.join(rig, rig.token("observer"), ("session",), "/whep?relay=0")
+        (own,) = set(rig.services.console.peers) - known
+        stranger = await rig.http.get("/api/relay", params={"peer": own.id}, headers=rig.token("observer"))
+        assert stranger.json()["relay"]["token"] == "", "somebody else's peer is nobody's key"
+        answer = await rig.http.get("/api/relay", params={"peer": own.id}, headers=peer.headers)
+        found: dict[str, Any] = answer.json()["relay"]
+        return found
+    finally:
+        await peer.close()
 
 
 def _relay(server: LiveKitStandIn, **settings: Any) -> dict[str, Any]:
@@ -77,12 +92,13 @@ async def test_a_ticket_lets_in_to_watch_one_publication_and_the_next_one_has_an
     verifier = TokenVerifier(KEY, SECRET)
     async with livekit_stand_in() as server, running_rig(**_relay(server)) as rig:
         first = await _ticket(rig)
-        claims = verifier.verify(first["token"])
+        assert first["token"] == "", "nobody gets in who takes no part"
+        claims = verifier.verify((await _with_token(rig))["token"])
         assert claims.video is not None
         assert claims.video.room == f"demo-{first['feed']:x}" == server.members[0].room
         assert (claims.video.can_publish, claims.video.can_publish_data) == (False, False)
-        assert verifier.verify((await _ticket(rig))["token"]).identity != claims.identity
-        rig.services.relays._restart(REVOKED)
+        assert verifier.verify((await _with_token(rig))["token"]).identity != claims.identity
+        rig.services.relays._restart(ENDED)
         second = await _ticket(rig, f"0-{first['feed']}")
         assert second["feed"] != first["feed"]
         await server.until(lambda: [each.room for each in server.members] == [f"demo-{second['feed']:x}"])

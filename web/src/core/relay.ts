@@ -50,6 +50,11 @@ export function parseRelayAnswer(answer: unknown): RelayTicket | null {
   return null;
 }
 
+/** Whether it lets in; the first answer only says where. */
+export function hasKey(ticket: RelayTicket): boolean {
+  return (ticket.engine === "janus" ? ticket.pin : ticket.token) !== "";
+}
+
 function isStream(value: unknown): value is StreamInfo {
   if (!isRecord(value)) return false;
   const texts = ["mid", "stream", "label", "codec"].every((name) => typeof value[name] === "string");

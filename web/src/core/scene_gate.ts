@@ -6,8 +6,11 @@ import { eventsBehind } from "./words";
 /** A part of the 3D scene's stream that waits for its event. */
 interface HeldUpdate {
   readonly event: number;
-  readonly deliver: () => void;
+  readonly deliver: Deliver;
 }
+
+/** Lets an update through; null: it builds the scene and belongs to no event. `confirmShown` follows. */
+type Deliver = (event: number | null) => void;
 
 /**
  * Keeps the 3D scene at the event of the picture on screen. Updates of the scene say how it changed, so none may be
@@ -16,7 +19,7 @@ interface HeldUpdate {
 export interface SceneGate {
   readonly held: HeldUpdate[];
   tagged: number | null; // event of the newest update that came
-  shown: number | null; // event that the scene shows; null before it shows one
+  shown: number | null; // event that the scene says it shows; null before it shows one
   forced: number; // updates that could wait no longer: then the veil says what the scene shows
 }
 
@@ -39,11 +42,11 @@ export function offerUpdate(
   gate: SceneGate,
   event: number | null,
   due: number | "all" | null,
-  deliver: () => void,
+  deliver: Deliver,
 ): void {
   gate.tagged = event ?? gate.tagged;
   if (gate.tagged === null) {
-    deliver();
+    deliver(null);
     return;
   }
   gate.held.push({ event: gate.tagged, deliver });
@@ -105,6 +108,10 @@ function eventOfMessage(message: unknown): number | null {
 function deliverFirst(gate: SceneGate): void {
   const first = gate.held.shift();
   if (first === undefined) return;
-  gate.shown = first.event;
-  first.deliver();
+  first.deliver(first.event);
+}
+
+/** The scene shows what was let through. */
+export function confirmShown(gate: SceneGate, event: number | null): void {
+  if (event !== null) gate.shown = event;
 }

@@ -54,7 +54,7 @@ export class Keyboard {
   }
 
   /** Keys of a frame inside the page: only STOP passes. */
-  foreign(event: KeyboardEvent): void {
+  foreign(event: Pick<KeyboardEvent, "code" | "repeat">): void {
     if (STOP_KEYS.has(event.code) && !event.repeat) this.events.stop();
   }
 

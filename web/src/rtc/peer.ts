@@ -129,7 +129,7 @@ export class Peer {
       this.connection.close();
       if (this.isOver) this.line.close();
     }
-    void relay.watch(ticket);
+    void relay.watch();
   }
 
   /** For one picture. Nothing has to be asked first: a robot has a first camera or none. */

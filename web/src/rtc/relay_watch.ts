@@ -1,5 +1,5 @@
 import type { IceServer } from "../core/ice_servers";
-import type { RelayTicket } from "../core/relay";
+import { hasKey, type RelayTicket } from "../core/relay";
 import type { ConsoleApi } from "./console_api";
 import { relayLink, type RelayLink } from "./relay_link";
 import type { Section } from "./section";
@@ -7,6 +7,7 @@ import type { StampReader } from "./stamp_reader";
 
 const RETRY_MS = 500;
 const REQUEST_LIMIT_MS = 10_000;
+const WELCOME_MS = 20; // between two looks whether the welcome has come
 
 export interface RelayWatchEvents {
   feedback(data: unknown): void;
@@ -27,9 +28,9 @@ export class RelayWatch {
     private readonly events: RelayWatchEvents,
   ) {}
 
-  /** Until it is closed, or no relay is left. */
-  async watch(ticket: RelayTicket): Promise<void> {
-    let next: RelayTicket | null = ticket;
+  /** Until it is closed, or no relay is left. The console says what lets into one only to a peer that is connected. */
+  async watch(): Promise<void> {
+    let next = await this.another(null);
     while (next !== null && !this.isOver) {
       await this.through(next);
       next = await this.another(next);
@@ -72,15 +73,21 @@ export class RelayWatch {
     this.media?.close();
   }
 
-  private async another(lost: RelayTicket): Promise<RelayTicket | null> {
-    while (!this.isOver) {
-      try {
-        const limit = AbortSignal.timeout(REQUEST_LIMIT_MS);
-        return await this.api.relay(this.peer(), `${lost.relay}-${lost.feed}`, limit);
-      } catch {
-        await new Promise((resolve) => setTimeout(resolve, RETRY_MS)); // the console is away too
-      }
+  private async another(lost: RelayTicket | null): Promise<RelayTicket | null> {
+    for (let waitMs = 0; !this.isOver; waitMs = RETRY_MS) {
+      if (waitMs > 0) await new Promise((resolve) => setTimeout(resolve, waitMs)); // the console is away too
+      await this.connected();
+      const limit = AbortSignal.timeout(REQUEST_LIMIT_MS);
+      const answer = this.api.relay(this.peer(), lost === null ? "" : `${lost.relay}-${lost.feed}`, limit);
+      const ticket = await answer.catch(() => undefined);
+      if (ticket !== undefined && (ticket === null || hasKey(ticket))) return ticket;
     }
     return null;
+  }
+
+  /** Returns when the console has said which peer this is, or when it is over. */
+  private async connected(): Promise<void> {
+    while (!this.isOver && this.peer() === "")
+      await new Promise((resolve) => setTimeout(resolve, WELCOME_MS));
   }
 }

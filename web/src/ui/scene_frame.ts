@@ -1,49 +1,50 @@
-import { eventOfBatch, offerUpdate, resetSceneGate, type SceneGate } from "../core/scene_gate";
+import { confirmShown, eventOfBatch, offerUpdate, resetSceneGate, type SceneGate } from "../core/scene_gate";
 import { isRecord } from "../core/schema_check";
 
-declare global {
-  interface Window {
-    /** Called by the scene's frame before any script of its own (server/scene_proxy.py). */
-    lockstepScene?: (frame: Window & typeof globalThis) => void;
-  }
-}
+/** A key that was pressed while the scene's frame had the focus. */
+export type ForeignKey = Pick<KeyboardEvent, "code" | "repeat">;
 
-/** The scene is one view of many: viser's own notices, and on a small screen its panel, would cover it. */
-const STYLE = `.mantine-Notifications-root, .mantine-Notification-root { display: none !important; }
-@media (max-width: 767px) { .mantine-Paper-root { display: none !important; } }`;
+export interface SceneFrameEvents {
+  due(): number | "all" | null;
+  onkey(key: ForeignKey): void;
+}
 
 /**
- * Puts the gate between the scene's worker, which receives and decodes its stream, and its drawing. Both are viser's
- * own and know nothing of events.
+ * Lets the scene's changes through when their event is due. The scene is viser's own client, which knows nothing of
+ * events; its frame has an origin that is nobody's, so neither side reaches into the other. A script in the frame
+ * (server/scene_frame.js) keeps each change until it is told, and says when it was shown.
+ *
+ * Returns what takes the listener away.
  */
-export function gateScene(gate: SceneGate, due: () => number | "all" | null): void {
-  window.lockstepScene = (frame) => {
-    const style = frame.document.createElement("style");
-    style.textContent = STYLE;
-    frame.document.head.append(style);
-    frame.Worker = new Proxy(frame.Worker, {
-      construct(target, args: ConstructorParameters<typeof Worker>) {
-        const worker = new target(...args);
-        gateMessages(worker, gate, due);
-        return worker;
-      },
-    });
-  };
-}
-
-function gateMessages(worker: Worker, gate: SceneGate, due: () => number | "all" | null): void {
-  let handler: Worker["onmessage"] = null;
-  Object.defineProperty(worker, "onmessage", {
-    get: () => handler,
-    set: (wanted: Worker["onmessage"]) => (handler = wanted),
-  });
-  worker.addEventListener("message", (event: MessageEvent<unknown>) => {
-    const deliver = (): void => void handler?.call(worker, event);
-    const data = isRecord(event.data) ? event.data : {};
-    if (data["type"] === "message_batch") offerUpdate(gate, eventOfBatch(data["messages"]), due(), deliver);
-    else {
-      if (data["type"] === "connected") resetSceneGate(gate);
-      deliver();
+export function gateScene(
+  gate: SceneGate,
+  frame: () => Pick<Window, "postMessage"> | null,
+  events: SceneFrameEvents,
+  host: Pick<Window, "addEventListener" | "removeEventListener"> = window,
+): () => void {
+  const sent: { id: number; event: number | null }[] = [];
+  const listen = (message: MessageEvent<unknown>): void => {
+    const scene = frame();
+    if (scene === null || message.source !== scene || message.origin !== "null" || !isRecord(message.data))
+      return;
+    const { type, id, code, repeat, messages } = message.data;
+    if (type === "scene_key" && typeof code === "string") events.onkey({ code, repeat: repeat === true });
+    if (typeof id !== "number") return;
+    if (type === "scene_connected") {
+      sent.length = 0;
+      resetSceneGate(gate);
+    } else if (type === "scene_batch") {
+      offerUpdate(gate, eventOfBatch(messages), events.due(), (event) => {
+        sent.push({ id, event });
+        scene.postMessage({ type: "scene_deliver", id }, "*"); // its origin has no name
+      });
+    } else if (type === "scene_shown") {
+      for (let first = sent[0]; first !== undefined && first.id <= id; first = sent[0]) {
+        sent.shift();
+        confirmShown(gate, first.event);
+      }
     }
-  });
+  };
+  host.addEventListener("message", listen);
+  return () => host.removeEventListener("message", listen);
 }

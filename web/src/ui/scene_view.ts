@@ -3,7 +3,7 @@ import { eventGap } from "../core/serial";
 import type { GateContext } from "../core/medium_counts";
 import type { ConsoleApi } from "../rtc/console_api";
 import { button, h, setHidden, setText } from "./dom";
-import { gateScene } from "./scene_frame";
+import { gateScene, type ForeignKey } from "./scene_frame";
 
 type SceneState = "off" | "loading" | "on" | "failed" | "empty";
 
@@ -13,7 +13,7 @@ export interface SceneSurroundings {
   due(): number | "all" | null;
   context(): GateContext;
   /** Keys pressed while the frame has the focus, which the page itself never sees. */
-  onkey(event: KeyboardEvent): void;
+  onkey(key: ForeignKey): void;
 }
 
 /** `window.lockstep.scene()` */
@@ -45,7 +45,7 @@ export class SceneView {
   ) {
     this.element.append(h("div", "scene-idle", {}, this.words, this.open));
     this.show("off", IDLE_WORDS);
-    gateScene(this.gate, () => page.due());
+    gateScene(this.gate, () => this.frame?.contentWindow ?? null, page);
   }
 
   /** Opens the scene unless it is open, or there is nothing to show. */
@@ -106,8 +106,9 @@ export class SceneView {
   private embed(path: string): void {
     if (this.state !== "loading") return;
     resetSceneGate(this.gate);
-    this.frame = h("iframe", "scene-frame", { src: path, title: "3D scene of the robot" });
-    this.watchKeys(this.frame);
+    // Whatever runs in there has an origin that is nobody's; the console says the same of it (server/security.py).
+    const attributes = { src: path, title: "3D scene of the robot", sandbox: "allow-scripts" };
+    this.frame = h("iframe", "scene-frame", attributes);
     this.element.append(this.frame);
     this.openedMs = performance.now();
     this.show("on", "");
@@ -117,13 +118,6 @@ export class SceneView {
     this.frame?.remove();
     this.frame = null;
     resetSceneGate(this.gate);
-  }
-
-  /** The frame comes from our own origin, so its window can be listened to. */
-  private watchKeys(frame: HTMLIFrameElement): void {
-    frame.addEventListener("load", () => {
-      frame.contentWindow?.addEventListener("keydown", (event) => this.page.onkey(event), { capture: true });
-    });
   }
 
   private show(state: SceneState, words: string): void {

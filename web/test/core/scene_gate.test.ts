@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { GateContext } from "../../src/core/medium_counts";
 import {
+  confirmShown,
   createSceneGate,
   eventOfBatch,
   offerUpdate,
@@ -21,10 +22,14 @@ describe("the 3D scene", () => {
   it("waits for the picture of its event, and shows every change up to it in order", () => {
     const gate = createSceneGate();
     const shown: string[] = [];
-    offerUpdate(gate, null, null, () => shown.push("built"));
-    offerUpdate(gate, 5, 4, () => shown.push("5"));
-    offerUpdate(gate, null, 4, () => shown.push("5 too"));
-    offerUpdate(gate, 7, 4, () => shown.push("7"));
+    const show = (words: string) => (event: number | null) => {
+      shown.push(words);
+      confirmShown(gate, event);
+    };
+    offerUpdate(gate, null, null, show("built"));
+    offerUpdate(gate, 5, 4, show("5"));
+    offerUpdate(gate, null, 4, show("5 too"));
+    offerUpdate(gate, 7, 4, show("7"));
     expect([shown, gate.shown, gate.held.length]).toEqual([["built"], null, 3]);
     settleScene(gate, 6);
     expect([shown, gate.shown]).toEqual([["built", "5", "5 too"], 5]);
@@ -36,7 +41,7 @@ describe("the 3D scene", () => {
 
   it("goes on over the wrap of the event reference", () => {
     const gate = createSceneGate();
-    offerUpdate(gate, 1, MAX_EVENT, () => undefined);
+    offerUpdate(gate, 1, MAX_EVENT, (event) => confirmShown(gate, event));
     expect(gate.shown).toBeNull();
     settleScene(gate, 2);
     expect(gate.shown).toBe(1);
@@ -44,8 +49,15 @@ describe("the 3D scene", () => {
 
   it("keeps no more than so many changes: then it shows the oldest, and counts it", () => {
     const gate = createSceneGate();
-    for (let event = 1; event <= 210; event++) offerUpdate(gate, event, null, () => undefined);
+    for (let event = 1; event <= 210; event++)
+      offerUpdate(gate, event, null, (shown) => confirmShown(gate, shown));
     expect([gate.held.length, gate.forced, gate.shown]).toEqual([200, 10, 10]);
+  });
+
+  it("shows nothing that it does not say it shows", () => {
+    const gate = createSceneGate();
+    offerUpdate(gate, 3, 3, () => undefined);
+    expect([gate.held.length, gate.shown]).toEqual([0, null]);
   });
 
   it("forgets what waited when its stream begins anew", () => {
