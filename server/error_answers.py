@@ -1,6 +1,5 @@
 """How errors are answered over HTTP: by name, counted, and never cached."""
 
-import msgspec
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from prometheus_client import Counter
@@ -9,6 +8,7 @@ from starlette.types import Scope
 
 from server.errors import AccessError, ConsoleError, TooManyRequests, http_error
 from server.house import House
+from server.problem import PROBLEM_JSON, problem_body
 from server.services import Services
 
 __all__ = ["answer_errors", "count_refused"]
@@ -63,5 +63,5 @@ async def _answer_validation_error(request: Request, error: Exception) -> Respon
 
 def _error_response(request: Request, status: int, name: str, detail: str, headers: dict[str, str]) -> Response:
     _bad_input(request.app.state).labels("http", name).inc()
-    body = msgspec.json.encode({"error": name, "detail": detail})
-    return Response(body, status, {**headers, "Cache-Control": "no-store"}, media_type="application/json")
+    body = problem_body(status, name, detail)
+    return Response(body, status, {**headers, "Cache-Control": "no-store"}, media_type=PROBLEM_JSON)

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from urllib.parse import urlsplit
 
-import msgspec
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -14,6 +13,7 @@ from server.client_address import counted_address
 from server.connection_places import ConnectionPlaces, Place
 from server.errors import ConsoleError, HostRefused, InternalFault, TooManyRequests, http_error
 from server.guarded_http import PLACE
+from server.problem import PROBLEM_JSON, problem_body
 from server.rate_limits import RateLimits
 from server.request_turns import RequestTurns
 from server.robot_paths import below_robot
@@ -158,8 +158,8 @@ async def _refuse(scope: Scope, send: Send, error: ConsoleError) -> None:
         await send({"type": "websocket.close", "code": POLICY_VIOLATION})
         return
     entry = http_error(error)
-    body = msgspec.json.encode({"error": entry.name, "detail": error.detail})
-    headers = {"content-type": "application/json", "cache-control": "no-store", "content-length": str(len(body))}
+    body = problem_body(entry.status, entry.name, error.detail)
+    headers = {"content-type": PROBLEM_JSON, "cache-control": "no-store", "content-length": str(len(body))}
     headers |= {name.lower(): value for name, value in entry.headers.items()}
     raw = [(name.encode(), value.encode()) for name, value in headers.items()]
     await send({"type": "http.response.start", "status": entry.status, "headers": raw})

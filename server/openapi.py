@@ -4,6 +4,7 @@ FastAPI could only write one that knows no answers, since bodies are read with b
 """
 
 import json
+import re
 from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any, NamedTuple
@@ -58,6 +59,7 @@ from server.errors import (
     WrongMediaType,
 )
 from server.ice_servers import IceServers
+from server.problem import PROBLEM_JSON, Problem
 from server.relay.tickets import RelayAnswer
 from server.watch import WatchTicket
 
@@ -75,13 +77,6 @@ EVERYWHERE: Errors = (HostRefused, TooManyRequests)
 WITH_TOKEN: Errors = (TokenMissing, TokenInvalid, LinkExpired, LinkRevoked, LinkOtherRobot)
 WITH_BODY: Errors = (BodyTooLarge, BodyTooSlow)
 WITH_JSON: Errors = (BadJson, *WITH_BODY)
-
-
-class Problem(msgspec.Struct, frozen=True):
-    """Every error: a stable name, and words for a person."""
-
-    error: str
-    detail: str
 
 
 class Parameter(NamedTuple):
@@ -260,7 +255,12 @@ def openapi_document(operations: Sequence[Operation] = OPERATIONS) -> dict[str, 
 
 
 def _operation(operation: Operation) -> dict[str, Any]:
-    found: dict[str, Any] = {"summary": operation.summary, "responses": _responses(operation)}
+    found: dict[str, Any] = {
+        "operationId": operation_id(operation),
+        "tags": [_tag(operation.path)],
+        "summary": operation.summary,
+        "responses": _responses(operation),
+    }
     if operation.token:
         found["security"] = [{"token": []}]
     if operation.parameters:
@@ -271,6 +271,18 @@ def _operation(operation: Operation) -> dict[str, Any]:
     if operation.body is not None:
         found["requestBody"] = {"required": isinstance(operation.body, str), "content": _content(operation.body)}
     return found
+
+
+def operation_id(operation: Operation) -> str:
+    """For generated clients: the method and the words of the path, `post_api_stop`."""
+    words = [re.sub(r"\W+", "_", each).strip("_") for each in operation.path.split("/")]
+    return "_".join([operation.method, *filter(None, words)])
+
+
+def _tag(path: str) -> str:
+    """The group that documentation shows an operation in: "recordings" of /api/recordings/{id}."""
+    words = [each for each in path.split("/") if each and not each.startswith("{") and each != "api"]
+    return words[0] if words else "console"
 
 
 def _responses(operation: Operation) -> dict[str, Any]:
@@ -304,7 +316,7 @@ def _error(status: int, entries: list[HttpError]) -> dict[str, Any]:
     names = sorted(entry.name for entry in entries)
     schema = {"allOf": [_reference(Problem), {"properties": {"error": {"enum": names}}}]}
     always = set.intersection(*({*entry.headers} for entry in entries)) - {"Connection"}
-    found: dict[str, Any] = {"description": ", ".join(names), "content": {JSON: {"schema": schema}}}
+    found: dict[str, Any] = {"description": ", ".join(names), "content": {PROBLEM_JSON: {"schema": schema}}}
     if always:
         found["headers"] = {name: {"required": True, "schema": {"type": "string"}} for name in sorted(always)}
     return found

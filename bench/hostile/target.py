@@ -47,7 +47,7 @@ class Target(NamedTuple):
 
     def note(self, answer: httpx.Response) -> None:
         name = str(answer.status_code)
-        if answer.status_code >= 400 and answer.headers.get("content-type", "").startswith("application/json"):
+        if answer.status_code >= 400 and answer.headers.get("content-type", "").startswith("application/problem+json"):
             name = answer.json().get("error", name)
         self.seen[name] += 1
 

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import msgspec
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
@@ -12,6 +11,7 @@ from server.access import Access
 from server.errors import ConsoleError, http_error
 from server.front_door import FrontDoor, HostNames
 from server.page import page_router
+from server.problem import PROBLEM_JSON, problem_body
 from server.rate_limits import RateLimits
 from server.recording.library import FileLibrary
 from server.recording.service import RecordingService
@@ -56,5 +56,5 @@ async def _answer_validation_error(request: Request, error: Exception) -> Respon
 
 
 def _error(status: int, name: str, detail: str) -> Response:
-    body = msgspec.json.encode({"error": name, "detail": detail})
-    return Response(body, status, {"Cache-Control": "no-store"}, media_type="application/json")
+    body = problem_body(status, name, detail)
+    return Response(body, status, {"Cache-Control": "no-store"}, media_type=PROBLEM_JSON)

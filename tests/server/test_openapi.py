@@ -132,3 +132,21 @@ def test_every_operation_says_what_it_refuses(operation: Any) -> None:
     responses = openapi_document([operation])["paths"][operation.path][operation.method]["responses"]
     assert {"421", "429"} <= responses.keys()
     assert ("401" in responses) is operation.token
+
+
+def test_every_operation_has_an_id_of_its_own_and_a_group() -> None:
+    found = [each for path in openapi_document()["paths"].values() for each in path.values()]
+    ids = [each["operationId"] for each in found]
+    assert len(set(ids)) == len(ids)
+    assert "post_api_stop" in ids
+    assert all(each["tags"] for each in found)
+
+
+async def test_an_error_is_problem_details_with_its_stable_name() -> None:
+    async with running_rig() as rig:
+        refused = await rig.http.get("/api/session")
+        assert refused.headers["content-type"] == "application/problem+json"
+        said = refused.json()
+        assert (said["type"], said["title"], said["status"]) == ("about:blank", "Unauthorized", 401)
+        assert said["error"] == "unauthorized"
+        assert said["detail"]

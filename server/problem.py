@@ -1,0 +1,30 @@
+"""The body of every error over HTTP: problem details (RFC 9457), with the error's stable name besides."""
+
+from http import HTTPStatus
+
+import msgspec
+
+__all__ = ["PROBLEM_JSON", "Problem", "problem_body"]
+
+PROBLEM_JSON = "application/problem+json"
+
+
+class Problem(msgspec.Struct, frozen=True, kw_only=True):
+    """`error` is what a program decides by; `title` and `detail` are for people."""
+
+    error: str  # stable name, "link_down"
+    detail: str  # what exactly was wrong
+    type: str = "about:blank"  # RFC 9457 4.2.1: the title is that of the status
+    title: str
+    status: int
+
+
+def problem_body(status: int, error: str, detail: str) -> bytes:
+    return msgspec.json.encode(Problem(error=error, detail=detail, title=_title(status), status=status))
+
+
+def _title(status: int) -> str:
+    try:
+        return HTTPStatus(status).phrase
+    except ValueError:
+        return "Error"
