@@ -222,6 +222,7 @@ async def _answering_peer(
         pc,
         offer,
         priority=identity.role == "operator",
+        waits=identity.role == "observer",
         trailer=trailer,
         thumbnail=thumbnail,
         voice=None if line is None else line.take,

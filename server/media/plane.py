@@ -191,6 +191,7 @@ class MediaPlane:
         offer_sdp: str,
         *,
         priority: bool,
+        waits: bool = False,
         trailer: bool,
         thumbnail: bool = False,
         voice: Callable[[VoicePacket], None] | None = None,
@@ -199,11 +200,11 @@ class MediaPlane:
 
         The i-th video section gets the i-th camera, the i-th audio section the i-th microphone; sections without
         one, or without a codec in common, are answered inactive. `priority` is for the operator: served first and at
-        once. `trailer` asks for the trailer carrier; otherwise the offer's header extensions decide. `thumbnail`: the
-        first camera alone, in the lowest tier. `voice` takes the peer's own sound, from the first audio section in
-        which it would only send.
+        once. `waits`: its datagrams take observers' turns. `trailer` asks for the trailer carrier; otherwise the
+        offer's header extensions decide. `thumbnail`: the first camera alone, in the lowest tier. `voice` takes the
+        peer's own sound, from the first audio section in which it would only send.
         """
-        self._guard(pc, None if priority else self._turns)
+        self._guard(pc, self._turns if waits else None)
         extensions = offered_extensions(offer_sdp)
         sources: dict[str, Iterator[AnyStream]] = {
             kind: iter([stream for stream in self._streams.values() if stream.kind == kind][: 1 if thumbnail else None])

@@ -178,7 +178,7 @@ async def viewing(
         await pc.setLocalDescription(await pc.createOffer())
         offer = with_extensions(pc.localDescription.sdp, uris or {})
         await server.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-        media = plane.attach(server, offer, priority=priority, trailer=trailer, thumbnail=thumbnail)
+        media = plane.attach(server, offer, priority=priority, waits=not priority, trailer=trailer, thumbnail=thumbnail)
         await server.setLocalDescription(await server.createAnswer())
         answer = server.localDescription.sdp
         viewer = Viewer(pc, server, media, answer)
