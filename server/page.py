@@ -1,5 +1,10 @@
 """Serves the page that Vite built, and says how to build it when it is not there."""
 
+import asyncio
+import gzip
+import mimetypes
+import os
+import re
 from pathlib import Path
 
 from fastapi import APIRouter, Request
@@ -11,6 +16,9 @@ __all__ = ["WEB_DIST", "page_router"]
 
 WEB_DIST = Path(__file__).parent / "web_dist"
 
+PACKED = (".css", ".js", ".md", ".svg", ".txt")  # what is worth compressing; fonts are already
+SMALLEST = 1000  # bytes; less is one packet anyway
+
 NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Lockstep</title>
 <body style="font: 18px/1.5 system-ui; background: #10141a; color: #d7dde5; max-width: 40em; margin: 4em auto">
 <h1>The page is not built yet</h1>
@@ -18,6 +26,31 @@ NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Locks
 <pre>make setup</pre><p>or by hand with</p><pre>cd web &amp;&amp; npm ci &amp;&amp; npm run build</pre>
 <p>and load this page again. The headless client and any WHEP player work without it.</p>
 """
+
+
+class _PackedFiles:
+    """Files compressed once, when they are first asked for, and kept: as many as were built."""
+
+    def __init__(self) -> None:
+        self._packed: dict[Path, tuple[int, bytes]] = {}
+
+    async def response(self, found: Path, changed: int, headers: dict[str, str]) -> Response:
+        """`changed`: when `found` was, to know whether what is kept is still that file."""
+        known = self._packed.get(found)
+        if known is None or known[0] != changed:
+            known = changed, await asyncio.to_thread(lambda: gzip.compress(found.read_bytes(), mtime=0))
+            self._packed[found] = known
+        kind = mimetypes.guess_type(found.name)[0] or "application/octet-stream"
+        return Response(known[1], media_type=kind, headers={**headers, "Content-Encoding": "gzip"})
+
+
+def _takes_gzip(request: Request) -> bool:
+    """RFC 9110 12.5.3; a quality of 0 is a no."""
+    for each in request.headers.get("accept-encoding", "").split(","):
+        name, _, parameter = each.strip().partition(";")
+        if name.strip().lower() in ("gzip", "*"):
+            return re.fullmatch(r"\s*q=0(\.0*)?\s*", parameter) is None
+    return False
 
 
 def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_robot: bool = True) -> APIRouter:
@@ -31,6 +64,7 @@ def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_rob
     """
     router = APIRouter()
     root = directory.resolve()
+    packed = _PackedFiles()
 
     def page(name: str) -> Response:
         if not (root / name).is_file():
@@ -54,6 +88,10 @@ def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_rob
             raise NotFound("no such page")
         hashed = path.startswith("assets/")
         caching = "public, max-age=31536000, immutable" if hashed else "no-cache"
-        return FileResponse(found, headers={"Cache-Control": caching})
+        headers = {"Cache-Control": caching, "Vary": "Accept-Encoding"}
+        state = os.stat(found)
+        if found.suffix in PACKED and state.st_size >= SMALLEST and _takes_gzip(request):
+            return await packed.response(found, state.st_mtime_ns, headers)
+        return FileResponse(found, headers=headers)
 
     return router

@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import httpx
@@ -8,11 +9,11 @@ from server.errors import NotFound
 from server.page import page_router
 
 
-async def _get(directory: Path, path: str) -> httpx.Response:
+async def _get(directory: Path, path: str, encoding: str = "identity") -> httpx.Response:
     app = FastAPI()
     app.include_router(page_router(directory))
     async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://console") as http:
-        return await http.get(path)
+        return await http.get(path, headers={"Accept-Encoding": encoding})
 
 
 @pytest.fixture
@@ -35,6 +36,39 @@ async def test_the_page_is_never_cached_and_its_hashed_assets_always(built: Path
     assert "immutable" in asset.headers["cache-control"]
     assert "javascript" in asset.headers["content-type"]
     assert (await _get(built, "/icon.svg")).headers["cache-control"] == "no-cache"
+
+
+@pytest.mark.parametrize(
+    ("encoding", "packed"),
+    [
+        ("gzip, br", True),
+        ("br, GZIP;q=0.5", True),
+        ("*", True),
+        ("gzip;q=0", False),
+        ("gzip; q=0.0", False),
+        ("br", False),
+    ],
+)
+async def test_a_large_text_comes_compressed_to_whoever_takes_that(built: Path, encoding: str, packed: bool) -> None:
+    text = "let x = 1;\n" * 1000
+    (built / "assets" / "big-1a2b.js").write_text(text)
+    found = await _get(built, "/assets/big-1a2b.js", encoding)
+    assert (found.text, found.headers["vary"]) == (text, "Accept-Encoding")
+    assert found.headers.get("content-encoding") == ("gzip" if packed else None)
+    assert (int(found.headers["content-length"]) < len(text) / 10) is packed
+    assert "immutable" in found.headers["cache-control"]
+    assert "javascript" in found.headers["content-type"]
+
+
+async def test_a_file_that_was_built_again_is_not_the_old_one(built: Path) -> None:
+    app = FastAPI()
+    app.include_router(page_router(built))
+    file = built / "assets" / "big-1a2b.js"
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://console") as http:
+        for number in range(2):
+            file.write_text(f"let x = {number};\n" * 1000)
+            os.utime(file, ns=(number, number))
+            assert (await http.get("/assets/big-1a2b.js", headers={"Accept-Encoding": "gzip"})).text == file.read_text()
 
 
 @pytest.mark.parametrize("path", ["/nothing", "/assets", "/..%2fsecret", "/%2e%2e/secret", "/assets/..%2f..%2fsecret"])
