@@ -12,11 +12,7 @@ from aiortc.rtcsctptransport import DataChunk, ForwardTsnChunk, InboundStream
 from robot_bridge.protocol.messages import Ping, Pong
 from server import peer_guards_private
 from server.peer_guards_private import (
-<<<<<<< HEAD
     CHECK_BURST,
-    ENOUGH_GAPS,
-=======
->>>>>>> 8aba030 (Page: compressed from memory, one style sheet; docs: what lasted, where the first picture's time goes; given-up chunks are passed over sooner)
     MAX_ADDRESSES,
     MAX_GAPS,
     MAX_STREAMS,
