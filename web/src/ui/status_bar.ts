@@ -48,7 +48,9 @@ export function createStatusBar(app: ConsoleApp, toggleDetails: () => void, news
       const audible = app.room.isAudible();
       setHidden(sound, app.room.sounds.size === 0);
       setPressed(sound, audible);
-      setText(soundText, audible ? "Sound on" : "Turn on sound");
+      const soundWords = audible ? "Sound on" : "Turn on sound";
+      setText(soundText, soundWords);
+      if (sound.ariaLabel !== soundWords) sound.ariaLabel = soundWords; // small screens show no text on it
       const loudest = Math.max(0, ...[...app.room.sounds.values()].map((stream) => stream.level()));
       level.style.setProperty("--level", loudest.toFixed(2));
     },
