@@ -51,14 +51,47 @@
     return worker;
   };
 
-  // viser fetches a part of itself from a data: URL, which the page's policy lets nobody do.
-  const WASM = "data:application/wasm;base64,";
+  // viser fetches parts of itself, code and a picture, from data: URLs, which the page's policy lets nobody do.
+  const PART = /^data:(application\/wasm|image\/[a-z+]+);base64,/;
   const fetched = window.fetch;
   window.fetch = async (resource, options) => {
-    if (typeof resource !== "string" || !resource.startsWith(WASM)) return fetched(resource, options);
-    const bytes = Uint8Array.from(atob(resource.slice(WASM.length)), (each) => each.charCodeAt(0));
-    return new Response(bytes, { headers: { "Content-Type": "application/wasm" } });
+    const url = resource instanceof Request ? resource.url : String(resource);
+    const part = PART.exec(url);
+    if (part === null) return fetched(resource, options);
+    const bytes = Uint8Array.from(atob(decodeURIComponent(url.slice(part[0].length))), (each) => each.charCodeAt(0));
+    return new Response(bytes, { headers: { "Content-Type": part[1] } });
   };
 
-  window.Worker = new Proxy(window.Worker, { construct: (target, args) => gate(new target(...args)) });
+  // In an origin that is nobody's, Chromium starts no module worker from a blob: URL that another thread has made. So
+  // the worker is a plain one, which makes such a URL itself and imports it; messages wait until it has.
+  const STARTER = `const early = [];
+self.onmessage = (event) => early.push(event.data);
+self.addEventListener("message", ({ data }) => {
+  early.length = 0;
+  import(URL.createObjectURL(data)).then(() => {
+    for (const each of early) self.dispatchEvent(new MessageEvent("message", { data: each }));
+  });
+}, { once: true });`;
+  const blobs = new Map(); // by URL
+  const makeUrl = URL.createObjectURL.bind(URL);
+  URL.createObjectURL = (object) => {
+    const url = makeUrl(object);
+    blobs.set(url, object);
+    return url;
+  };
+  const revokeUrl = URL.revokeObjectURL.bind(URL);
+  URL.revokeObjectURL = (url) => {
+    blobs.delete(url);
+    revokeUrl(url);
+  };
+
+  const start = (Worker, url, options) => {
+    const code = options?.type === "module" ? blobs.get(String(url)) : undefined;
+    if (code === undefined) return new Worker(url, options);
+    const worker = new Worker(makeUrl(new Blob([STARTER], { type: "text/javascript" })));
+    worker.postMessage(code);
+    return worker;
+  };
+
+  window.Worker = new Proxy(window.Worker, { construct: (target, args) => gate(start(target, ...args)) });
 })();
