@@ -1,6 +1,7 @@
 """`lockstep robot`: run a bridge."""
 
 import asyncio
+import contextlib
 import faulthandler
 import json
 import logging
@@ -165,7 +166,8 @@ def _mjcf(path: Path) -> Robot:
 async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings, as_json: bool) -> None:
     stopping = asyncio.Event()
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # SIGHUP: its terminal was closed
+    # SIGHUP: its terminal was closed; SIGQUIT: Ctrl-\ there.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         loop.add_signal_handler(number, stopping.set)
     async with Bridge(make(), settings) as bridge:
         _announce(name, bridge, "tcp" if settings.tls is None else "tls", as_json)
@@ -185,6 +187,9 @@ def _announce(name: str, bridge: Bridge, scheme: str, as_json: bool) -> None:
     url = f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
     typer.echo(json.dumps({"robot": url}) if as_json else f"{name} at {url}")
     sys.stdout.flush()
+    if as_json:  # whoever reads that line may never read on, and a full pipe would hold up the ticks
+        with contextlib.suppress(OSError):
+            os.dup2(2, 1)  # what is printed from now on goes where the log goes
 
 
 def main() -> None:

@@ -157,7 +157,8 @@ def load(call: str) -> Callable[[], None]:
 
 
 def main() -> None:
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # a service manager ends the bridge, and this by it
+    # A service manager ends the bridge, and this by it.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     act = load(sys.argv[1])

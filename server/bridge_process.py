@@ -1,13 +1,14 @@
 """Runs a robot bridge as a process of its own, beside the console: what a robot renders never holds up a command."""
 
 import asyncio
-import json
 import os
 import shutil
 import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+
+import msgspec
 
 import robot_bridge
 from server.backoff import Backoff
@@ -133,13 +134,30 @@ class BridgeProcess:
             raise BridgeFailed(None)
         try:
             async with asyncio.timeout(START_TIMEOUT):
-                line = await process.stdout.readline()
-                if not line:
-                    raise BridgeFailed(await process.wait())
+                while True:
+                    with suppress(ValueError):  # a line that is too long, and gone
+                        line = await process.stdout.readline()
+                        if not line:
+                            raise BridgeFailed(await process.wait())
+                        if (address := _address_in(line)) is not None:
+                            return address
         except TimeoutError as error:
             raise BridgeFailed(None) from error
-        address: str = json.loads(line)["robot"]
-        return address
+
+
+class _Announcement(msgspec.Struct):
+    robot: str
+
+
+_announcement = msgspec.json.Decoder(_Announcement)
+
+
+def _address_in(line: bytes) -> str | None:
+    """None: something else, such as what a robot's library prints."""
+    try:
+        return _announcement.decode(line).robot
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return None
 
 
 def _meaning(code: int) -> str:

@@ -3,6 +3,7 @@
 import faulthandler
 import logging
 import os
+import ssl
 import sys
 from collections.abc import Mapping
 from enum import StrEnum
@@ -348,6 +349,8 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
         raise typer.Exit(EXIT_PORT_TAKEN) from error
     except (StateDirUnusable, BadFleet, BoardUnusable) as error:
         raise _usage(str(error)) from error
+    except ssl.SSLError as error:
+        raise _usage(f"tls_cert and tls_key are no certificate chain and its key: {error}") from error
     except BridgeFailed as error:
         say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error

@@ -25,6 +25,7 @@ __all__ = ["MAX_SECONDS", "Invitation", "Invitations", "may_invite"]
 
 MAX_LIVE = 500
 MAX_KEPT = 5000  # with those that ended lately
+FOR_SUPERVISORS = 0.1  # of both: an operator who makes links without end shuts nobody else out
 MIN_SECONDS = 60.0
 MAX_SECONDS = 366 * 24 * 3600.0
 SHOWN_AFTER_END = 24 * 3600.0  # s that an ended one stays in the list
@@ -98,10 +99,7 @@ class Invitations:
                 raise NotAllowed("your own link is not good for all of these robots")
         if not MIN_SECONDS <= seconds <= MAX_SECONDS:
             raise BadParameter(f"a link is good for {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
-        if sum(each.is_good(now) for each in self._known.values()) >= MAX_LIVE:
-            raise TooManyInvitations(f"there are {MAX_LIVE} already; revoke some first")
-        if by is not None and len(self._known) >= MAX_KEPT:
-            raise TooManyInvitations(f"{MAX_KEPT} are remembered, most of which ended; make one on the command line")
+        self._check_room(by, now)
         expires = now + seconds if by is None else min(now + seconds, by.expires)
         return self._add(
             Invitation(
@@ -115,6 +113,14 @@ class Invitations:
                 robots=tuple(sorted(set(robots))),
             )
         )
+
+    def _check_room(self, by: Identity | None, now: float) -> None:
+        share = 1.0 if by is None or by.role == "supervisor" else 1.0 - FOR_SUPERVISORS
+        live, kept = int(MAX_LIVE * share), int(MAX_KEPT * share)
+        if sum(each.is_good(now) for each in self._known.values()) >= live:
+            raise TooManyInvitations(f"there are {live} already; revoke some first")
+        if by is not None and len(self._known) >= kept:
+            raise TooManyInvitations(f"{kept} are remembered, most of which ended; make one on the command line")
 
     def for_start(self, role: Role, seconds: float, now: float) -> Invitation:
         """The link that the console prints: the same one at every start until half of its time is over."""

@@ -6,6 +6,7 @@ that cannot be read is a stop too: whoever pressed meant it.
 
 import hashlib
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -72,7 +73,8 @@ class KeptStops:
                 return press
         except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
             log.error("a kept stop cannot be read", error="kept_stop_unreadable", path=path.name, detail=str(error))
-        os.replace(path, self._path(path.stem))
+        with suppress(OSError):  # then it is found, and said, at the next start too
+            os.replace(path, self._path(path.stem))
         return Press(id=path.stem, reason=UNREADABLE)
 
     def _path(self, press: str) -> Path:

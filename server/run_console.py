@@ -8,6 +8,7 @@ import socket
 import sys
 from collections.abc import Coroutine, Mapping
 from contextlib import suppress
+from pathlib import Path
 
 import typer
 from fastapi import FastAPI
@@ -25,7 +26,7 @@ from server.robot_connection import RobotConnection
 from server.serve import running, wait_for_signal
 from server.settings import Settings
 from server.state import ConsoleState
-from server.state_dir import StateDirUnusable, default_state_dir
+from server.state_dir import StateDirUnusable
 from server.tls import Certificate, ends_at, fingerprint, own_names, self_signed
 
 __all__ = ["run_console", "say"]
@@ -46,7 +47,7 @@ async def run_console(
     Args:
         bridges: of our own, by the robots' names; "" is the only robot of a console
     """
-    certificate = _certificate(settings)
+    certificate = _certificate(settings, state.directory.path)
     stopping = asyncio.get_running_loop().create_task(wait_for_signal())
     try:
         addresses = await _unless(stopping, _start(bridges))
@@ -115,16 +116,17 @@ def _calm_garbage_collection() -> None:
     gc.set_threshold(*GC_THRESHOLDS)
 
 
-def _certificate(settings: Settings) -> Certificate | None:
-    """What to encrypt HTTP with; None: not at all."""
+def _certificate(settings: Settings, directory: Path) -> Certificate | None:
+    """What to encrypt HTTP with; None: not at all. Raises StateDirUnusable."""
     if settings.tls_cert is not None and settings.tls_key is not None:
         return Certificate(settings.tls_cert, settings.tls_key)
     if not settings.tls:
         return None
     names = own_names(settings.host) | set(settings.tls_names) | set(settings.own_names) | set(own_addresses())
-    certificate = self_signed(
-        settings.state_dir or default_state_dir(), names - {"*"}, datetime.datetime.now(datetime.UTC)
-    )
+    try:
+        certificate = self_signed(directory, names - {"*"}, datetime.datetime.now(datetime.UTC))
+    except OSError as error:
+        raise StateDirUnusable(directory, f"{error.filename}: {error.strerror}") from error
     say(f"the certificate is our own; its SHA-256 fingerprint is {fingerprint(certificate)}")
     return certificate
 

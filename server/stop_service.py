@@ -423,7 +423,8 @@ class StopService:
     # background
 
     async def run(self) -> None:
-        """Until cancelled: what has no answer in time."""
+        """Until cancelled: what has no answer in time. Looks at once: an earlier run may have ended by a fault."""
+        self._wake.set()
         while True:
             await self._wake.wait()
             self._wake.clear()

@@ -21,7 +21,7 @@ from server.services import Services
 from server.settings import Settings
 from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
-from server.stop_presses import AlreadyTaken, Press
+from server.stop_presses import AlreadyTaken, NewPress, Press
 from server.stop_service import KEPT, StopAnswer, StopOutcome
 
 __all__ = ["FleetSession"]
@@ -89,6 +89,8 @@ class FleetSession:
         log.warning("stop kept", by=press.by.name, where=press.where, reason=press.reason, robot=self.name)
         if isinstance(pressed, AlreadyTaken):
             return StopAnswer(StopOutcome(press.id, pressed.taken), 0, up=False)
+        if isinstance(pressed, NewPress) and pressed.replaced is not None:
+            stops.settled(pressed.replaced.id)
         stops.keep(press)
         unwritten = await stops.written(press.id)
         detail = f"the session of this robot has failed; {KEPT}"

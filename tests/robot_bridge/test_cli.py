@@ -46,6 +46,23 @@ async def test_it_prints_its_address_once_ready_and_leaves_cleanly(how: signal.S
     assert json.loads(log.read_text().splitlines()[0])["kind"] == "start"
 
 
+async def test_what_is_printed_after_the_address_holds_up_nothing_when_nobody_reads_it() -> None:
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "robot_bridge", "planar", "--port", "0", "--json"),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    try:
+        assert process.stdout is not None
+        async with asyncio.timeout(20):
+            await process.stdout.readline()
+            assert await process.stdout.read() == b""  # its end: what follows goes to the log
+        assert process.returncode is None
+    finally:
+        process.terminate()
+        await process.wait()
+
+
 def test_an_unknown_robot_is_answered_with_those_there_are() -> None:
     result = CliRunner().invoke(cli.robot_app, ["tractor", "--port", "0"])
     assert result.exit_code == 2

@@ -258,6 +258,7 @@ class _Process:
         ("command", signal.SIGTERM),
         ("command", signal.SIGINT),
         ("command", signal.SIGHUP),
+        ("command", signal.SIGQUIT),
         ("tasks-cancelled", signal.SIGTERM),
         ("loop-closed", signal.SIGTERM),
     ],

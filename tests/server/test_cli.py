@@ -117,6 +117,41 @@ async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], 
     assert "a-password" not in err
 
 
+async def test_a_certificate_that_is_none_is_said_in_one_line(tmp_path: Path) -> None:
+    garbage = tmp_path / "garbage.pem"
+    garbage.write_text("garbage")
+    code, out, err = await _run("serve", "--port", "0", "--tls-cert", str(garbage), "--tls-key", str(garbage))
+    assert (code, out) == (2, "")
+    assert "tls_cert and tls_key are no certificate chain" in err
+    assert "Traceback" not in err
+
+
+async def test_a_place_that_takes_no_certificate_of_our_own_is_said_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "tls-key.new").mkdir()
+    code, out, err = await _run("serve", "--port", "0", "--tls", "self-signed", "--state-dir", str(tmp_path))
+    assert (code, out) == (2, "")
+    assert "the state directory cannot be used" in err
+    assert "Traceback" not in err
+
+
+async def test_without_a_state_directory_the_console_of_one_run_has_a_certificate_too(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    process = await asyncio.create_subprocess_exec(
+        *(LOCKSTEP, "serve", "--port", "0", "--tls", "self-signed", "--state-dir", str(tmp_path / "file" / "state")),
+        stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    try:
+        assert process.stderr is not None
+        async with asyncio.timeout(PATIENCE):
+            while "waiting for the robot" not in (line := (await process.stderr.readline()).decode()):
+                assert line, "the console has ended"
+    finally:
+        if process.returncode is None:
+            process.terminate()
+        await process.communicate()
+
+
 async def test_up_runs_several_robots_each_with_a_name_and_ends_them_all(tmp_path: Path) -> None:
     async with running_fleet(tmp_path, {"left": "planar", "right": "planar"}) as fleet:
         assert set(fleet.robots) == {"left", "right"}

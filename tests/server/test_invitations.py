@@ -1,9 +1,10 @@
+import msgspec
 import pytest
 
 from robot_bridge.protocol.console import Role
 from server.access import Identity
 from server.errors import BadParameter, NotAllowed, NotFound, TooManyInvitations
-from server.invitations import MAX_LIVE, MAX_SECONDS, SHOWN_AFTER_END, Invitation, Invitations
+from server.invitations import MAX_KEPT, MAX_LIVE, MAX_SECONDS, SHOWN_AFTER_END, Invitation, Invitations
 
 NOW = 1_000_000.0
 HOUR = 3600.0
@@ -61,6 +62,22 @@ def test_they_are_bounded_and_revoked_or_expired_ones_do_not_count() -> None:
     known.revoke(None, made[0].id, NOW)
     known.invite(None, "observer", "", HOUR, NOW)
     known.invite(None, "observer", "", HOUR, NOW + 2 * HOUR)
+
+
+def test_an_operator_who_makes_links_without_end_leaves_room_for_supervisors() -> None:
+    operator, supervisor = _person("operator"), _person("supervisor", "other")
+    known = Invitations([])
+    for _ in range(MAX_LIVE - MAX_LIVE // 10):
+        known.invite(operator, "observer", "", HOUR, NOW)
+    with pytest.raises(TooManyInvitations):
+        known.invite(operator, "observer", "", HOUR, NOW)
+    made = known.invite(supervisor, "operator", "", HOUR, NOW)
+    ended = [msgspec.structs.replace(made, id=str(number), revoked_at=NOW) for number in range(MAX_KEPT)]
+    for kept, who in ((0, None), (1, supervisor), (MAX_KEPT // 10 + 1, operator)):
+        if who is not None:
+            with pytest.raises(TooManyInvitations):
+                Invitations(ended[kept - 1 :]).invite(who, "observer", "", HOUR, NOW)
+        Invitations(ended[kept:]).invite(who, "observer", "", HOUR, NOW)
 
 
 def test_an_operator_sees_and_revokes_what_it_invited_and_a_supervisor_everything() -> None:

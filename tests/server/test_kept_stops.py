@@ -58,6 +58,22 @@ def test_a_file_that_cannot_be_read_is_a_stop_too_and_goes_when_that_has_arrived
     assert kept.load() == []
 
 
+def test_a_file_that_can_neither_be_read_nor_moved_hides_no_other_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = _kept(tmp_path)
+    kept.keep(_press("a"))
+    (path,) = (tmp_path / "kept-stops").rglob("*.json")
+    path.write_bytes(b"{")
+    kept.keep(_press("b", 1.0))
+
+    def refuse(*args: object) -> None:
+        raise OSError("read-only")
+
+    monkeypatch.setattr(os, "replace", refuse)
+    assert [press.reason for press in kept.load()] == [UNREADABLE, "smoke"]
+
+
 def test_a_file_that_was_half_written_is_not_taken_for_a_stop(tmp_path: Path) -> None:
     kept = _kept(tmp_path)
     kept.keep(_press("a"))

@@ -273,6 +273,29 @@ async def test_what_a_link_that_lives_does_not_answer_is_sent_again_by_itself(
     assert {cast(Stop, each).press for each in bench.robot.sent} == {"a"}
 
 
+async def test_after_a_fault_of_ours_a_stop_without_an_answer_is_sent_again_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(tmp_path)
+    bench.press("ann", "a")
+    sends = bench.robot.send_stop
+
+    def fail(stop: Stop) -> bool:
+        raise RuntimeError("a fault of ours")
+
+    monkeypatch.setattr(stop_service, "AGAIN_SECONDS", 0.0)
+    monkeypatch.setattr(bench.robot, "send_stop", fail)
+    with pytest.raises(RuntimeError):
+        await bench.service.run()
+    monkeypatch.setattr(bench.robot, "send_stop", sends)
+    before = len(bench.robot.sent)
+    again = asyncio.create_task(bench.service.run())
+    async with asyncio.timeout(PATIENCE):
+        while len(bench.robot.sent) == before:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+    again.cancel()
+
+
 async def test_a_bridge_that_starts_anew_is_told_of_the_stop_that_held(bench: Bench) -> None:
     bench.press("ann", "a")
     bench.take("a", 1)

@@ -11,7 +11,7 @@ from server.audit import Actor
 from server.fleet.tiles import FAILED
 from server.media.plane import MediaPlane
 from server.recording.recorder import Recorder
-from server.stop_presses import new_press
+from server.stop_presses import MAX_PENDING, new_press
 from tests.server.fleet.rig import FleetRig, drive_once, running_fleet, running_fleet_rig
 from tests.server.rig import PATIENCE, eventually, reset_by_http, running_bridge, stop_words
 
@@ -130,6 +130,25 @@ async def test_a_stop_that_the_robot_has_not_heard_of_outlives_a_session_that_fa
                 kept, sent = _stops(rig, "left")
                 assert kept == ("Ann", "stop, not delivered yet")
                 assert sent[1].startswith(f"stop, sent again, stop {clock.stop.number}")
+
+
+async def test_stops_without_end_at_a_robot_whose_session_has_failed_fill_no_disk(
+    faults: Faults, tmp_path: Path
+) -> None:
+    def files() -> int:
+        return len(list(tmp_path.rglob("kept-stops/*/*.json")))
+
+    async with running_bridge() as gone:
+        port = gone.address[1]
+    async with running_fleet({"left": port}, state_dir=tmp_path) as rig:
+        await faults.end(rig, "left")
+        session = rig.fleet.sessions["left"]
+        presses = [new_press(Actor("Ann"), "http", "smoke") for _ in range(3 * MAX_PENDING)]
+        await asyncio.gather(*(session.stop(press) for press in presses))
+        await eventually(lambda: files() >= MAX_PENDING)
+        last = new_press(Actor("Ann"), "http", "the last")
+        assert not (await session.stop(last)).outcome.delivered
+        await eventually(lambda: files() == MAX_PENDING)
 
 
 async def test_a_robot_whose_directory_cannot_be_made_is_without_a_session_and_the_others_run(tmp_path: Path) -> None:

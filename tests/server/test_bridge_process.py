@@ -1,0 +1,36 @@
+import sys
+from pathlib import Path
+
+import pytest
+
+from server import bridge_process
+from server.bridge_process import BridgeFailed, BridgeProcess
+
+ADDRESS = "tcp://127.0.0.1:4711"
+
+
+def _bridge(directory: Path, prints: str) -> BridgeProcess:
+    """One whose interpreter prints this, and stays."""
+    python = directory / "python"
+    python.write_text(f"#!{sys.executable}\nimport sys, time\n{prints}\nsys.stdout.flush()\ntime.sleep(600)\n")
+    python.chmod(0o700)
+    return BridgeProcess("planar", "127.0.0.1", 0, [], "secret", lambda _: None, str(python))
+
+
+@pytest.mark.parametrize("first", ["a banner", '{"robot": 1}', "[]", "{" * 3000, "x" * 100_000, "\\xff"])
+async def test_what_a_robots_library_prints_first_is_not_taken_for_its_address(tmp_path: Path, first: str) -> None:
+    announcement = f'{{"robot": "{ADDRESS}"}}'
+    bridge = _bridge(tmp_path, f"print({first!r})\nprint({announcement!r})")
+    try:
+        assert await bridge.start() == ADDRESS
+    finally:
+        await bridge.close()
+
+
+async def test_a_bridge_that_prints_something_and_no_address_has_not_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bridge_process, "START_TIMEOUT", 0.5)
+    bridge = _bridge(tmp_path, "print('no address')")
+    with pytest.raises(BridgeFailed, match="did not start in time"):
+        await bridge.start()
