@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench.emulator import Constant, Impairment, Network, Uniform, even_profile, independent
-from client import CommandRefused, Console, ConsoleLost
+from client import CommandRefused, Console, ConsoleLost, StopUnconfirmed
 from tests.client.truth import collecting, drawn_event, executed_after, until_logged
 from tests.support.stack import Stack, running_stack
 
@@ -97,7 +97,7 @@ async def test_a_console_that_dies_is_noticed_in_bounded_time(tmp_path: Path) ->
                 await anext(console.pictures())
             with pytest.raises(ConsoleLost):
                 await anext(console.feedbacks())
-            with pytest.raises(ConsoleLost):
+            with pytest.raises(StopUnconfirmed, match="no answer from"):
                 await console.stop("gone")
         await _until_gone(stack.robot)
 

@@ -68,14 +68,18 @@ async def _later(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> 
 
 
 FLOODING = """
-import contextlib, socket, sys, time
+import contextlib, os, socket, sys, time
+
+os.nice(10)  # it stands for another machine, which takes no processor time of the bridge's
 
 host, says = sys.argv[1], bytes.fromhex(sys.argv[5])
 port, rate, kept = int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4])
 sockets, made, began = [], 0, time.monotonic()
 print("floods", flush=True)
 while True:
-    while made < (time.monotonic() - began) * rate:
+    due = (time.monotonic() - began) * rate
+    made = max(made, due - rate / 20)  # what a busy machine held up for longer is not made good at once
+    while made < due:
         made += 1
         connection = socket.socket()
         connection.setblocking(False)
@@ -127,7 +131,7 @@ async def test_a_console_gets_its_link_every_time(tls: bool, host: str, says: by
         SlowPath(bridge.address) as path,
         flood(bridge.address, host, says),
     ):
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(40):
             while not bridge.counters.endings["full"] + bridge.counters.bad_input["tls"]:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         for _ in range(10):

@@ -73,7 +73,7 @@ def test_the_address_may_stand_in_a_file_whose_faults_are_named(tmp_path: Path) 
 
 def test_without_the_package_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(BoardUnusable, match=r"lockstep\[redis\]"):
+    with pytest.raises(BoardUnusable, match=r"pip install -e '\.\[redis\]'"):
         check_board(BoardSettings(board="redis://h"), "https://h")  # type: ignore[arg-type]
 
 

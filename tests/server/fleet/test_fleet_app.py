@@ -41,19 +41,23 @@ async def test_the_overview_shows_what_every_robot_does() -> None:
 
 async def test_what_one_robot_keeps_lies_in_a_directory_of_its_own() -> None:
     async with running_fleet_rig("left", "right") as rig:
-        started = await rig.http.post("/robots/left/api/recordings", headers=rig.token("operator"), json={})
+        observer, operator = (
+            rig.token("observer"),
+            rig.token("operator"),
+        )  # a link reads what is recorded while it is good
+        started = await rig.http.post("/robots/left/api/recordings", headers=operator, json={})
         assert started.status_code == 201
         ended = await rig.http.post("/robots/left/api/recordings/stop", headers=rig.token("operator"))
         assert ended.status_code == 200
         robots = rig.state.directory.path / "robots"
         assert len(list((robots / "left" / "recordings").glob("*.mcap"))) == 1
         listed = {
-            name: (await rig.http.get(f"/robots/{name}/api/recordings", headers=rig.token("observer"))).json()
+            name: (await rig.http.get(f"/robots/{name}/api/recordings", headers=observer)).json()
             for name in ("left", "right")
         }
         assert [len(listed[name]["recordings"]) for name in listed] == [1, 0]
         one = listed["left"]["recordings"][0]["id"]
-        ticket = await rig.http.post(f"/robots/left/api/recordings/{one}/ticket", headers=rig.token("operator"))
+        ticket = await rig.http.post(f"/robots/left/api/recordings/{one}/ticket", headers=operator)
         path = ticket.json()["path"]
         assert path.startswith(f"/robots/left/api/recordings/{one}/file?ticket=")
         assert (await rig.http.get(path)).status_code == 200

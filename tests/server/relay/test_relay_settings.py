@@ -94,5 +94,5 @@ def test_a_livekit_needs_a_key_and_a_secret_that_is_long_enough() -> None:
 
 def test_without_its_client_a_livekit_is_refused_with_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(relay_settings, "find_spec", lambda name: None if name == "livekit.rtc" else object())
-    with pytest.raises(ValidationError, match=r"pip install 'lockstep\[livekit\]'"):
+    with pytest.raises(ValidationError, match=r"pip install -e '\.\[livekit\]'"):
         Settings(relay=LIVEKIT, **KEYS)  # type: ignore[arg-type]

@@ -52,7 +52,7 @@ def test_bytes_that_are_no_model_are_refused(tmp_path: Path) -> None:
 
 def test_the_command_says_why_and_ends(tmp_path: Path) -> None:
     result = CliRunner().invoke(cli.robot_app, ["--mjcf", str(tmp_path / "nobody.xml"), "--port", "0"])
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "nobody.xml does not exist" in result.output
 
 
