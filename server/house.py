@@ -59,13 +59,26 @@ class House:
 
     async def run(self) -> None:
         """Until cancelled: act on what other processes have changed about the links, and on links that expire."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._look_on(), name="links end")
+            tasks.create_task(self._keep_time(), name="newest time")  # a disk that hangs holds up no end of a link
+
+    async def _look_on(self) -> None:
+        while True:
+            await asyncio.sleep(CHECK_SECONDS)
+            try:
+                self.enforce(self.state.invitations.refresh(), COMMAND_LINE)
+            except Exception as error:
+                self.metrics.faults.caught("links", error)
+
+    async def _keep_time(self) -> None:
+        """Once in a while, and whenever a link has expired."""
         store, loop = self.state.invitations, asyncio.get_running_loop()
         looked = store.now()
         keep_at = loop.time()
         while True:
             await asyncio.sleep(CHECK_SECONDS)
             try:
-                self.enforce(store.refresh(), COMMAND_LINE)
                 now = store.now()
                 expired = any(looked < each.expires <= now for each in store.known.all)
                 looked = now

@@ -50,11 +50,11 @@ MAX_WAITING = 2048  # audit records that could not be shared yet; then the oldes
 BATCH = 256
 STOP_PATIENCE = 2.0  # s for all who have the robots to answer
 STOP_AGAIN = 0.4  # s until it is asked again
-MAX_STOPS = 32  # different ones under way
+MAX_STOPS = 32  # different ones whose answers are waited for; what is more is sent once
 NEWS_AT_ONCE = 20  # messages, then a pause: a flood of news takes no more than its share of the loop
 NEWS_PAUSE = 0.01
 FAREWELL_SECONDS = 0.5
-TOO_MANY = StopAnswer(False, False, 0, "not confirmed: too many stops are under way")
+TOO_MANY = StopAnswer(False, False, 0, "not confirmed: sent, but too many stops are under way")
 
 
 class RedisBoard:
@@ -137,12 +137,13 @@ class RedisBoard:
         wanted, by = tuple(sorted(set(robots))), press.by
         if not wanted:
             return {}
-        if self._desk.waiting >= MAX_STOPS:
-            return dict.fromkeys(wanted, TOO_MANY)
         request = StopRequest(
             console=self.id, request=secrets.token_hex(8), robots=wanted, by=by.name[:60], role=by.role[:60],
             link=by.link[:64], reason=press.reason[:500], press=press.id,
         )  # fmt: skip
+        if self._desk.waiting >= MAX_STOPS:
+            await self._say(request)
+            return dict.fromkeys(wanted, TOO_MANY)
         asked = self._desk.ask(request)
         try:
             with suppress(TimeoutError):
@@ -304,12 +305,15 @@ class RedisBoard:
     async def _ask(self, request: StopRequest, complete: asyncio.Event) -> None:
         """Until all have answered; Redis forgets news that nobody hears, so it is asked more than once."""
         while not complete.is_set():
-            if self._store is not None:
-                with suppress(BoardError):  # the session notices too
-                    await self._store.tell(self._pack(request))
+            await self._say(request)
             with suppress(TimeoutError):
                 async with asyncio.timeout(STOP_AGAIN):
                     await complete.wait()
+
+    async def _say(self, request: StopRequest) -> None:
+        if self._store is not None:
+            with suppress(BoardError):  # the session notices too
+                await self._store.tell(self._pack(request))
 
     def _unconfirmed(self, robot: str) -> StopAnswer:
         if self._unknown_since is not None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import re
+import threading
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -304,6 +305,32 @@ async def test_a_link_that_expires_ends_its_peers_and_says_so_by_name() -> None:
         assert rig.count("lockstep_peers_ended_total", why="link expired") == 1
         answer = await rig.http.get("/api/session", headers={"Authorization": f"Bearer {token}"})
         assert (answer.status_code, answer.json()["error"]) == (401, "link_expired")
+
+
+async def test_a_disk_that_hangs_holds_up_the_end_of_no_link(monkeypatch: pytest.MonkeyPatch) -> None:
+    hangs, ends = threading.Event(), threading.Event()
+
+    def hang(store: InvitationStore) -> None:
+        hangs.set()
+        ends.wait()
+
+    monkeypatch.setattr(InvitationStore, "keep_time", hang)
+    async with running_rig() as rig:
+        try:
+            async with asyncio.timeout(PATIENCE):
+                while not hangs.is_set():  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            token = rig.access.sign(Identity("observer", "x", "id", time.time() + 2.5), time.time())
+            peer = TestPeer()
+            try:
+                await peer.join(rig, {"Authorization": f"Bearer {token}"}, ("control", "session", "stop"))
+                async with asyncio.timeout(PATIENCE):
+                    await peer.closed.wait()
+                assert not ends.is_set()
+            finally:
+                await peer.close()
+        finally:
+            ends.set()
 
 
 async def test_who_brings_a_token_of_another_console_is_never_told_what_is_wrong_with_it() -> None:

@@ -71,6 +71,20 @@ async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(
         assert answers["left"].detail.startswith("not confirmed: other consoles are unknown (unreachable")
 
 
+async def test_a_flood_of_stops_keeps_nobody_elses_stop_from_the_robot(
+    server: RedisServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(redis_board, "MAX_STOPS", 1)
+    async with running_board(server.url, "one", tile("left")) as one, running_board(server.url, "two") as two:
+        await eventually(two.others, "the robot")
+        flood = asyncio.create_task(two.stop(["nobodys"], new_press(Actor("Mallory"), "http", "")))
+        await asyncio.sleep(0)
+        answers = await two.stop(["left"], new_press(ANN, "http", "smoke"))
+        assert not answers["left"].confirmed
+        await eventually(lambda: one.host.stops == [("left", "Ann", "smoke")], "the stop")
+        flood.cancel()
+
+
 async def test_audit_records_of_all_consoles_are_merged_by_time(server: RedisServer) -> None:
     def record(n: int, time: float) -> AuditRecord:
         return AuditRecord(n=n, time=time, kind="note", who="Ann", detail="ä\nb")
