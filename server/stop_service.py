@@ -139,6 +139,8 @@ class StopService:
         self._deadlines: dict[str, float] = {}  # press -> until when its answer is waited for
         self._sent_at = 0.0  # when all that is pending was sent last
         self._wake = asyncio.Event()
+        if self._late:
+            self._wake.set()  # the link for commands may be another console's: then nothing else sends these
         self._news = asyncio.Event()  # replaced at every answer
         keeper.on_trouble = self._trouble_changed
 
@@ -262,6 +264,7 @@ class StopService:
             if self._presses.again(press):
                 self._late.add(press.id)
                 self._keeper.keep(press)
+                self._wake.set()
         self._settle(self._resets.link_down("the robot bridge was started anew"))
 
     def taken(self, taken: StopTaken) -> None:

@@ -19,6 +19,7 @@ __all__ = ["Mark", "MarkFinder", "MarkKind"]
 
 MarkKind = Literal["contact", "refusal", "stop", "reset", "seat", "note", "fault", "link"]
 REFUSAL_SPACING = 1_000_000  # µs
+STOP_SPACING = 1_000_000  # µs between marks of further stops, while one holds
 RELEASE_SHARE = 0.6  # of the threshold: a contact ends below it, so that a trembling force is one
 
 
@@ -36,6 +37,8 @@ class MarkFinder:
         self._threshold = _threshold(description)
         self._touching = False
         self._stopped = False
+        self._stop_number = 0  # of the newest stop that is known
+        self._last_stop = -math.inf
         self._faults: list[str] = []
         self._holder: str | None = None  # None: not known yet
         self._link = ""
@@ -64,10 +67,7 @@ class MarkFinder:
 
     def _feedback(self, record: FeedbackRecord, arrived: int) -> list[Mark]:
         found: list[Mark] = []
-        if record.stop.stopped != self._stopped:
-            self._stopped = record.stop.stopped
-            words = f"{record.stop.by}: {record.stop.reason}".strip(": ")
-            found.append(Mark(record.event, arrived, "stop" if self._stopped else "reset", words))
+        found += self._stop(record, arrived)
         if record.faults != self._faults:
             found += [Mark(record.event, arrived, "fault", text) for text in record.faults if text not in self._faults]
             self._faults = record.faults
@@ -79,6 +79,21 @@ class MarkFinder:
             elif self._touching and force < RELEASE_SHARE * self._threshold:
                 self._touching = False
         return found
+
+    def _stop(self, record: FeedbackRecord, arrived: int) -> list[Mark]:
+        stop = record.stop
+        newer, self._stop_number = stop.number > self._stop_number, max(stop.number, self._stop_number)
+        if stop.stopped != self._stopped:
+            self._stopped = stop.stopped
+            words = f"{stop.by}: {stop.reason}".strip(": ")
+            self._last_stop = arrived
+            return [Mark(record.event, arrived, "stop" if self._stopped else "reset", words)]
+        if newer and stop.stopped and arrived - self._last_stop >= STOP_SPACING:
+            self._last_stop = (
+                arrived  # its reset and the next stop came between two feedbacks, or somebody pressed again
+            )
+            return [Mark(record.event, arrived, "stop", f"again, stop {stop.number}")]
+        return []
 
     def _refusal(self, record: RefusalRecord, arrived: int) -> list[Mark]:
         if arrived - self._last_refusal < REFUSAL_SPACING:

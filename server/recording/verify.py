@@ -31,9 +31,9 @@ CheckName = Literal[
     "complete",  # no event is missing, and the recorder left nothing out
     "monotonic",  # `s` never decreases, and everything is of one epoch
     "once",  # every event comes from one forwarded command, and executes once
-    "in_time",  # no command executes later than max_event_age after the feedback that it answers
+    "in_time",  # no command executes later than max_event_age after the feedback that it answers, and has seen
     "seat",  # commands are forwarded for the seat's holder alone
-    "stopped",  # and not while the robot is stopped
+    "stopped",  # and not while the robot is stopped, or a stop is on its way to it
     "stamps",  # no picture or sound is stamped newer than it is
     "rendered",  # the operator's page rendered nothing beyond its tolerance
     "signed",  # everything is what was signed, to its end; or nothing is signed
@@ -52,6 +52,7 @@ CHECKS: tuple[CheckName, ...] = (
 )
 TICK = 0.25  # s from the decision to execute until the feedback's own time: a tick and the measurement, with room
 ROUNDING = 2e-6  # s; times in the file are rounded to ns, capture times of sound to a sample
+MANY_PRESSES = 64  # on their way; of more some share an answer, and the oldest of them may have none of their own
 MOST = 50  # violations of a check that are listed
 
 
@@ -87,6 +88,50 @@ class _Answered(msgspec.Struct):
 
     times: dict[int, float]  # s, the bridge's clock
     stopped: dict[int, bool]
+    nonces: dict[int, int]  # 0 in recordings of before there were any
+
+
+class _Stops:
+    """Whether a stop is on its way to the robot. In recordings of before there were numbers, a stop has no press."""
+
+    def __init__(self) -> None:
+        self.shown = 0  # number of the newest that a feedback has shown
+        self._asked: dict[str, None] = {}  # presses that the robot has not taken, oldest first
+        self._taken = 0  # number of the newest that it has
+        self._asked_without_id = False
+
+    @property
+    def coming(self) -> bool:
+        return bool(self._asked) or self._asked_without_id or self._taken > self.shown
+
+    def record(self, record: StopRecord) -> str:
+        """What is wrong with it; "" for nothing."""
+        if record.kind == "stop":
+            if record.press:
+                self._asked[record.press] = None
+            else:
+                self._asked_without_id = True
+        elif record.kind == "taken":
+            self._take(record)
+        elif not record.number:
+            self._asked_without_id = False
+        elif record.number < self.shown:
+            return f"a reset of stop {record.number} had effect, and stop {self.shown} is newer"
+        return ""
+
+    def _take(self, taken: StopRecord) -> None:
+        self._taken = max(self._taken, taken.number)
+        while len(self._asked) > MANY_PRESSES and (oldest := next(iter(self._asked))) != taken.press:
+            del self._asked[oldest]
+        self._asked.pop(taken.press, None)
+
+    def feedback(self, feedback: FeedbackRecord) -> str:
+        """As `record`."""
+        stop, shown = feedback.stop, self.shown
+        self.shown = max(shown, stop.number)
+        if stop.stopped:
+            self._asked_without_id = False
+        return f"stop {stop.number} is shown after stop {shown}" if stop.number < shown else ""
 
 
 class Verifier:
@@ -99,7 +144,8 @@ class Verifier:
         self._first_times: dict[int, float] = {}  # by event, s, the bridge's clock
         self._offset = 0  # ns from the bridge's clock to the recording's
         self._holder: str | None = None  # None: not known yet
-        self._stop_asked = self._stopped = False
+        self._stops = _Stops()
+        self._stopped = False
         self._in_flight: CommandRecord | None = None
         self._linked = True
         self._waiting: list[tuple[str, int, int, float]] = []  # stamped with an event whose feedback is not here yet
@@ -133,10 +179,9 @@ class Verifier:
                 self._in_flight = None
             case SeatRecord():
                 self._holder = record.holder
-            case StopRecord(kind="stop"):
-                self._stop_asked = True
-            case StopRecord(kind="reset"):
-                self._stop_asked = False
+            case StopRecord():
+                if wrong := self._stops.record(record):
+                    self.fail("stopped", wrong, record.event, micros)
             case RefusalRecord(by="robot", refused=refused) if self._in_flight is not None:
                 if refused in (0, self._in_flight.event):
                     self._in_flight = None
@@ -156,7 +201,7 @@ class Verifier:
         if self._holder is not None and command.peer != self._holder:
             holds = f"{self._holder!r} holds the seat" if self._holder else "nobody holds the seat"
             self.fail("seat", f"a command of {command.peer!r} went to the robot while {holds}", command.event, micros)
-        if self._stop_asked or self._stopped:
+        if self._stops.coming or self._stopped:
             self.fail("stopped", "a command went to the robot while it was stopped", command.event, micros)
         if self._in_flight is not None:
             self.fail(
@@ -164,7 +209,16 @@ class Verifier:
             )
         if self._newest is not None and command.event != event_after(self._newest.event):
             self.fail("once", f"a command that is not the next after event {self._newest.event}", command.event, micros)
+        self._judge_nonce(command, micros)
         self._in_flight = command
+
+    def _judge_nonce(self, command: CommandRecord, micros: int) -> None:
+        """Whoever drives has seen what the command answers."""
+        known = None if self._newest is None else self._answered.get(self._newest.event)
+        nonce = 0 if known is None else known.nonces.get(command.issue, 0)
+        if nonce and command.nonce != nonce:
+            text = f"its nonce is not that of issue {command.issue}, which it answers"
+            self.fail("in_time", text, command.event, micros)
 
     def _feedback(self, feedback: FeedbackRecord, micros: int, captured: int) -> None:
         before = self._newest
@@ -181,16 +235,17 @@ class Verifier:
             return
         self._newest = feedback
         self._stopped = feedback.stop.stopped
-        if self._stopped:
-            self._stop_asked = False
+        if wrong := self._stops.feedback(feedback):
+            self.fail("stopped", wrong, feedback.event, micros)
         known = self._answered[feedback.event]
         known.times[feedback.issue] = feedback.time
         known.stopped[feedback.issue] = feedback.stop.stopped
+        known.nonces[feedback.issue] = feedback.nonce
         self._settle_stamps(feedback.event)
 
     def _begin(self, feedback: FeedbackRecord) -> None:
         """The first of the file: what was before is not known."""
-        self._answered = {feedback.event: _Answered({}, {})}
+        self._answered = {feedback.event: _Answered({}, {}, {})}
         if feedback.issue == 1:
             self._first_times[feedback.event] = feedback.time
 
@@ -216,8 +271,8 @@ class Verifier:
         elif self._commands > 0 or self._events > 1:  # the very first may have been sent before the file began
             self.fail("once", f"event {event} was executed without a forwarded command", event, micros)
         self._answered = {
-            before.event: self._answered.get(before.event, _Answered({}, {})),
-            event: _Answered({}, {}),
+            before.event: self._answered.get(before.event, _Answered({}, {}, {})),
+            event: _Answered({}, {}, {}),
         }
         self._first_times[event] = feedback.time
 

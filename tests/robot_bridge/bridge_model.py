@@ -32,6 +32,7 @@ class MotionWitness:
     def __init__(self) -> None:
         self.given: list[int] = []  # numbers of stops, in order
         self.stopped_at = 0.0
+        self.shown = 0  # newest stop that a feedback has said to hold
         self.holds = False  # a stop holds
         self.locked = False
         self.neutral = False  # a neutral command executed since the last cause, as an answer to what came after it
@@ -49,6 +50,7 @@ class MotionWitness:
         """A reset takes effect."""
         assert number == self.given[-1], "a reset that does not name the newest stop took effect"
         assert now - self.stopped_at >= LEAST_STOP - EXACT, "a stop was shorter than it may be"
+        assert self.shown == number, "a reset took effect before a feedback had shown its stop"
         assert not self.locked, "a reset took effect while the robot was locked"
         self.holds = False
         self.cause()
@@ -110,6 +112,8 @@ class BridgeModel:
             return []
         feedback = self.core.issue(MEASURED, self.now)
         self.witness.seen += 1
+        if feedback.stop.stopped:
+            self.witness.shown = feedback.stop.number
         self.issued[feedback.nonce] = self.witness.seen
         assert feedback.stop.stopped == self.witness.holds, "the feedback says something else than what holds"
         assert feedback.neutral_needed != self.witness.neutral, "the feedback is wrong about the neutral command"
@@ -169,9 +173,9 @@ class BridgeModel:
         self.acknowledged = {} if self._disk is None else dict(self._disk.latch.presses)
         if not self._keeps:
             self.witness.holds = False
+        resets = self._disk is not None and not self._disk.latch.stopped  # a reset had reached the disk
         self._begin()
         if self._keeps and held:
-            resets = self._disk is not None and not self._disk.latch.stopped
             assert self.witness.holds or (in_order and resets), "a restart released a stop"
 
     # inside

@@ -1,268 +1,339 @@
-"""The life of a STOP through the real core of the bridge, the real desk, presses and seat, in any order of events.
+"""Random lives of a STOP, from the press to the next motion, through the real cores of the console and the bridge.
 
-What is on its way between console and bridge is a list that a lost link empties. Nothing waits for real time.
+Most rules are whole spells ("a second passes, and somebody resets"), so that a life gets from a stop to the next
+motion again and again; the others disturb it between any two messages.
 """
 
-from hypothesis import settings
+from collections.abc import Callable, Iterator
+
+import pytest
+from hypothesis import event, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from robot_bridge.event_core import EventCore, Executed
-from robot_bridge.protocol.description import Axis, RobotDescription
-from robot_bridge.protocol.messages import Command, Feedback, Stop, StopTaken
-from robot_bridge.protocol.serial import event_after
-from robot_bridge.robots.base import Measurement
-from robot_bridge.stop_latch import ResetTaken, StopLatch, StopRecord
-from server.command_desk import CommandDesk, Forward
-from server.event_clock import EventClock
-from server.seat import ControlSeat, SeatTimes
-from server.stop_presses import NewPress, Press, StopPresses
+from robot_bridge.protocol.messages import Command, Reset
+from robot_bridge.protocol.serial import MAX_EVENT, event_after
+from tests.robot_bridge.core_helpers import NEUTRAL
+from tests.safety.stop_world import LINKS, MOVE, PEOPLE, Link, World
 
-ROBOT = RobotDescription(
-    name="r", label="R", axes=(Axis(name="x", label="x", unit="m/s", minimum=-1, maximum=1, slew=1, brake=1),)
-)
-MEASURED = Measurement(axes=[0.0], joints=[], wrench=[], ranges=[], at_rest=True, faults=[])
-REST, MOVE = [0.0], [0.5]
-people = st.sampled_from(["ann", "bob"])
+people = st.sampled_from(list(PEOPLE))
+links = st.sampled_from(LINKS)
+few = st.integers(0, 3)
+mostly = st.sampled_from([True, True, True, False])
+seldom = st.sampled_from([False, False, False, True])
 
 
 class StopLife(RuleBasedStateMachine):
-    @initialize()
-    def start(self) -> None:
-        self.now = 100.0
-        self.pressed = 0
-        self.made: list[str] = []  # every press, ever
-        self.delivered: dict[str, int] = {}  # press -> number that its presser was told
-        self.record: StopRecord | None = None  # the bridge's disk
-        self.epochs = 0
-        self.up = False
-        self.released = True  # nobody has stopped it since a reset that named the newest stop
-        self.neutral = False  # and a neutral command was executed after that
-        self.holder = ""
-        self.console_starts()
-        self.bridge_starts()
-        self.link_up()
-        self.sit("ann", supervisor=False)
-        self.drive_on(neutral_first=True)  # so that what undoes a stop would show as motion at once
+    @initialize(first_event=st.sampled_from([1, MAX_EVENT - 2]))
+    def begin(self, first_event: int) -> None:
+        self.world = World(first_event=first_event)
+        self.sent: list[Command] = []
+        self.world.arm_and_drive()  # so that what undoes a stop shows as motion at once
+        assert self.world.bridge.driven
 
-    def bridge_starts(self) -> None:
-        self.latch = StopLatch(self.record)
-        self.core = EventCore(ROBOT.axes, max_event_age=2.0)
-        self.core.begin(self.latch)
-        self.core.issue(MEASURED, self.now)
-        self.neutral = False
+    def teardown(self) -> None:
+        if hasattr(self, "world"):
+            event(f"moved again after a stop: {min(self.world.moved, 3)}")
+            self.world.close()
 
-    def console_starts(self, kept: list[Press] | None = None) -> None:
-        self.clock, self.seat, self.presses = EventClock(), ControlSeat(SeatTimes()), StopPresses()
-        self.desk = CommandDesk(self.clock, self.seat, self.presses)
-        for press in kept or []:
-            self.presses.again(press)
-        self.to_bridge: list[Command | Stop] = []
-        self.to_console: list[Feedback | StopTaken] = []
-
-    # links
+    # spells
 
     @rule()
-    def link_up(self) -> None:
-        if self.up:
-            return
-        self.up = True
-        epoch = str(self.epochs)
-        if epoch != self.clock.epoch:
-            held = self.clock.stop
-            if held.stopped and held.press:
-                self.presses.again(Press(id=held.press))
-            self.desk.epoch_ends()
-            self.clock.begin(epoch)
-        self.to_bridge += [press.message() for press in self.presses.pending]
-        self.desk.link_up(ROBOT)
-        self.core.need_neutral()
-        self.neutral = False
-        self.issue()
+    def somebody_arms_and_drives(self) -> None:
+        self.world.arm_and_drive()
 
     @rule()
-    def link_down(self) -> None:
-        self.up, self.to_bridge, self.to_console = False, [], []
-        self.desk.link_down()
+    def the_holder_goes_on_with_the_held_stick(self) -> None:
+        self.world.drive(MOVE)
+
+    @rule(person=people, http=st.booleans())
+    def somebody_stops_it(self, person: str, http: bool) -> None:
+        self.world.press(person, http=http)
+        self.world.pump()
+
+    @rule(person=st.sampled_from(["sue", "sue", "ann", "bob"]), http=st.booleans())
+    def a_second_passes_and_somebody_resets(self, person: str, http: bool) -> None:
+        self.world.let_a_second_pass_and_reset(person, http=http)
+
+    @rule(held=st.booleans(), http=st.booleans())
+    def all_is_put_right_and_somebody_drives_on(self, held: bool, http: bool) -> None:
+        """With the stick held all the while nothing moves; with a neutral command in between it does, after all."""
+        world = self.world
+        world.bridge.disk_fails = world.disk.fails = False
+        world.bridge.unlock()
+        for link in LINKS:
+            world.connect(link)
+        world.wait(2.0)  # what has no answer is sent again, and resets may be asked for again
+        world.pump()
+        world.let_a_second_pass_and_reset("sue", http=http)
+        assert not world.bridge.witness.holds, "nobody can release it"
+        if not world.console.holder:
+            world.console.sit("bob")
+        if held:
+            world.drive(MOVE)
+        world.drive(NEUTRAL, MOVE)
+        assert world.bridge.driven, "nobody can drive it"
+        assert not world.console.keeper.presses.pending, "a press waits though all is up"
+
+    @rule(person=people, seconds=st.sampled_from([0.0, 0.5, 0.98]))
+    def somebody_stops_it_and_resets_at_once(self, person: str, seconds: float) -> None:
+        self.world.press(person)
+        self.world.pump()
+        self.world.wait(seconds)
+        self.world.reset("sue")
+        self.world.pump()
+
+    @rule(person=people)
+    def somebody_resets_a_stop_that_no_feedback_has_shown(self, person: str) -> None:
+        world = self.world
+        world.pump()
+        world.press(person)
+        world.arrive("operator")
+        world.wait(1.1)
+        world.to_bridge["operator"].append(Reset(number=world.bridge.core.stop_state.number))
+        world.arrive("operator")
+        world.write()
+
+    @rule(first=people, second=people, arrives=few)
+    def two_press_while_the_link_is_lost(self, first: str, second: str, arrives: int) -> None:
+        self.world.press(first)
+        self.world.press(second, http=True)
+        self.world.lose_all(arrives)
+        self.world.wait(1.1)
+
+    @rule(person=people, link=links, in_order=st.booleans())
+    def a_stop_arrives_and_the_bridge_ends_before_its_disk_has_it(
+        self, person: str, link: Link, in_order: bool
+    ) -> None:
+        self.world.press(person)
+        self.world.arrive(link)
+        self.world.restart_bridge(in_order=in_order)
 
     @rule()
-    def restart_bridge(self) -> None:
-        self.link_down()
-        self.record = self.latch.record
-        self.epochs += 1
-        self.bridge_starts()
+    def a_stop_comes_while_a_reset_waits_for_the_disk(self) -> None:
+        world = self.world
+        world.pump()
+        world.wait(1.1)
+        world.reset("sue")
+        world.arrive("operator")
+        world.press("bob")
+        world.arrive("operator")
+        world.pump()
 
-    @rule()
-    def restart_console(self) -> None:
-        self.link_down()
-        self.console_starts(self.presses.pending)
-
-    # people
-
-    @rule(person=people, supervisor=st.booleans())
-    def sit(self, person: str, supervisor: bool) -> None:
-        if supervisor:
-            self.seat.take(person, "supervisor", self.now)
+    @rule(cause=st.sampled_from(["held up", "unlocked", "operator"]))
+    def a_neutral_command_is_on_its_way_when_something_holds_the_robot(self, cause: str) -> None:
+        world = self.world
+        world.pump()
+        if world.console.holder:
+            world.command(world.console.holder, NEUTRAL)
+        if cause == "held up":
+            world.bridge.held_up()
+        elif cause == "unlocked":
+            world.bridge.lock("key switch")
+            world.bridge.unlock()
         else:
-            self.seat.request(person, "operator", self.now)
-        if self.seat.holder != self.holder:
-            self.holder = self.seat.holder
-            self.desk.abandon()
+            world.bridge.operator_comes()
+        world.drive(MOVE)
 
-    @rule(again=st.booleans())
-    def press(self, again: bool) -> None:
-        if again and self.made:
-            name = self.made[-1]
-        else:
-            self.pressed += 1
-            name = f"press {self.pressed}"
-            self.made.append(name)
-        if isinstance(self.presses.press(Press(id=name)), NewPress) and self.up:
-            self.to_bridge.append(Stop(press=name))
+    @rule(person=st.sampled_from(["sue", "ann"]), arrives=few)
+    def the_robot_is_locked_while_somebody_resets(self, person: str, arrives: int) -> None:
+        self.world.bridge.lock("key switch")
+        self.world.let_a_second_pass_and_reset(person)
 
-    @rule(offset=st.integers(-1, 1), seconds=st.sampled_from([0.0, 0.5, 1.5]))
-    def reset(self, offset: int, seconds: float) -> None:
-        """By somebody with the right, who names this or another stop, soon or later. It arrives after what was sent."""
-        if not self.up or self.presses.pending:
-            return  # the console refuses it
-        self.arrive(len(self.to_bridge))
-        self.now += seconds
-        number = max(0, self.clock.stop.number + offset)
-        newest = self.core.stop_state.number
-        if isinstance(self.core.reset(number, self.now), ResetTaken):
-            assert number == newest
-            self.released, self.neutral = True, False
+    # single steps
 
-    @rule(person=people, values=st.sampled_from([REST, MOVE]), stale=st.booleans(), forged=st.booleans())
-    def command(self, person: str, values: list[float], stale: bool, forged: bool) -> None:
-        feedback = self.clock.feedback
-        if feedback is None:
+    @rule(person=people, again=seldom, http=st.booleans())
+    def press(self, person: str, again: bool, http: bool) -> None:
+        self.world.press(person, again=again, http=http)
+
+    @rule(person=people, offset=st.sampled_from([0, 0, -1, 1]), http=st.booleans())
+    def reset(self, person: str, offset: int, http: bool) -> None:
+        self.world.reset(person, offset, http=http)
+
+    @rule(person=people, values=st.sampled_from([NEUTRAL, MOVE]))
+    def command(self, person: str, values: list[float]) -> None:
+        self.world.command(person, values)
+
+    @rule(values=st.sampled_from([NEUTRAL, MOVE]), nonce=st.sampled_from([0, 1, 12345]), past_the_console=st.booleans())
+    def somebody_answers_what_nobody_has_sent(self, values: list[float], nonce: int, past_the_console: bool) -> None:
+        feedback = self.world.bridge.feedback
+        if nonce == feedback.nonce:
             return
-        issue = 1 if stale else feedback.issue
-        nonce = 12345 if forged else feedback.nonce
-        command = Command(event=event_after(feedback.event), issue=issue, values=values, nonce=nonce)
-        outcome = self.desk.command(person, command, self.now)
-        if isinstance(outcome, Forward):
-            assert self.seat.holder == person
-            assert not forged
-            assert not self.presses.pending
-            self.to_bridge.append(outcome.command)
+        forged = Command(event=event_after(feedback.event), issue=feedback.issue, values=values, nonce=nonce)
+        if past_the_console:
+            self.world.bridge.receive(forged)
+        elif self.world.console.holder:
+            self.world.console.command(self.world.console.holder, forged)
 
-    # what is on its way
+    @rule(offset=st.sampled_from([-1, 0, 1]))
+    def a_reset_that_was_held_up_arrives(self, offset: int) -> None:
+        number = max(0, self.world.bridge.core.stop_state.number + offset)
+        self.world.to_bridge["operator"].append(Reset(number=number))
 
-    @rule(count=st.integers(1, 3))
-    def arrive(self, count: int) -> None:
-        for message in self.to_bridge[:count]:
-            self.at_bridge(message)
-        del self.to_bridge[:count]
-
-    def at_bridge(self, message: Command | Stop) -> None:
-        if isinstance(message, Stop):
-            given = self.core.stop(message.press, message.by, message.reason, self.now)
-            if given.is_new:
-                self.released = self.neutral = False
-            self.to_console.append(StopTaken(press=message.press, number=given.number))
-            return
-        outcome = self.core.command(message, self.now)
-        if isinstance(outcome, Executed):
-            assert not self.core.stop_state.stopped
-            if outcome.values == REST:
-                self.neutral = True
-            else:
-                assert self.released, "it moves though nobody reset the newest stop"
-                assert self.neutral, "it moves without a neutral command since"
-        else:
-            self.desk.link_down()  # the refusal's feedback is not modelled: the desk forgets what was in flight
-            if self.up:
-                self.desk.link_up(ROBOT)
+    @rule(person=people)
+    def sit(self, person: str) -> None:
+        self.world.console.sit(person)
 
     @rule()
-    def issue(self) -> None:
-        feedback = self.core.issue(MEASURED, self.now)
-        if self.up:
-            self.to_console.append(feedback)
+    def leave_the_seat(self) -> None:
+        self.world.console.release()
 
-    @rule(count=st.integers(1, 4))
-    def hear(self, count: int) -> None:
-        for message in self.to_console[:count]:
-            if isinstance(message, StopTaken):
-                self.desk.stop_taken(message)
-                self.delivered |= {each.press.id: each.taken.number for each in self.presses.taken(message)}
-            elif self.clock.observe(message, self.now):
-                self.desk.feedback(message)
-        del self.to_console[:count]
+    @rule(person=people, silent=mostly)
+    def sue_silences_somebody(self, person: str, silent: bool) -> None:
+        people = self.world.console.people.all
+        self.world.console.service.silence(people["sue"], people[person].id, silent=silent)  # type: ignore[arg-type]
 
-    @rule(seconds=st.sampled_from([0.1, 1.1, 3.0]))
+    @rule(link=links, count=st.integers(1, 3))
+    def arrive(self, link: Link, count: int) -> None:
+        self.world.arrive(link, count)
+
+    @rule(link=links, count=st.integers(1, 3))
+    def hear(self, link: Link, count: int) -> None:
+        self.world.hear(link, count)
+
+    @rule(seconds=st.sampled_from([0.0, 0.3, 0.6, 1.0, 2.1, 700.0]))
     def wait(self, seconds: float) -> None:
-        self.now += seconds
+        self.world.wait(seconds)
 
-    @rule(inside=st.booleans())
-    def lock_out(self, inside: bool) -> None:
-        if inside:
-            if self.core.lock_out("somebody is at the robot", self.now) is not None:
-                self.released = self.neutral = False
-        elif self.core.let_in():
-            self.neutral = False
+    @rule()
+    def tick(self) -> None:
+        self.world.tick()
 
-    @rule(neutral_first=st.booleans())
-    def drive_on(self, neutral_first: bool) -> None:
-        """All that an eager holder does at once, so that motion is reached often."""
-        for values in (REST, MOVE) if neutral_first else (MOVE,):
-            self.issue()
-            self.hear(1000)
-            if self.seat.holder:
-                self.command(self.seat.holder, values, stale=False, forged=False)
-            self.arrive(1000)
+    @rule()
+    def write(self) -> None:
+        self.world.write()
+
+    # what goes wrong
+
+    @rule(link=links, arrives=few)
+    def lose(self, link: Link, arrives: int) -> None:
+        self.world.lose(link, arrives)
+
+    @rule(link=links)
+    def connect(self, link: Link) -> None:
+        self.world.connect(link)
+
+    @rule(in_order=st.booleans(), file_lost=seldom, arrives=few)
+    def the_bridge_restarts(self, in_order: bool, file_lost: bool, arrives: int) -> None:
+        self.world.restart_bridge(in_order=in_order, file_lost=file_lost, arrives=arrives)
+
+    @rule(killed=st.booleans(), arrives=few)
+    def the_console_restarts(self, killed: bool, arrives: int) -> None:
+        self.world.restart_console(killed=killed, arrives=arrives)
+
+    @rule(fails=seldom, which=st.sampled_from(["robot", "console"]))
+    def a_disk_fails_or_works(self, fails: bool, which: str) -> None:
+        if which == "robot":
+            self.world.bridge.disk_fails = fails
+        else:
+            self.world.disk.fails = fails
+
+    @rule(suspended=st.sampled_from([0.0, 3600.0]))
+    def the_robot_has_a_fault_or_is_suspended(self, suspended: float) -> None:
+        self.world.wait(suspended)
+        self.world.bridge.held_up()
+
+    @rule(microseconds=st.sampled_from([-(10**12), -5, 10**6]))
+    def the_wall_clock_jumps(self, microseconds: int) -> None:
+        self.world.wall += microseconds
+
+    @rule()
+    def somebody_locks_the_robot(self) -> None:
+        self.world.bridge.lock("key switch")
+
+    @rule()
+    def somebody_unlocks_it(self) -> None:
+        self.world.bridge.unlock()
 
     @invariant()
-    def a_press_is_never_lost(self) -> None:
-        """Each has a number that its presser was told, or is pending, and so is sent again."""
-        if hasattr(self, "made"):
-            assert all(name in self.delivered or self.presses.is_pending(name) for name in self.made)
-            assert all(number > 0 for number in self.delivered.values())
+    def nothing_moves_while_a_stop_holds_and_no_press_is_lost(self) -> None:
+        if hasattr(self, "world"):
+            self.world.check()
 
 
-StopLife.TestCase.settings = settings(max_examples=300, stateful_step_count=40, deadline=None)
+StopLife.TestCase.settings = settings(
+    max_examples=300, stateful_step_count=40, deadline=None, derandomize=False, print_blob=True
+)
 TestStopLife = StopLife.TestCase
 
 
-def test_the_machine_does_reach_motion_and_a_stop_a_reset_and_motion_again() -> None:
-    life = StopLife()
-    life.start()
-    assert life.core.pending is not None
-    life.press(again=False)
-    life.arrive(10)
-    life.issue()
-    life.hear(100)
-    assert (life.released, life.core.stop_state.stopped) == (False, True)
-    life.drive_on(neutral_first=True)
-    life.reset(offset=0, seconds=1.5)
-    event = life.core.current
-    life.drive_on(neutral_first=True)
-    assert (life.released, life.core.pending) == (True, event + 2)
+@pytest.fixture
+def world() -> Iterator[World]:
+    world = World()
+    world.arm_and_drive()
+    yield world
+    world.close()
 
 
-def test_after_a_lost_link_a_restart_and_a_reset_an_eager_holder_moves_nothing_without_a_neutral_command() -> None:
-    for what in ("link", "bridge", "console", "reset"):
-        life = StopLife()
-        life.start()
-        if what == "link":
-            life.link_down()
-        elif what == "bridge":
-            life.restart_bridge()
-        elif what == "console":
-            life.restart_console()
-            life.sit("ann", supervisor=True)
-        else:
-            life.press(again=False)
-            life.arrive(10)
-            life.issue()
-            life.hear(100)
-            life.reset(offset=0, seconds=1.5)
-        life.link_up()
-        event = life.core.current
-        life.drive_on(neutral_first=False)
-        assert (life.core.current, life.core.pending) == (event, None), what
-        life.sit("ann", supervisor=True)
-        life.drive_on(neutral_first=True)
-        assert life.core.pending is not None, what
+def test_a_robot_that_is_driven_stopped_reset_and_armed_as_it_should_be_moves(world: World) -> None:
+    """Or nothing above would be worth anything."""
+    states = [(world.bridge.driven, world.bridge.witness.holds)]
+    steps: list[Callable[[], None]] = [
+        lambda: world.press("olga", http=True),
+        world.pump,
+        lambda: world.drive(NEUTRAL, MOVE),
+        world.let_a_second_pass_and_reset,
+        lambda: world.drive(MOVE),
+        lambda: world.drive(NEUTRAL, MOVE),
+    ]
+    for step in steps:
+        step()
+        states.append((world.bridge.driven, world.bridge.witness.holds))
+    assert states == [
+        (True, False),
+        (True, False),
+        (False, True),
+        (False, True),
+        (False, False),
+        (False, False),
+        (True, False),
+    ]
+    assert len(world.promises.delivered) == 1
+
+
+def test_after_a_lost_link_a_restart_and_a_reset_an_eager_holder_moves_nothing_without_a_neutral_command(
+    world: World,
+) -> None:
+    def lose() -> None:
+        world.lose("operator")
+
+    def restart_bridge() -> None:
+        world.restart_bridge(in_order=True)
+
+    def restart_console() -> None:
+        world.restart_console(killed=True)
+        world.console.sit("ann")
+
+    def stop_and_reset() -> None:
+        world.press("bob")
+        world.let_a_second_pass_and_reset()
+
+    for happens in (lose, restart_bridge, restart_console, stop_and_reset):
+        happens()
+        world.connect("operator")
+        world.drive(MOVE, MOVE)
+        assert not world.bridge.driven, happens.__name__
+        world.drive(NEUTRAL, MOVE)
+        assert world.bridge.driven, happens.__name__
+
+
+def test_a_press_that_the_robot_could_not_be_told_of_outlives_a_console_that_is_killed(world: World) -> None:
+    world.lose_all()
+    world.press("bob", http=True)
+    assert world.promises.kept == set(world.presses)
+    world.restart_console(killed=True)
+    world.connect("media")  # the other link is another console's, say
+    world.wait(0.6)
+    world.pump()
+    assert world.bridge.witness.holds
+    assert not world.disk.files
+
+
+def test_a_stop_is_said_to_another_run_of_the_bridge_also_where_only_the_link_for_media_is_up(world: World) -> None:
+    world.press("bob")
+    world.pump()
+    world.restart_bridge(in_order=True, file_lost=True)
+    world.connect("media")
+    world.wait(0.6)
+    world.arrive("media")
+    assert world.presses[0] in world.bridge.acknowledged

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import pytest
 
 from robot_bridge.protocol.console import Report, StreamReport
+from robot_bridge.protocol.messages import StopState
 from robot_bridge.protocol.serial import MAX_EVENT
 from server.recording.records import CommandRecord, FeedbackRecord, ReportRecord, StopRecord
 from server.recording.topics import CAMERA
@@ -76,6 +78,42 @@ def with_a_command_while_stopped(entry: Entry) -> list[Entry]:
     return [entry]
 
 
+def stop_record(kind: Literal["stop", "taken", "reset"], press: str = "", number: int = 0) -> StopRecord:
+    return StopRecord(epoch=EPOCH, event=49, kind=kind, by="Bo", where="stop", press=press, number=number)
+
+
+def with_stop_records(*records: StopRecord) -> Change:
+    """Before the command of event 50; what the feedback says from then on is stop 7, not stopped."""
+
+    def change(entry: Entry) -> list[Entry]:
+        if isinstance(entry.record, FeedbackRecord) and entry.event >= 49:
+            return [changed(entry, stop=StopState(number=7))]
+        if entry.event == 50 and isinstance(entry.record, CommandRecord):
+            return [*(own_entry(record, entry.arrived) for record in records), entry]
+        return [entry]
+
+    return change
+
+
+def with_nonces(of_command: int) -> Change:
+    """Of issues and commands alike, but for the command of event 50."""
+
+    def change(entry: Entry) -> list[Entry]:
+        if isinstance(entry.record, FeedbackRecord):
+            return [changed(entry, nonce=1000 + entry.event)]
+        if isinstance(entry.record, CommandRecord):
+            return [changed(entry, nonce=of_command if entry.event == 50 else 999 + entry.event)]
+        return [entry]
+
+    return change
+
+
+def with_a_stop_number_that_goes_back(entry: Entry) -> list[Entry]:
+    if isinstance(entry.record, FeedbackRecord):
+        return [changed(entry, stop=StopState(number=6 if entry.event > 50 else 7))]
+    return [entry]
+
+
 def with_a_picture_stamped_too_new(entry: Entry) -> list[Entry]:
     return [entry._replace(event=51)] if entry.topic == CAMERA + "front" and entry.event == 50 else [entry]
 
@@ -104,6 +142,14 @@ def with_another_epoch(entry: Entry) -> list[Entry]:
         (with_a_late_command, "in_time"),
         (with_somebody_elses_command, "seat"),
         (with_a_command_while_stopped, "stopped"),
+        (with_stop_records(stop_record("stop", "a")), "stopped"),
+        (with_stop_records(stop_record("stop", "a"), stop_record("reset", number=7)), "stopped"),
+        (with_stop_records(stop_record("stop", "a"), stop_record("taken", "b", 7)), "stopped"),
+        (with_stop_records(stop_record("stop", "a"), stop_record("taken", "a", 8)), "stopped"),
+        (with_stop_records(stop_record("reset", number=6)), "stopped"),
+        (with_a_stop_number_that_goes_back, "stopped"),
+        (with_nonces(1), "in_time"),
+        (with_nonces(0), "in_time"),
         (with_a_picture_stamped_too_new, "stamps"),
         (with_a_command_that_was_never_forwarded, "once"),
         (with_something_rendered_beyond_the_tolerance, "rendered"),
@@ -113,6 +159,33 @@ def with_another_epoch(entry: Entry) -> list[Entry]:
 def test_a_tampered_recording_fails_the_check_that_it_breaks(tmp_path: Path, tamper: Change, check: CheckName) -> None:
     path = rewritten(tmp_path / "a.mcap", Story(events=80).entries(), tamper)
     assert check in failed(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        with_stop_records(stop_record("stop", "a"), stop_record("taken", "a", 7), stop_record("reset", number=7)),
+        with_stop_records(
+            stop_record("stop", "a"),
+            stop_record("stop", "b"),
+            *(stop_record("taken", press, 7) for press in ("a", "b")),
+        ),
+        with_nonces(1049),
+        with_stop_records(stop_record("stop"), stop_record("reset")),
+    ],
+    ids=["taken and reset", "two presses", "nonces", "of before there were presses and numbers"],
+)
+def test_a_recording_with_stops_that_are_over_and_with_nonces_keeps_every_promise(
+    tmp_path: Path, change: Change
+) -> None:
+    assert failed(rewritten(tmp_path / "a.mcap", Story(events=80).entries(), change)) == set()
+
+
+def test_presses_without_an_answer_of_their_own_end_when_a_later_one_is_taken(tmp_path: Path) -> None:
+    presses = [stop_record("stop", str(number)) for number in range(70)]
+    answers = [stop_record("taken", str(number), 7) for number in range(6, 70)]
+    change = with_stop_records(*presses, *answers)
+    assert failed(rewritten(tmp_path / "a.mcap", Story(events=80).entries(), change)) == set()
 
 
 def test_bytes_that_were_changed_without_their_checksum_fail(tmp_path: Path) -> None:
