@@ -83,6 +83,13 @@ class StopLife(RuleBasedStateMachine):
         self.world.reset("sue")
         self.world.pump()
 
+    @rule(person=people, values=st.sampled_from([NEUTRAL, MOVE]), arrives=few)
+    def the_holder_goes_on_while_a_stop_is_on_its_way(self, person: str, values: list[float], arrives: int) -> None:
+        self.world.press(person)
+        if self.world.console.holder:
+            self.world.command(self.world.console.holder, values)
+        self.world.arrive("operator", arrives)
+
     @rule(person=people)
     def somebody_resets_a_stop_that_no_feedback_has_shown(self, person: str) -> None:
         world = self.world
@@ -332,6 +339,7 @@ def test_a_press_that_the_robot_could_not_be_told_of_outlives_a_console_that_is_
 def test_a_stop_is_said_to_another_run_of_the_bridge_also_where_only_the_link_for_media_is_up(world: World) -> None:
     world.press("bob")
     world.pump()
+    world.wait(0.2)  # the console has nothing left to wait for
     world.restart_bridge(in_order=True, file_lost=True)
     world.connect("media")
     world.wait(0.6)
