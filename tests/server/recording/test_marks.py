@@ -8,7 +8,7 @@ from server.recording.records import FeedbackRecord
 def stops(*states: StopState, spacing: int = STOP_SPACING) -> list[tuple[int, str, str]]:
     """The marks of feedback that shows these stops, each with its place among them."""
     finder = MarkFinder()
-    found = []
+    found: list[tuple[int, str, str]] = []
     for place, stop in enumerate(states):
         record = FeedbackRecord(epoch="e", event=place + 1, issue=1, time=0.0, axes=[], stop=stop)
         found += [(place, mark.kind, mark.text) for mark in finder.find(record, place * spacing)]
