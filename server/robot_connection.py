@@ -104,8 +104,9 @@ class RobotConnection:
         return self._keepers["operator"].send(message)
 
     def send_stop(self, stop: Stop) -> bool:
-        """As `send`, over whichever link lives: the bridge takes a stop from both."""
-        return self._keepers["operator"].send(stop) or self._keepers["media"].send(stop)
+        """As `send`, over every link that lives: TCP may repeat a lost packet on one of them for seconds."""
+        sent = [keeper.send(stop) for keeper in self._keepers.values()]
+        return any(sent)
 
     def bad_input(self) -> Counter[str]:
         """What the bridge sent that could not be read, by name."""

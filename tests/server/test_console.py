@@ -146,6 +146,26 @@ def test_the_answer_to_a_stop_counts_on_both_links() -> None:
     assert host.calls[2:] == ["taken p", "taken q"]
 
 
+@pytest.mark.parametrize("living", [("operator", "media"), ("media",), ("operator",), ()])
+def test_a_stop_goes_by_every_link_that_lives_since_one_may_be_stalled(
+    living: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[str] = []
+
+    class FakeKeeper:
+        def __init__(self, host: str, port: int, role: str, *_: object) -> None:
+            self.role = role
+
+        def send(self, message: LinkMessage) -> bool:
+            sent.extend([self.role] if self.role in living else [])
+            return self.role in living
+
+    monkeypatch.setattr("server.robot_connection.LinkKeeper", FakeKeeper)
+    connection, _ = _connection()
+    assert connection.send_stop(Stop()) == bool(living)
+    assert sent == list(living)
+
+
 def test_without_a_link_nothing_is_sent() -> None:
     connection, _ = _connection()
     assert not connection.send_stop(Stop())
