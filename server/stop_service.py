@@ -36,7 +36,7 @@ from server.reset_attempts import RESET_REASONS, ResetAttempts, ResetOutcome
 from server.session_tap import SessionTap
 from server.silenced_links import SilencedLinks
 from server.stop_keeper import StopKeeper
-from server.stop_presses import AlreadyTaken, NewPress, Press
+from server.stop_presses import AlreadyTaken, NewPress, Press, Settled
 
 __all__ = ["KEPT", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
 
@@ -137,6 +137,7 @@ class StopService:
         self._listeners: dict[str, list[str]] = {}  # press -> peers that wait for its outcome
         self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
         self._deadlines: dict[str, float] = {}  # press -> until when its answer is waited for
+        self._newest: Settled | None = None  # stop of this epoch that was said from here
         self._sent_at = 0.0  # when all that is pending was sent last
         self._wake = asyncio.Event()
         if self._late:
@@ -258,18 +259,30 @@ class StopService:
         self._spread()
 
     def epoch_ends(self, held: StopState) -> None:
-        """Another bridge: it is told of a stop that held at the last one, in case it does not remember."""
+        """Another bridge: it is told of a stop that held at the last one, in case it does not remember.
+
+        Also of one that the last bridge took, and that no feedback has shown.
+        """
+        newest, self._newest = self._newest, None
         if held.stopped and held.press:
-            press = Press(id=held.press, by=Actor(held.by), where="epoch", reason=held.reason, time=time.time())
-            if self._presses.again(press):
-                self._late.add(press.id)
-                self._keeper.keep(press)
-                self._wake.set()
+            by = Actor(held.by)
+            self._say_again(Press(id=held.press, by=by, where="epoch", reason=held.reason, time=time.time()))
+        if newest is not None and newest.taken.number > held.number:
+            self._say_again(newest.press)
         self._settle(self._resets.link_down("the robot bridge was started anew"))
+
+    def _say_again(self, press: Press) -> None:
+        if self._presses.again(press):
+            self._late.add(press.id)
+            self._keeper.keep(press)
+            self._wake.set()
 
     def taken(self, taken: StopTaken) -> None:
         """The bridge's answer to a stop."""
-        for press, answer in self._presses.taken(taken):
+        settled = self._presses.taken(taken)
+        if settled and (self._newest is None or taken.number > self._newest.taken.number):
+            self._newest = settled[0]
+        for press, answer in settled:
             self._keeper.settled(press.id)
             self._deadlines.pop(press.id, None)
             late = press.id in self._late

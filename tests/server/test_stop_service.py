@@ -310,6 +310,21 @@ async def test_a_bridge_that_starts_anew_is_told_of_the_stop_that_held(bench: Be
     assert not bench.service.unconfirmed
 
 
+async def test_a_bridge_that_starts_anew_is_told_of_a_stop_that_the_last_one_took_and_never_showed(
+    bench: Bench,
+) -> None:
+    bench.press("ann", "a")
+    bench.press("bob", "b")
+    bench.take("b", 6, kept=False)
+    bench.take("a", 5, kept=False)
+    bench.service.epoch_ends(bench.clock.stop)
+    assert [press.id for press in bench.keeper.presses.pending] == ["b"]
+    bench.take("b", 1)
+    bench.show(StopState(stopped=False, number=1))
+    bench.service.epoch_ends(bench.clock.stop)
+    assert bench.keeper.presses.pending == []
+
+
 async def test_a_failed_write_is_said_to_whoever_pressed_and_to_everybody(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
