@@ -142,8 +142,9 @@ class Bridge:
             await self.close()
             raise
         self._keeper.start(self._written)
-        self._record("start", self._core.current, epoch=self.epoch)
-        if self._core.stop_state.stopped:
+        stop = self._core.stop_state
+        self._record("start", self._core.current, epoch=self.epoch, stopped=stop.stopped, number=stop.number)
+        if stop.stopped:
             self._stop_due = True
         self._issue()
         atexit.register(self._rest_at_exit)

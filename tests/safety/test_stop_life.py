@@ -83,6 +83,19 @@ class StopLife(RuleBasedStateMachine):
         self.world.reset("sue")
         self.world.pump()
 
+    @rule(person=people, offset=st.sampled_from([-1, 1]), late=st.booleans())
+    def a_second_passes_and_somebody_resets_another_stop(self, person: str, offset: int, late: bool) -> None:
+        world = self.world
+        world.connect("operator")
+        world.press(person)
+        world.pump()
+        world.wait(1.1)
+        if late:  # the console let it pass when that stop was the newest
+            world.to_bridge["operator"].append(Reset(number=max(0, world.bridge.core.stop_state.number + offset)))
+        else:
+            world.reset("sue", offset)
+        world.pump()
+
     @rule(person=people, values=st.sampled_from([NEUTRAL, MOVE]), arrives=few)
     def the_holder_goes_on_while_a_stop_is_on_its_way(self, person: str, values: list[float], arrives: int) -> None:
         self.world.press(person)
