@@ -3,10 +3,14 @@
 from robot_bridge.event_core import BURST
 from robot_bridge.protocol.console import Seat, SeatRequest
 from robot_bridge.protocol.messages import Command, Feedback
-from tests.server.rig import running_rig
+from tests.server.rig import TestPeer, running_rig
 
 COMMANDS = 20
 CLOCKS = 0.005  # s between the clock that paces and the one that feedback is stamped with, over the whole run
+
+
+async def answer_after(peer: TestPeer, event: int) -> Feedback:
+    return await peer.feedback(lambda each: each.event == event + 1)
 
 
 async def test_commands_that_answer_each_feedback_at_once_execute_at_the_robots_event_rate() -> None:
@@ -16,12 +20,12 @@ async def test_commands_that_answer_each_feedback_at_once_execute_at_the_robots_
         feedback = await peer.feedback()
         answers: list[Feedback] = []
         for number in range(COMMANDS):
-            event = feedback.event + 1
+            before = feedback.event
             values = [0.3 if number else 0.0] + [0.0] * (len(feedback.axes) - 1)
-            command = Command(event=event, issue=feedback.issue, nonce=feedback.nonce, values=values)
+            command = Command(event=before + 1, issue=feedback.issue, nonce=feedback.nonce, values=values)
             for _ in range(3):  # repeats make it no faster
                 peer.send("control", command)
-            feedback = await peer.feedback(lambda each, event=event: each.event == event)
+            feedback = await answer_after(peer, before)
             answers.append(feedback)
         description = rig.services.console.robot.description
         assert description is not None
