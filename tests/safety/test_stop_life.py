@@ -83,6 +83,18 @@ class StopLife(RuleBasedStateMachine):
         self.world.reset("sue")
         self.world.pump()
 
+    @rule(first=people, second=people)
+    def a_second_passes_and_somebody_resets_while_another_stop_is_on_its_way(self, first: str, second: str) -> None:
+        world = self.world
+        world.connect("operator")
+        world.press(first)
+        world.pump()
+        world.wait(1.1)
+        world.pump()
+        world.press(second)
+        world.reset("sue")
+        world.pump()
+
     @rule(person=people, offset=st.sampled_from([-1, 1]), late=st.booleans())
     def a_second_passes_and_somebody_resets_another_stop(self, person: str, offset: int, late: bool) -> None:
         world = self.world
