@@ -140,6 +140,9 @@ async def test_an_operator_invites_observers_and_operators_only(stack: Stack, ch
             await ann.page.keyboard.press("Tab")
             assert await ann.page.evaluate(REACHABLE), "focus left the dialogue for something that it covers"
         await _dialogue(ann).get_by_role("button", name="Close").click()
+        assert await ann.page.evaluate("document.activeElement === document.body"), "the keyboard is the robot's again"
+        await ann.page.get_by_role("button", name="Invite…").press("Enter")
+        await _dialogue(ann).get_by_role("button", name="Close").press("Enter")
         assert await ann.page.evaluate("document.activeElement.textContent") == "Invite…"
         await _tab(dee, "People")
         assert await dee.page.get_by_role("button", name="Invite…").count() == 0

@@ -90,7 +90,7 @@ async def test_the_holder_is_heard_while_the_button_is_held_and_everyone_sees_it
         assert await watcher.page.locator(".talk").is_hidden()
         assert await level(card) < SILENT
         await talking(console, True)
-        await console.page.get_by_text("You are heard").wait_for()
+        await console.page.locator(".talk-label", has_text="You are heard").wait_for()
         await watcher.page.get_by_text("operator is speaking").wait_for()
         assert max([await level(card) for _ in range(3)]) > HEARD
         await talking(console, False)
@@ -109,7 +109,7 @@ async def test_the_key_talks_too_and_silence_falls_when_the_seat_is_given_back_o
         await console.until_live()
         await console.until("s.seat && s.seat.mine")
         await console.page.keyboard.down("v")
-        await console.page.get_by_text("You are heard").wait_for()
+        await console.page.locator(".talk-label", has_text="You are heard").wait_for()
         await console.page.get_by_role("button", name="Give control back").click()
         await console.until("s.seat && !s.seat.mine")
         assert await afterwards(card) < SILENT
@@ -117,7 +117,7 @@ async def test_the_key_talks_too_and_silence_falls_when_the_seat_is_given_back_o
         await console.page.get_by_role("button", name="Request control").click()
         await console.until("s.seat && s.seat.mine")
         await console.page.keyboard.down("v")
-        await console.page.get_by_text("You are heard").wait_for()
+        await console.page.locator(".talk-label", has_text="You are heard").wait_for()
         other = await console.page.context.new_page()
         await other.bring_to_front()
         await console.page.evaluate("window.dispatchEvent(new Event('blur'))")  # headless windows keep the focus

@@ -21,8 +21,15 @@ export function keepKeyboardFree(disposal: Disposal): void {
 export function focusedControl(): string | null {
   const active = document.activeElement;
   if (active === null || !active.matches(CONTROLS)) return null;
-  const name = (active.getAttribute("aria-label") ?? active.textContent).trim();
+  const name = (active.getAttribute("aria-label") ?? wordsOf(active)).trim();
   return name.length > 24 ? `${name.slice(0, 23)}…` : name;
+}
+
+/** Its text without the key that works it too, and without what is for the eye alone. */
+function wordsOf(control: Element): string {
+  const copy = control.cloneNode(true) as Element;
+  for (const each of copy.querySelectorAll("kbd, [aria-hidden=true]")) each.remove();
+  return copy.textContent;
 }
 
 function letGo(selector: string): void {
