@@ -10,6 +10,7 @@ from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Feedback, PressId, StopNumber, StopState, Text
 from server.access import Right
 from server.body import read_json
+from server.errors import PressUsed
 from server.json_answer import json_answer
 from server.scene_proxy import scene_query
 from server.services import authorized, services, takes_stops
@@ -119,6 +120,8 @@ async def stop(request: Request) -> Response:
     stopped = await robot.stop(new_press(caller.actor, "http", wanted.reason, wanted.press))
     if not stopped.outcome.delivered:
         raise stopped.error()
+    if stopped.outcome.released:
+        raise PressUsed(f"stop {stopped.outcome.number} of this press was reset; a new press needs another id, or none")
     return json_answer(Delivered(True, stopped.event, stopped.outcome.number, stopped.outcome.press))
 
 

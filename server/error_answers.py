@@ -1,12 +1,14 @@
 """How errors are answered over HTTP: by name, counted, and never cached."""
 
+from http import HTTPStatus
+
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from prometheus_client import Counter
 from starlette.exceptions import HTTPException
 from starlette.types import Scope
 
-from server.errors import AccessError, ConsoleError, TooManyRequests, http_error
+from server.errors import ConsoleError, TooManyRequests, http_error
 from server.house import House
 from server.problem import PROBLEM_JSON, problem_body
 from server.services import Services
@@ -43,9 +45,10 @@ def _house(state: object) -> House:
 async def _answer_console_error(request: Request, error: Exception) -> Response:
     if not isinstance(error, ConsoleError):
         raise error
-    if isinstance(error, AccessError) and not _house(request.app.state).guard.may_fail(request.scope):
-        error = TooManyRequests("too many requests without a valid token from this address")
     entry = http_error(error)
+    if entry.status == HTTPStatus.UNAUTHORIZED and not _house(request.app.state).guard.may_fail(request.scope):
+        error = TooManyRequests("too many requests without a valid token from this address")
+        entry = http_error(error)
     return _error_response(request, entry.status, entry.name, error.detail, entry.headers)
 
 

@@ -29,6 +29,7 @@ ConsoleError
 │   ├── PreconditionRequired
 │   ├── RecordingUnreadable  what is asked for is damaged, and stays so
 │   ├── ResetTooSoon        a reset right after the stop that it names
+│   ├── PressUsed           the stop of this press was reset since
 │   ├── StaleReset          a reset that does not name the newest stop
 │   ├── TooManyRequests
 │   └── WrongMediaType
@@ -99,6 +100,7 @@ __all__ = [
     "SceneUnavailable",
     "ShuttingDown",
     "Silenced",
+    "PressUsed",
     "StaleReset",
     "StateUnavailable",
     "TokenInvalid",
@@ -222,6 +224,10 @@ class PreconditionFailed(RequestError):
 
 
 class PreconditionRequired(RequestError):
+    pass
+
+
+class PressUsed(RequestError):
     pass
 
 
@@ -375,6 +381,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     NotConnected: HttpError(409, "not_connected"),
     LockedOut: HttpError(409, "locked_out"),
     ResetTooSoon: HttpError(409, "too_soon", {"Retry-After": "1"}),
+    PressUsed: HttpError(409, "press_used"),
     StaleReset: HttpError(409, "stale_reset"),
     TooManyInvitations: HttpError(409, "too_many_invitations"),
     PreconditionFailed: HttpError(412, "precondition_failed"),

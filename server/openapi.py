@@ -40,6 +40,7 @@ from server.errors import (
     OriginRefused,
     PreconditionFailed,
     PreconditionRequired,
+    PressUsed,
     RecordingFailed,
     RecordingUnreadable,
     ResetNotKept,
@@ -162,7 +163,7 @@ OPERATIONS: tuple[Operation, ...] = (
     ),
     Operation(
         *("post", "/api/stop", "Stop the robot, latched. From every role.", 200, Delivered),
-        errors=(Silenced, LinkDown, Unconfirmed, *WITH_JSON),
+        errors=(Silenced, PressUsed, LinkDown, Unconfirmed, *WITH_JSON),
         body=StopRequest,
     ),
     Operation(

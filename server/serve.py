@@ -146,12 +146,15 @@ async def running(
 
 
 async def wait_for_signal() -> None:
-    """Until SIGINT or SIGTERM."""
+    """Until SIGINT, SIGTERM, or the end of the terminal unless that is ignored (`nohup`)."""
     loop, asked = asyncio.get_running_loop(), asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    signals = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signals.append(signal.SIGHUP)
+    for number in signals:
         loop.add_signal_handler(number, asked.set)
     try:
         await asked.wait()
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in signals:
             loop.remove_signal_handler(number)

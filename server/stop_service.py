@@ -75,6 +75,7 @@ class StopOutcome(NamedTuple):
     press: str
     taken: StopTaken | None  # the bridge's answer; None: it has not answered
     detail: str = ""  # why it is not delivered; "" when it is
+    released: bool = False  # the stop that it became was reset since
 
     @property
     def delivered(self) -> bool:
@@ -217,7 +218,8 @@ class StopService:
         except TimeoutError:
             taken = None
         if taken is not None:
-            return StopOutcome(press, taken)
+            held = self._clock.stop
+            return StopOutcome(press, taken, released=not held.stopped and held.number >= taken.number)
         self._keeper.keep(*(each for each in self._presses.pending if each.id == press))
         unwritten = await self._keeper.written(press)
         why = "the robot has not confirmed it" if self._robot.up else "the robot cannot be told now"

@@ -71,6 +71,31 @@ async def test_an_observer_can_stop_and_only_the_holder_of_the_seat_or_a_supervi
         assert rig.count("lockstep_stops_total", where="http") == 1
 
 
+async def test_a_press_whose_stop_was_reset_stops_nothing_and_says_so() -> None:
+    press, wanted = "5f" * 16, {"reason": "dog in the room"}
+    async with running_rig() as rig:
+        headers = rig.token("observer")
+        for _ in range(2):  # a repeat has the outcome of the first
+            answer = await rig.http.post("/api/stop", headers=headers, json={**wanted, "press": press})
+            assert answer.status_code == 200
+        await _stop_state(rig, stopped=True)
+        await reset_by_http(rig.http, "/api/reset", rig.token("supervisor"), lambda: rig.services.console.clock.stop)
+        await _stop_state(rig, stopped=False)
+        used = await rig.http.post("/api/stop", headers=headers, json={**wanted, "press": press})
+        assert (used.status_code, used.json()["error"]) == (409, "press_used")
+        again = await rig.http.post("/api/stop", headers=headers, json=wanted)
+        assert again.status_code == 200
+        await _stop_state(rig, stopped=True)
+
+
+async def test_what_a_good_link_may_not_do_is_named_however_often_its_address_failed_to_say_who_it_is() -> None:
+    async with running_rig(max_refused_burst=1) as rig:
+        for _ in range(3):
+            await rig.http.get("/api/session")
+        refused = await rig.http.post("/api/reset", headers=rig.token("observer"), json={"number": 1})
+        assert (refused.status_code, refused.json()["error"]) == (403, "not_allowed")
+
+
 async def test_a_stop_needs_no_body() -> None:
     async with running_rig() as rig:
         assert (await rig.http.post("/api/stop", headers=rig.token("operator"))).status_code == 200

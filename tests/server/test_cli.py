@@ -75,6 +75,13 @@ async def test_a_bridge_that_dies_is_started_again_on_the_same_port(tmp_path: Pa
         assert any(stack.robot in line for line in stack.output)
 
 
+async def test_the_end_of_the_terminal_ends_the_console_in_order(tmp_path: Path) -> None:
+    async with running_stack(tmp_path) as stack:
+        stack.process.send_signal(signal.SIGHUP)
+        async with asyncio.timeout(PATIENCE):
+            assert await stack.process.wait() == 0
+
+
 async def test_a_console_that_crashes_in_native_code_says_where_it_was(tmp_path: Path) -> None:
     async with running_stack(tmp_path) as stack:
         os.kill(stack.process.pid, signal.SIGSEGV)
