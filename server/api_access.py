@@ -109,7 +109,14 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     here = services(request)
     _require_inviter(caller)
     by = caller.actor
-    revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
+    if here.state.invitations.end_at_once(caller.identity, invitation_id):
+        here.house.enforce([], by)
+    try:
+        revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
+    except StateUnavailable as error:
+        raise StateUnavailable(
+            f"the link has ended here, until this console is started anew; {error.detail}"
+        ) from error
     here.house.enforce(revoked, by)
     return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
 

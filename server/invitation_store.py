@@ -9,7 +9,7 @@ import msgspec
 import structlog
 
 from server.access import Identity
-from server.errors import LinkExpired, LinkRevoked
+from server.errors import LinkExpired, LinkRevoked, NotFound
 from server.invitations import Invitation, Invitations
 from server.link_clock import LinkClock
 from server.state_dir import StateDamaged, StateDir, StateDirUnusable
@@ -69,6 +69,7 @@ class InvitationStore:
         self._known = self._read()
         self._elsewhere = self._read_elsewhere()
         self._revoked = self._known.revoked()
+        self._ended: set[str] = set()  # revoked by this process, whether or not the disk has taken it
         if seen > time.time() + BEHIND_SECONDS:
             log.warning("this machine's clock is behind; links end by the newest time that was seen", seen=seen)
 
@@ -94,7 +95,19 @@ class InvitationStore:
         return self._known
 
     def is_revoked(self, invitation_id: str) -> bool:
-        return invitation_id in self._revoked or invitation_id in self._elsewhere
+        return invitation_id in self._revoked or invitation_id in self._elsewhere or invitation_id in self._ended
+
+    def end_at_once(self, by: Identity, invitation_id: str) -> bool:
+        """From now on `is_revoked` of this link, and of all that was invited with it. The disk may take its time.
+
+        Whether it is known here; a link that another process has just made is found by `update` alone.
+        """
+        try:
+            ended = Invitations(self._known.all).revoke(by, invitation_id, self.now())
+        except NotFound:
+            return False
+        self._ended |= {each.id for each in ended}
+        return True
 
     def has_ended(self, link: str, expires: float) -> bool:
         """Whether the link of this id, which expires then, is good no more."""

@@ -4,7 +4,7 @@ import asyncio
 import re
 import threading
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from robot_bridge.robots.registry import create_robot
 from robot_bridge.settings import BridgeSettings
 from server.access import Identity
 from server.invitation_store import InvitationStore
-from server.invitations import MAX_LIVE
+from server.invitations import MAX_LIVE, Invitations
 from server.state_dir import StateDir, StateDirUnusable
 from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_console, running_rig
 
@@ -123,7 +123,9 @@ async def test_the_audit_names_the_software_and_the_description_and_says_when_th
     assert other.detail.endswith(f"; was {first.what}")
 
 
-async def test_a_disk_that_is_full_is_said_by_name_and_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_disk_that_is_full_is_said_by_name_and_a_link_ends_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def full(*_: object) -> None:
         raise StateDirUnusable(Path("state"), "No space left on device")
 
@@ -134,7 +136,8 @@ async def test_a_disk_that_is_full_is_said_by_name_and_changes_nothing(monkeypat
         assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
         refused = await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
         assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
-        assert (await rig.http.get("/api/session", headers=_bearer(made["link"]))).status_code == 200
+        ended = await rig.http.get("/api/session", headers=_bearer(made["link"]))
+        assert ended.json()["error"] == "link_revoked"
         monkeypatch.undo()
         assert (await _invite(rig, "operator")).status_code == 201
 
@@ -331,6 +334,37 @@ async def test_a_disk_that_hangs_holds_up_the_end_of_no_link(monkeypatch: pytest
                 await peer.close()
         finally:
             ends.set()
+
+
+async def test_a_disk_that_hangs_holds_up_no_revocation(monkeypatch: pytest.MonkeyPatch) -> None:
+    hangs, ends = threading.Event(), threading.Event()
+    update = InvitationStore.update
+
+    def hang(store: InvitationStore, change: Callable[[Invitations], object]) -> object:
+        hangs.set()
+        ends.wait()
+        return update(store, change)
+
+    async with running_rig() as rig:
+        made = (await _invite(rig, "supervisor", role="operator")).json()
+        headers = {"Authorization": f"Bearer {made['link'].partition('#token=')[2]}"}
+        peer = TestPeer()
+        try:
+            await peer.join(rig, headers, ("control", "session", "stop"))
+            monkeypatch.setattr(InvitationStore, "update", hang)
+            revoking = asyncio.create_task(
+                rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
+            )
+            async with asyncio.timeout(PATIENCE):
+                await peer.closed.wait()
+            assert (await rig.http.get("/api/session", headers=headers)).json()["error"] == "link_revoked"
+            assert hangs.is_set()
+            assert not ends.is_set()
+        finally:
+            ends.set()
+            await peer.close()
+        assert (await revoking).status_code == 200
+        assert (await rig.http.get("/api/session", headers=headers)).json()["error"] == "link_revoked"
 
 
 async def test_who_brings_a_token_of_another_console_is_never_told_what_is_wrong_with_it() -> None:
