@@ -114,9 +114,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     try:
         revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
     except StateUnavailable as error:
-        raise StateUnavailable(
-            f"the link has ended here, until this console is started anew; {error.detail}"
-        ) from error
+        raise StateUnavailable(f"the link has ended here until the console starts anew; {error.detail}") from error
     here.house.enforce(revoked, by)
     return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
 

@@ -123,7 +123,7 @@ async def test_the_audit_names_the_software_and_the_description_and_says_when_th
     assert other.detail.endswith(f"; was {first.what}")
 
 
-async def test_a_disk_that_is_full_is_said_by_name_and_a_link_ends_all_the_same(
+async def test_a_full_disk_is_said_by_name_and_a_link_ends_all_the_same(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def full(*_: object) -> None:
