@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-unit test-web test-browser test-long check format bench fuzz lock generate clean
+.PHONY: help setup run test test-unit test-web test-browser test-fast test-long check format bench fuzz lock generate clean
 
 help: ## List the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/  make \1|\2/' | column -t -s '|'
@@ -25,6 +25,10 @@ run: setup ## Start the simulated robot and the console, and print the links (AR
 test: $(VENV)/.dev setup ## Install what the tests need and run all of them
 	@scripts/system-packages $(TEST_PACKAGES)
 	$(MAKE) --no-print-directory test-web test-unit test-browser
+
+test-fast: $(VENV)/.dev web/node_modules/.installed ## Run the tests that take less than a minute together
+	cd web && npm test --silent
+	$(BIN)/python -m pytest -q -m "fast and not long" -n 2 --dist loadfile
 
 test-web: web/node_modules/.installed
 	cd web && npm test --silent

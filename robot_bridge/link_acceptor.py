@@ -64,11 +64,13 @@ class LinkAcceptor:
 
     async def close(self) -> None:
         """May be called again."""
-        if self._accepting is not None:
-            self._accepting.cancel()
-            await asyncio.wait([self._accepting])
-            self._accepting = None
-        self._listener.close()
+        accepting, self._accepting = self._accepting, None
+        try:
+            if accepting is not None:
+                accepting.cancel()
+                await asyncio.wait([accepting])
+        finally:  # also when the closing is cancelled: nobody comes back to it
+            self._listener.close()
 
     async def _accept(self) -> None:
         loop = asyncio.get_running_loop()

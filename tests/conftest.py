@@ -1,13 +1,28 @@
-"""No test touches the state that a console keeps for its user; all draw off screen."""
+"""No test touches the state that a console keeps for its user; all draw off screen.
+
+Tests are `fast`, but for those of the files in slow.txt: real processes, networks and simulated robots, whose tests
+take the better part of a second or more together. `make test-fast` leaves those and the browsers out.
+"""
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from robot_bridge.robots.mujoco_view.graphics import choose_graphics
 
 choose_graphics()  # before a test file imports mujoco
+
+
+ROOT = Path(__file__).parents[1]
+SLOW = {ROOT / line for line in (ROOT / "tests" / "slow.txt").read_text().split()}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path not in SLOW and item.get_closest_marker("browser") is None:
+            item.add_marker(pytest.mark.fast)
 
 
 @pytest.fixture(autouse=True, scope="session")
