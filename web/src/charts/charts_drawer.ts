@@ -16,7 +16,7 @@ const RANGES = [
 /** The live charts beside the pictures. Nothing is drawn while it is closed. */
 export class ChartsDrawer implements Panel {
   readonly element: HTMLElement;
-  private readonly place = h("div", "charts-place");
+  private readonly place = h("div", "charts-place", { tabindex: "0", role: "group", "aria-label": "Charts" }); // scrolls where the window is low
   private readonly words = h("span", "charts-words", { role: "status" });
   private readonly freezeButton = toolButton("Freeze", "F", () => this.freeze());
   private readonly rangeButtons: readonly HTMLButtonElement[];
