@@ -92,11 +92,12 @@ def _moved(pose: Pose, joint: BodyJoint, value: float) -> Pose:
 
 def about(axis: Vector, angle: float) -> Quaternion:
     """A turn about `axis`, which need not be of length 1; about no axis it is no turn."""
-    length = math.hypot(*axis)  # exact for tiny axes too, whose squares underflow
-    if length == 0:
+    largest = max(map(abs, axis))
+    if largest == 0:
         return (1.0, 0.0, 0.0, 0.0)
-    sine = math.sin(angle / 2) / length
-    return (math.cos(angle / 2), axis[0] * sine, axis[1] * sine, axis[2] * sine)
+    x, y, z = (value / largest for value in axis)  # first: one over a tiny length would be infinite
+    sine = math.sin(angle / 2) / math.hypot(x, y, z)
+    return (math.cos(angle / 2), x * sine, y * sine, z * sine)
 
 
 def product(a: Quaternion, b: Quaternion) -> Quaternion:

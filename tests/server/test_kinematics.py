@@ -42,6 +42,12 @@ def test_a_turn_about_no_axis_is_none() -> None:
     assert about((0.0, 0.0, 0.0), 1.0) == (1.0, 0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("axis", [(5e-324, 0.0, 0.0), (0.0, 5e-324, 5e-324), (1e-310, -2e-310, 3e-320)])
+def test_a_turn_about_an_axis_as_short_as_there_is_one_is_a_turn(axis: tuple[float, float, float]) -> None:
+    assert math.hypot(*about(axis, 2.0)) == pytest.approx(1.0)
+    assert about(axis, 2.0)[0] == pytest.approx(math.cos(1.0))
+
+
 @given(st.tuples(*[st.floats(-5, 5)] * 3), st.floats(-10, 10), st.tuples(*[st.floats(-5, 5)] * 3))
 def test_turning_keeps_lengths_and_turning_back_undoes_it(
     axis: tuple[float, float, float], angle: float, vector: tuple[float, float, float]
