@@ -28,3 +28,9 @@ export function stopAdvice(fate: StopFate, said: boolean): string | null {
   if (advice === null || fate !== "unconfirmed") return advice;
   return `${advice} ${said ? "This page keeps sending it." : "Press STOP again."}`;
 }
+
+/** Of a button that nobody has pressed lately. `heard`: the robot's state is known now, and not only as it was. */
+export function restingStopWords(stopped: boolean, heard: boolean, touch: boolean): string {
+  if (stopped) return heard ? "robot is stopped" : "stopped when last heard";
+  return touch ? "" : "Esc";
+}

@@ -1,4 +1,5 @@
-import { STOP_BUTTON_WORDS } from "../core/stop_words";
+import { robotIsUp } from "../core/console_state";
+import { restingStopWords, STOP_BUTTON_WORDS } from "../core/stop_words";
 import type { ConsoleApp } from "../console_app";
 import { h, setData, setText, type Panel } from "./dom";
 
@@ -21,18 +22,20 @@ export function createStopPanel(app: ConsoleApp): Panel {
   element.addEventListener("click", (event) => {
     if (event.detail === 0) press();
   });
+  const restingWords = (now: number): string => {
+    const heard = app.hears(now) && robotIsUp(app.state);
+    return restingStopWords(
+      app.state.stop.stopped,
+      heard,
+      document.documentElement.dataset["touch"] === "true",
+    );
+  };
   return {
     element,
     update(now) {
       const fate = app.stopping.fate(now);
       setData(element, "state", fate === null ? (app.state.stop.stopped ? "stopped" : "ready") : fate);
-      setText(words, fate === null ? restingWords(app) : STOP_BUTTON_WORDS[fate]);
+      setText(words, fate === null ? restingWords(now) : STOP_BUTTON_WORDS[fate]);
     },
   };
-}
-
-/** Of a button that nobody has pressed lately. */
-function restingWords(app: ConsoleApp): string {
-  if (app.state.stop.stopped) return "robot is stopped";
-  return document.documentElement.dataset["touch"] === "true" ? "" : "Esc";
 }
