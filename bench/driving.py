@@ -4,16 +4,16 @@ import asyncio
 import math
 import random
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from client import Console
+from client import Console, NotArmed
 from robot_bridge.link_client import RobotLink
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback
 from robot_bridge.protocol.serial import event_after
 
-__all__ = ["Pause", "Trip", "console_trips", "link_trips", "round_and_round"]
+__all__ = ["Pause", "Trip", "console_trips", "drive_on", "link_trips", "round_and_round"]
 
 SPEEDS = {"base.vx": 0.15, "base.wz": 0.6, "tool.vz": 0.03}  # the base drives a circle of 0.25 m; the tool nods
 TICK = 0.004  # s, the robot's control tick
@@ -61,6 +61,20 @@ class Pause:
         await asyncio.sleep(max(0.0, until - TIMER - time.monotonic()))
         while time.monotonic() < until:
             pass
+
+
+async def drive_on(console: Console, values: Sequence[float]) -> Feedback:
+    """Drive, and arm first wherever the robot asks for it: nobody stands beside a simulated one.
+
+    Raises:
+        CommandRefused: the robot is stopped, this console does not hold the seat, …
+        ConsoleLost: the connection ended.
+    """
+    try:
+        return await console.drive(values)
+    except NotArmed:
+        await console.arm()
+        return await console.drive(values)
 
 
 async def console_trips(console: Console, count: int, *, seconds: float = 60.0, seed: int = 1) -> list[Trip]:

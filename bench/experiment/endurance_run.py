@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol
 import httpx
 import msgspec
 
+from bench.driving import drive_on
 from bench.emulator.profile import Profile
 from bench.experiment.choices import Choices, media_of
 from bench.experiment.endurance import Endurance
@@ -155,7 +156,7 @@ class HeadlessHands:
                 await console.take_seat()
                 while True:
                     move = script.at(clock())
-                    await console.drive(move.values)
+                    await drive_on(console, move.values)
                     await asyncio.sleep(move.interval)
             except CommandRefused:
                 await asyncio.sleep(RETRY_SECONDS)

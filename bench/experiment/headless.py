@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from bench.driving import drive_on
 from bench.experiment.choices import Choices
 from bench.experiment.observation import Look, Observation
 from bench.experiment.operator_script import OperatorScript
@@ -90,7 +91,7 @@ class HeadlessClient:
             move = script.at(elapsed)
             try:
                 async with asyncio.timeout(began + seconds - time.monotonic()):
-                    await self._console.drive(move.values)
+                    await drive_on(self._console, move.values)
             except TimeoutError:
                 break  # the run ends while a command is on its way
             await asyncio.sleep(max(0.0, move.interval - (time.monotonic() - began - elapsed)))

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any, Protocol
 
+from bench.driving import drive_on
 from bench.emulator.delay import Constant
 from bench.emulator.impairment import Impairment
 from bench.emulator.profile import Profile, TwoWay
@@ -164,7 +165,7 @@ class HeadlessStick:
             self.intentions.append((formed, value))
             try:
                 async with asyncio.timeout(STEP):
-                    await console.drive([value, *[0.0] * (len(console.description.axes) - 2), 0.8])
+                    await drive_on(console, [value, *[0.0] * (len(console.description.axes) - 2), 0.8])
             except TimeoutError:
                 continue  # in flight; the next intention takes its place
             except CommandRefused as refused:

@@ -5,7 +5,7 @@ import time
 from collections import Counter
 from typing import NamedTuple
 
-from bench.driving import round_and_round
+from bench.driving import drive_on, round_and_round
 from client import Console
 from client.errors import CommandRefused, ConsoleError
 
@@ -72,7 +72,7 @@ class FleetDriver:
             sent = time.monotonic()
             try:
                 async with asyncio.timeout(STUCK_SECONDS):
-                    await console.drive(values(sent))
+                    await drive_on(console, values(sent))
             except CommandRefused as error:
                 self._notice(error.reason)
                 await asyncio.sleep(AGAIN_SECONDS)

@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.driving import round_and_round
+from bench.driving import drive_on, round_and_round
 from bench.emulator import NetworkProcess, Profile
 from bench.processes import running_process
 from bench.stack import Stack, running_bridge
@@ -106,7 +106,7 @@ async def driving(
             async with asyncio.timeout(seconds):
                 while True:
                     began = time.monotonic()
-                    feedback = await console.drive(values(began))
+                    feedback = await drive_on(console, values(began))
                     drive.sent(feedback.event, began)
         except TimeoutError:
             pass
