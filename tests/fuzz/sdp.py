@@ -5,6 +5,7 @@ bounds.
 """
 
 import asyncio
+import atexit
 import contextlib
 import functools
 
@@ -60,7 +61,9 @@ def negotiation(text: str) -> None:
 @functools.cache
 def _runner() -> asyncio.Runner:
     restrict_ice_hosts([])  # no sockets
-    return asyncio.Runner()
+    runner = asyncio.Runner()
+    atexit.register(runner.close)
+    return runner
 
 
 async def _answer(text: str) -> None:
