@@ -33,34 +33,40 @@ def hostile_command(
     if front not in FRONTS or not set(kind or ()) <= set(known):
         typer.echo(f"lockstep: the fronts are {', '.join(FRONTS)}; the kinds are {', '.join(known)}", err=True)
         raise typer.Exit(2)
-    try:
-        found = [
-            uvloop.run(hostile(peers, seconds, seed, lambda text: typer.echo(text, err=True), one, front))
-            for one in (known if each else kind or [""])
-        ]
-    except ProcessFailed as error:
-        typer.echo(f"lockstep: {error}", err=True)
-        raise typer.Exit(3) from error
-    figures = found if len(found) > 1 else found[0]
+    found = list[dict[str, Any]]()
+    kinds, failed = known if each else kind or [""], False
+    for one in kinds:
+        try:
+            found.append(uvloop.run(hostile(peers, seconds, seed, lambda text: typer.echo(text, err=True), one, front)))
+        except ProcessFailed as error:  # the figures of the others are worth having
+            typer.echo(f"lockstep: {one or 'all kinds'}: {error}", err=True)
+            failed = True
+        else:
+            typer.echo(_row(found[-1]), err=True)
+    if not found:
+        raise typer.Exit(3)
+    figures = found if len(kinds) > 1 else found[0]
     if json_file == "-":
         sys.stdout.write(json.dumps(figures) + "\n")
     elif json_file is not None:
         Path(json_file).write_text(json.dumps(figures, indent=2) + "\n")
-    typer.echo(_summary(found[0]) if len(found) == 1 else _table(found), err=True)
-    raise typer.Exit(int(any(one["ratio"] > one["allowed"] for one in found)))
+    typer.echo(_summary(found[0]) if len(kinds) == 1 else _table(found), err=True)
+    raise typer.Exit(3 if failed else int(any(one["ratio"] > one["allowed"] for one in found)))
 
 
 def _table(found: list[dict[str, Any]]) -> str:
     """A row for each kind. The crowd's own processor time shows whether it could do anything at all."""
-    lines = ["kind                  attempts  in peace  among them  ratio  p95 among  crowd s"]
-    for one in found:
-        attempts = sum(one["crowd"]["attempts"].values())
-        quiet, disturbed = one["quiet_ms"], one["disturbed_ms"]
-        lines.append(
-            f"{one['kind']:20} {attempts:9} {quiet['median']:9.2f} {disturbed['median']:11.2f} {one['ratio']:6.2f}"
-            f" {disturbed['p95']:10.2f} {one['crowd_cpu_seconds']:8.1f}"
-        )
-    return "\n".join(lines)
+    head = "kind                  attempts  in peace  among them  ratio  p95 among  crowd s"
+    return "\n".join([head, *map(_row, found)])
+
+
+def _row(one: dict[str, Any]) -> str:
+    attempts = sum(one["crowd"]["attempts"].values())
+    quiet, disturbed = one["quiet_ms"], one["disturbed_ms"]
+    return (
+        f"{one['kind']:20} {attempts:9} {quiet['median']:9.2f} {disturbed['median']:11.2f} {one['ratio']:6.2f}"
+        f" {disturbed['p95']:10.2f} {one['crowd_cpu_seconds']:8.1f}"
+    )
 
 
 def _summary(figures: dict[str, Any]) -> str:
