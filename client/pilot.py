@@ -102,6 +102,7 @@ class Pilot:
         self._pings: deque[float] = deque(maxlen=PINGS)  # round trips; none of a command is shorter
         self._void: int | None = None  # an event that only neutral values may use
         self._arming = False  # that command is wanted, or on its way
+        self._asked_again = False  # the answer to it asked for one more
         self._stop_number: int | None = None  # of the newest stop seen; None before the first feedback
         self._used_up: tuple[int, int] | None = None  # a feedback that can no longer be answered
         self._moved = False  # values were sent since the robot was last proven to be at rest
@@ -144,10 +145,10 @@ class Pilot:
 
     def _look_for_stops(self, feedback: Feedback) -> None:
         known, self._stop_number = self._stop_number, feedback.stop.number
-        if feedback.stop.stopped:
+        if feedback.stop.stopped or known not in (None, feedback.stop.number):  # or stopped and reset since then
             if self.ready or self._arming or self._flight is not None or self._want is not _Want.NOTHING:
                 self.hold_back("stopped")
-        elif self.ready and (feedback.neutral_needed or known not in (None, feedback.stop.number)):
+        elif self.ready and feedback.neutral_needed:
             self.hold_back("not_neutral")
 
     def refusal(self, refusal: Refusal) -> None:
@@ -199,7 +200,7 @@ class Pilot:
     def arm(self) -> int:
         """Send a neutral command, after which the robot may move. Returns a ticket, whose outcome is its feedback."""
         self._rest = None
-        self._arming = True
+        self._arming, self._asked_again = True, False
         self._values = list(self._neutral)
         self._want = _Want.VALUES
         self._ticket += 1
@@ -341,20 +342,24 @@ class Pilot:
             self.timer.sample(taken)  # echoes make a sample too long at times, which is the safe side
         else:
             self.loss(now)  # and no sample, by Karn's rule
-        if flight.ticket and not self._arming:
+        if flight.ticket and self.ready:
             self._outcomes.append(Outcome(flight.ticket, feedback, None))
             self._idle_at = max(self._idle_at, now + TURN)
 
     def _prove(self, flight: _Flight, feedback: Feedback) -> None:
-        """Whether the robot may move now. Something that came in between asks for one more neutral command."""
+        """Whether the robot may move now. A neutral command that answers an issue from before, say, a reset counts for
+        nothing at the robot, so one more follows it. A cause that outlives that one came after somebody armed."""
         if feedback.stop.stopped or (not self.ready and not self._arming):
             return
-        if feedback.neutral_needed:
-            if self._arming:
-                self._want = _Want.VALUES
-            return
-        if flight.neutral:
-            self.ready, self._arming = True, False
+        if not feedback.neutral_needed:
+            if flight.neutral:
+                self.ready, self._arming = True, False
+        elif self._arming and self._asked_again:
+            self._arming = False
+            self.hold_back("not_neutral")
+        elif self._arming:
+            self._want = _Want.VALUES
+            self._asked_again = flight.neutral
 
     def _is_used_up(self) -> bool:
         newest = self.newest

@@ -260,7 +260,8 @@ export class ConsoleApp {
     const standing = standingOf(this.state);
     applyMessage(this.state, parsed.message, Date.now());
     this.stopping.took(parsed.message, this.state.stop, this.heardMs);
-    const forbidden = interlock(standing, this.state, parsed.message, this.driver?.unproven === true);
+    const awaits = this.driver !== null && driver.driverAwaitsNeutral(this.driver, parsed.message);
+    const forbidden = interlock(standing, this.state, parsed.message, awaits);
     if (forbidden !== null) this.bar(forbidden);
     this.follow(parsed.message, feedback, this.heardMs);
     if (this.state.handOver !== handOver) this.handedOver();

@@ -1,4 +1,4 @@
-import type { ClientMessage, Feedback, Refusal } from "../wire";
+import type { ClientMessage, Feedback, Refusal, ServerMessage } from "../wire";
 import {
   gateState,
   nextCommand,
@@ -77,6 +77,7 @@ export interface Driver {
   neutralOwed: boolean; // one neutral command is due after disarming
   barred: boolean; // nothing but rests leaves until the person has armed
   unproven: boolean; // armed, and no neutral command was answered since
+  askedAgain: boolean; // the answer to that command asked for one more
   flightIsNeutral: boolean; // what the event in flight was first sent with
   barrier: number | null; // events up to this one were voided by a rest: only neutral goes under their numbers
   rest: { event: number; sends: number; atMs: number; sinceMs: number } | null; // until the robot is at rest
@@ -104,6 +105,7 @@ export function createDriver(
     neutralOwed: false,
     barred: true,
     unproven: false,
+    askedAgain: false,
     flightIsNeutral: false,
     barrier: null,
     rest: null,
@@ -120,7 +122,10 @@ export function driverFeedback(
   const { gate, rest } = driver;
   const flying = gate.inFlight;
   if (!takeFeedback(gate, feedback.event, feedback.issue, feedback.nonce)) return false;
-  if (flying !== null && gate.inFlight === null && driver.flightIsNeutral) driver.unproven = false;
+  if (flying !== null && gate.inFlight === null && driver.flightIsNeutral) {
+    driver.askedAgain = feedback.neutral_needed;
+    driver.unproven &&= feedback.neutral_needed;
+  }
   const sample = noteFeedback(driver.latency, feedback.event, now);
   if (sample !== null && flying === feedback.event) landed(driver, feedback.issue, sample, now);
   if (driver.barrier !== null && !isNewer(driver.barrier, feedback.event)) driver.barrier = null;
@@ -175,6 +180,18 @@ export function driverRelease(driver: Driver, now: number): void {
 export function driverArm(driver: Driver): void {
   driver.barred = false;
   driver.unproven = true;
+  driver.askedAgain = false;
+}
+
+/**
+ * Whether a robot that asks for a neutral command in `message`, not yet taken, only asks for the one that arming sends.
+ * A command that answers an issue from before, say, a reset counts for nothing at the robot, so one more follows it. A
+ * cause that outlives that one came after the person armed.
+ */
+export function driverAwaitsNeutral(driver: Driver, message: ServerMessage): boolean {
+  if (!driver.unproven || !driver.askedAgain || message.type !== "feedback") return driver.unproven;
+  const { inFlight } = driver.gate;
+  return inFlight === null || isNewer(inFlight, message.event);
 }
 
 /** Disarmed: rest, one neutral unless that is barred, then silence. */
