@@ -7,16 +7,17 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from robot_bridge.protocol.console import Participant, Seat, StreamInfo, StreamOffer
 from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Feedback, PressId, StopNumber, StopState, Text
+from robot_bridge.protocol.messages import Feedback, StopNumber, StopState
 from server.access import Right
 from server.body import read_json
 from server.errors import PressUsed
 from server.json_answer import json_answer
 from server.scene_proxy import scene_query
 from server.services import authorized, services, takes_stops
-from server.stop_presses import new_press
+from server.stop_body import read_stop
+from server.stop_presses import new_press, told_id
 
-__all__ = ["Delivered", "Health", "Released", "ResetRequest", "ScenePath", "SessionInfo", "StopRequest", "router"]
+__all__ = ["Delivered", "Health", "Released", "ResetRequest", "ScenePath", "SessionInfo", "router"]
 
 router = APIRouter()
 Caller = Annotated[Right, Depends(authorized)]
@@ -43,13 +44,6 @@ class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
     voice: bool  # whether the console takes the voice of who holds the seat
     description: RobotDescription | None
     feedback: Feedback | None
-
-
-class StopRequest(msgspec.Struct, frozen=True):
-    """Body of POST /api/stop. Repeats of one press carry its id, which is 32 random hex digits; "": a new one."""
-
-    reason: Text = ""
-    press: PressId = ""
 
 
 class ResetRequest(msgspec.Struct, frozen=True):
@@ -79,6 +73,7 @@ class Delivered(msgspec.Struct, frozen=True):
     event: int
     number: int  # of the stop
     press: str
+    kept: bool  # on the robot's disk
 
 
 class Released(msgspec.Struct, frozen=True):
@@ -116,13 +111,15 @@ async def stop(request: Request) -> Response:
     """Anyone with a token, also while the robot's session has failed."""
     robot = takes_stops(request)
     caller = robot.access.bearer_to_stop(request.headers.get("authorization"))
-    wanted = await read_json(request, StopRequest)
-    stopped = await robot.stop(new_press(caller.actor, "http", wanted.reason, wanted.press))
+    wanted = await read_stop(request)
+    press = new_press(caller.actor, "http", wanted.reason, wanted.press)
+    stopped = await robot.stop(press)
     if not stopped.outcome.delivered:
         raise stopped.error()
     if stopped.outcome.released:
         raise PressUsed(f"stop {stopped.outcome.number} of this press was reset; a new press needs another id, or none")
-    return json_answer(Delivered(True, stopped.event, stopped.outcome.number, stopped.outcome.press))
+    told = told_id(press, wanted.press)
+    return json_answer(Delivered(True, stopped.event, stopped.outcome.number, told, stopped.outcome.kept))
 
 
 @router.post("/api/reset")

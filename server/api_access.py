@@ -11,7 +11,7 @@ from robot_bridge.protocol.console import Role
 from server.access import MAX_ROBOTS, HasRole, Identity, Right, RobotName, require_role
 from server.audit import AuditRecord
 from server.body import read_json
-from server.errors import NotAllowed, StateUnavailable
+from server.errors import NotAllowed, Silenced, StateUnavailable
 from server.invitations import Invitation, Invitations, may_invite
 from server.links import console_link
 from server.services import Services, authorized, services
@@ -88,6 +88,8 @@ async def invite(request: Request, caller: Caller) -> Response:
     here = services(request)
     wanted = await read_json(request, InvitationRequest)
     _require_inviter(caller)
+    if here.house.is_silenced(caller.identity.token_id):
+        raise Silenced("a supervisor has silenced the STOP of your link; until that ends it invites nobody")
     robots = _wanted_robots(here, wanted)
     by = caller.actor
     made = await _update(

@@ -83,6 +83,7 @@ def guard_app(app: FastAPI, settings: Settings) -> None:
         health=RateLimits(settings.max_request_rate, settings.max_request_burst),
         count=count_refused,
         link_of=lambda scope: _link_of(scope, known),
+        is_silenced=_is_silenced,
         places=places,
         caught=_caught,
     )
@@ -114,6 +115,11 @@ def _link_of(scope: Scope, known: KnownTokens) -> str:
         return ""
     known.add(token)
     return link
+
+
+def _is_silenced(scope: Scope, link: str) -> bool:
+    house = getattr(scope["app"].state, "house", None)
+    return isinstance(house, House) and house.is_silenced(link)
 
 
 def _caught(scope: Scope, error: Exception) -> None:

@@ -2,6 +2,8 @@
 
 from typing import Literal
 
+import msgspec
+
 from robot_bridge.protocol.console import (
     ClientMessage,
     Note,
@@ -18,10 +20,26 @@ from robot_bridge.protocol.console import (
 from robot_bridge.protocol.errors import MessageError
 from robot_bridge.protocol.messages import Command, Ping, Reset, Rest, Stop
 from server.errors import BinaryMessage, Flood, MalformedMessage, MessageTooLarge, UnknownChannel, WrongChannel
+from server.stop_presses import MAX_REASON, stop_text
 
-__all__ = ["CHANNELS", "MAX_MESSAGE", "ChannelName", "MessageBudget", "channel_name", "channel_of", "parse_message"]
+__all__ = [
+    "CHANNELS",
+    "MAX_MESSAGE",
+    "ChannelName",
+    "MessageBudget",
+    "channel_name",
+    "channel_of",
+    "parse_message",
+    "stop_in",
+]
 
 ChannelName = Literal["control", "session", "stop"]
+
+
+class _AnyStop(msgspec.Struct, frozen=True, tag_field="type", tag="stop"):
+    reason: object = ""
+    press: object = ""
+
 
 CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
     "control": (Command, Rest, Report, Ping, Stop),  # a stop is never turned away for the channel it took
@@ -31,6 +49,8 @@ CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
 
 # Where one line carries all channels, the kind says which it is; a stop is for `stop`, the last that takes it.
 CHANNEL_OF: dict[type[ClientMessage], ChannelName] = {kind: name for name in CHANNELS for kind in CHANNELS[name]}
+
+_any_stop = msgspec.json.Decoder(_AnyStop)
 
 MAX_MESSAGE = 16 * 1024  # bytes; a report of 32 streams is the largest, about 7 kB
 
@@ -71,6 +91,17 @@ def parse_message(channel: ChannelName | None, data: object) -> ClientMessage:
     if channel is not None and not isinstance(message, CHANNELS[channel]):
         raise WrongChannel(f"{type(message).__name__.lower()} does not belong on {channel}")
     return message
+
+
+def stop_in(data: object) -> Stop | None:
+    """The stop in what `parse_message` refuses. What says that it is a stop is one, whatever else is wrong with it."""
+    if not isinstance(data, str | bytes) or len(data) > MAX_MESSAGE:
+        return None
+    try:
+        found = _any_stop.decode(data)
+    except (msgspec.DecodeError, UnicodeError, RecursionError):
+        return None
+    return Stop(reason=stop_text(found.reason)[:MAX_REASON], press=stop_text(found.press))
 
 
 class MessageBudget:

@@ -58,6 +58,7 @@ from server.seat import SeatRefusal, SeatTimes
 from server.seat_keeper import SeatKeeper
 from server.session_tap import SessionTap
 from server.settings import Settings
+from server.silenced_links import SilencedLinks
 from server.speed_cap import SpeedCap
 from server.stop_keeper import StopKeeper
 from server.stop_presses import new_press
@@ -94,7 +95,9 @@ class Console:
         tap: SessionTap | None = None,
         *,
         stops: StopKeeper,
+        silenced: SilencedLinks | None = None,
     ) -> None:
+        """`silenced`: of all robots of this console; None: this one has its own."""
         self.clock = clock or EventClock()
         self._tap = tap or SessionTap()
         self.audit = AuditTrail(self.clock, audit_log)
@@ -110,7 +113,7 @@ class Console:
         self.speed_cap = SpeedCap(settings.speed_cap)
         self._desk = CommandDesk(self.clock, self.seat.rules, stops.presses, self.speed_cap)
         self.stops = StopService(
-            self.robot, stops, self.peers, self.clock, self._holder, self.audit, metrics, self._tap
+            self.robot, stops, self.peers, self.clock, self._holder, self.audit, metrics, self._tap, silenced
         )
         self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.drivers, self.peers.observers)
         self._forwarded_at = 0.0  # when the command in flight left
@@ -353,7 +356,7 @@ class Console:
 
     def _stop(self, peer: Peer, channel: ChannelName, stop: Stop) -> None:
         try:
-            self.stops.stop(new_press(peer.actor, channel, stop.reason, stop.press))
+            self.stops.stop(new_press(peer.actor, channel, stop.reason, stop.press), stop.press)
         except Silenced as error:
             self._metrics.refusals.labels("silenced").inc()
             refusal = Refusal(event=0, reason="silenced", current=self.clock.event, detail=error.detail)

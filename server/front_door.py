@@ -18,9 +18,12 @@ from server.rate_limits import RateLimits
 from server.request_turns import RequestTurns
 from server.robot_paths import below_robot
 
-__all__ = ["FrontDoor", "HostNames", "client_address"]
+__all__ = ["STOP_BURST", "STOP_RATE", "FrontDoor", "HostNames", "client_address"]
 
-STOPS = ("/api/stop", "/api/fleet/stop")  # with a good token never turned away, and never waiting
+STOPS = ("/api/stop", "/api/fleet/stop")
+# Stops of one link by HTTP that pass every limit and wait for nobody. A page says one press once a second, to each
+# console; what is more goes through the limits and turns of all other requests.
+STOP_RATE, STOP_BURST = 20.0, 20  # Hz
 HEALTH = ("/healthz", "/readyz")  # counted apart: a check must not fail for what else comes from its address
 POLICY_VIOLATION = 1008  # RFC 6455 7.4.1
 PATIENCE = 5  # requests in a row that are turned away, then the connection is closed
@@ -55,7 +58,8 @@ class FrontDoor:
     """An ASGI middleware, for HTTP and WebSockets. Refusals are counted by name and answered like all others.
 
     What brings a good token is served before what does not, and keeps its connection when there are too many; a stop
-    that brings one passes every limit. A fault in what is behind is answered by name, counted, and goes no further.
+    that brings one passes every limit, up to a rate of its link's own, unless that link's stops are silenced. A fault
+    in what is behind is answered by name, counted, and goes no further.
     """
 
     def __init__(
@@ -68,17 +72,23 @@ class FrontDoor:
         *,
         health: RateLimits | None = None,
         link_of: Callable[[Scope], str] = lambda scope: "",
+        is_silenced: Callable[[Scope, str], bool] = lambda scope, link: False,
         places: ConnectionPlaces | None = None,
         caught: Callable[[Scope, Exception], None] | None = None,
     ) -> None:
-        """`health`: of health checks. `link_of`: the link whose good token a request brings, "" without one."""
+        """`health`: of health checks. `link_of`: the link whose good token a request brings, "" without one.
+
+        `is_silenced`: whether a supervisor has silenced the stops of that link.
+        """
         self._app = app
         self._hosts = hosts
         self._requests = requests
         self._health = requests if health is None else health
         self._count = count
         self._clock = clock
+        self._stops = RateLimits(STOP_RATE, STOP_BURST)  # by link
         self._link_of = link_of
+        self._is_silenced = is_silenced
         self._places = places
         self._caught = caught
         self._turns = RequestTurns()
@@ -94,19 +104,25 @@ class FrontDoor:
                 return  # others needed its place
             send = _patient(send, place)
         try:
-            self._check(scope, address, link)
+            self._hosts.check(Headers(scope=scope).get("host"))
+            goes_first = self._goes_first(scope, link)
+            if not goes_first:
+                self._check_rate(scope, address)
         except ConsoleError as error:
             self._count(scope, http_error(error).name)
             await _refuse(scope, send, error)
             return
-        if not (link and _is_one_of(scope, STOPS)):
+        if not goes_first:
             await self._turns.take(link or address, first=bool(link))
         await self._serve(scope, receive, send)
 
-    def _check(self, scope: Scope, address: str, link: str) -> None:
-        self._hosts.check(Headers(scope=scope).get("host"))
-        if link and _is_one_of(scope, STOPS):
-            return
+    def _goes_first(self, scope: Scope, link: str) -> bool:
+        """Whether it is a stop that no limit holds up."""
+        if not link or scope.get("method") != "POST" or not _is_one_of(scope, STOPS):
+            return False
+        return not self._is_silenced(scope, link) and self._stops.spend(link, self._clock())
+
+    def _check_rate(self, scope: Scope, address: str) -> None:
         limits = self._health if _is_one_of(scope, HEALTH) else self._requests
         if not limits.spend(address, self._clock()):
             raise TooManyRequests("too many requests from this address")

@@ -1,6 +1,8 @@
 """What all robots of one console have in common: who may come in, how often anybody may ask, and how many fit."""
 
 import asyncio
+import time
+from collections.abc import Mapping
 from typing import Protocol
 
 import structlog
@@ -13,6 +15,7 @@ from server.guard import Guard
 from server.invitations import Invitation
 from server.link_warden import LinkWarden
 from server.places import check_place
+from server.silenced_links import SilencedLinks
 from server.state import ConsoleState
 from server.state_dir import StateDirUnusable
 
@@ -54,6 +57,7 @@ class House:
         self.guard = guard
         self.metrics = metrics
         self.wardens: list[LinkWarden] = []
+        self.silenced = SilencedLinks(state.invitations.invited_with)
         self._max_peers = max_peers
         self._reserved = reserved
 
@@ -67,6 +71,7 @@ class House:
         while True:
             await asyncio.sleep(CHECK_SECONDS)
             try:
+                self._end_silences()
                 self.enforce(self.state.invitations.refresh(), COMMAND_LINE)
             except Exception as error:
                 self.metrics.faults.caught("links", error)
@@ -99,6 +104,28 @@ class House:
     def connected(self, link: str) -> int:
         """Peers that are here with the link of this id, at any robot."""
         return sum(warden.connected(link) for warden in self.wardens)
+
+    # silence
+
+    def is_silenced(self, link: str) -> bool:
+        """Whether a supervisor has silenced the stops of this link, or of one that it was invited with."""
+        return self.silenced.holds(link, time.monotonic())
+
+    def silences(self) -> dict[str, float]:
+        """The links that other consoles have to silence too, and until when, in s since 1970."""
+        now, ahead = time.monotonic(), self.state.invitations.now() - time.monotonic()
+        known = [each.id for each in self.state.invitations.known.all]
+        return {link: until + ahead for link, until in self.silenced.to_tell(known, now).items()}
+
+    def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
+        """Another console's `silences`; all that it has now."""
+        now, ahead = time.monotonic(), self.state.invitations.now() - time.monotonic()
+        self.silenced.told_elsewhere(console, {link: until - ahead for link, until in links.items()}, now)
+
+    def _end_silences(self) -> None:
+        for link in self.silenced.ended(time.monotonic()):
+            for warden in self.wardens:
+                warden.silence_ended(link)
 
     def check_room(self, identity: Identity) -> None:
         """Raises TooManyPeers when there is no place for another peer at any robot."""

@@ -97,6 +97,10 @@ class InvitationStore:
     def is_revoked(self, invitation_id: str) -> bool:
         return invitation_id in self._revoked or invitation_id in self._elsewhere or invitation_id in self._ended
 
+    def invited_with(self, link: str) -> str:
+        """The link that this one was made with; "" for none, and for one that is not known here."""
+        return self._known.invited_with(link)
+
     def end_at_once(self, by: Identity, invitation_id: str) -> bool:
         """From now on `is_revoked` of this link, and of all that was invited with it. The disk may take its time.
 

@@ -77,6 +77,11 @@ class Invitations:
     def all(self) -> list[Invitation]:
         return list(self._known.values())
 
+    def invited_with(self, invitation_id: str) -> str:
+        """The link that this one was made with; "" for none, and for one that is not known."""
+        found = self._known.get(invitation_id)
+        return "" if found is None else found.by_link
+
     def revoked(self) -> frozenset[str]:
         return frozenset(each.id for each in self._known.values() if each.revoked_at is not None)
 

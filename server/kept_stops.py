@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import structlog
 
-from server.stop_presses import Press
+from server.stop_presses import MAX_GIVEN, Press, press_id
 
 __all__ = ["KeptStops", "kept_stops_place"]
 
@@ -69,13 +69,13 @@ class KeptStops:
         try:
             with path.open("rb") as file:
                 press = _decoder.decode(file.read(MAX_BYTES))
-            if self._path(press.id) == path:
+            if self._path(press.id) == path and len(press.id) <= MAX_GIVEN:  # of a bridge's own any text
                 return press
         except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
             log.error("a kept stop cannot be read", error="kept_stop_unreadable", path=path.name, detail=str(error))
         with suppress(OSError):  # then it is found, and said, at the next start too
-            os.replace(path, self._path(path.stem))
-        return Press(id=path.stem, reason=UNREADABLE)
+            os.replace(path, self._path(press_id("", path.stem)))
+        return Press(id=press_id("", path.stem), reason=UNREADABLE)
 
     def _path(self, press: str) -> Path:
         """Press ids come from anybody, and name no path."""

@@ -1,6 +1,7 @@
 """Ends what a link gave when the link ends: peers at once, viewers of the 3D scene too."""
 
 import asyncio
+from collections.abc import Callable
 
 from server.audit import Actor, AuditKind
 from server.audit_trail import AuditTrail
@@ -18,8 +19,17 @@ UNKNOWN_SECONDS = 10.0
 class LinkWarden:
     """Of one robot. The house calls `enforce`."""
 
-    def __init__(self, invitations: InvitationStore, peers: Peers, audit: AuditTrail, robot: str = "") -> None:
+    def __init__(
+        self,
+        invitations: InvitationStore,
+        peers: Peers,
+        audit: AuditTrail,
+        robot: str = "",
+        show_silence: Callable[[], None] = lambda: None,
+    ) -> None:
+        """`show_silence`: called at every look; tells peers whether their stops are silenced."""
         self.peers = peers
+        self._show_silence = show_silence
         self._audit = audit
         self._invitations = invitations
         self._robot = robot
@@ -40,8 +50,13 @@ class LinkWarden:
                 peer.end("link revoked")
             elif now >= peer.identity.expires:
                 peer.end("link expired")
+        self._show_silence()
         self._looked.set()
         self._looked = asyncio.Event()
+
+    def silence_ended(self, link: str) -> None:
+        """The stops of this link are heard again, by themselves."""
+        self._audit.record("silence", what="ended", detail=link)
 
     def connected(self, link: str) -> int:
         """Peers that are here with the link of this id."""

@@ -13,7 +13,7 @@ import msgspec
 
 from robot_bridge.protocol.console import RecordingState
 from robot_bridge.protocol.serial import MAX_EVENT
-from server.api import Delivered, Health, Released, ResetRequest, ScenePath, SessionInfo, StopRequest
+from server.api import Delivered, Health, Released, ResetRequest, ScenePath, SessionInfo
 from server.api_access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
 from server.api_recordings import FileTicket, RecordingDetails, RecordingList, RecordingRequest
 from server.errors import (
@@ -62,6 +62,7 @@ from server.errors import (
 from server.ice_servers import IceServers
 from server.problem import PROBLEM_JSON, Problem
 from server.relay.tickets import RelayAnswer
+from server.stop_body import StopRequest
 from server.watch import WatchTicket
 
 __all__ = ["OPERATIONS", "Operation", "openapi_document"]

@@ -24,7 +24,7 @@ from robot_bridge.protocol.messages import Stop
 from server.access import Identity
 from server.answer_pace import AnswerPace
 from server.audit import Actor
-from server.channels import ChannelName, MessageBudget, channel_of, parse_message
+from server.channels import ChannelName, MessageBudget, channel_of, parse_message, stop_in
 from server.errors import ChannelError, Flood, TransportRefused
 from server.names import clean_name
 from server.rate_limits import RateLimits
@@ -313,6 +313,8 @@ class Peer(ABC):
         try:
             message = self._parse(channel, data, now)
         except ChannelError as error:
+            if (stop := stop_in(data)) is not None:
+                self._host.message_received(self, channel or "stop", stop)
             self._refused(channel or "line", error)
             return
         self._heard_at = now

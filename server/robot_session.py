@@ -102,7 +102,17 @@ async def _session(
     )
     engines = relay_engines(settings, media, house.state.signing_key(settings) + robot)
     relays = RelayDesk(settings, engines, lambda: console.peers, house.state.invitations.has_ended)
-    console = Console(settings, metrics, RelayedMedia(media, relays), scene, audit, clock, recorder, stops=stops)
+    console = Console(
+        settings,
+        metrics,
+        RelayedMedia(media, relays),
+        scene,
+        audit,
+        clock,
+        recorder,
+        stops=stops,
+        silenced=house.silenced,
+    )
     console.peers.relays.append(relays)
     console.peers.further_bounds.append(house.check_room)
     console.further_news.append(recorder.state)
@@ -130,7 +140,7 @@ async def _session(
         house=house,
         access=access,
         audit=audit,
-        warden=LinkWarden(house.state.invitations, console.peers, console.audit, robot),
+        warden=LinkWarden(house.state.invitations, console.peers, console.audit, robot, console.stops.show_silence),
         scene=scene,
         recorder=recorder,
         relays=relays,

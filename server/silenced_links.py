@@ -1,30 +1,59 @@
-"""Links whose stops a supervisor has silenced. No I/O, no clock: `now` is handed in."""
+"""Links whose stops a supervisor has silenced, and all that were invited with them. No I/O, no clock: `now` is given.
 
-__all__ = ["SILENCE_SECONDS", "SilencedLinks"]
+Whoever may invite could go on with a link of their own making. So silence covers a link and every link below it: those
+that were invited with it, with those, and so on, before or after it was silenced.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+__all__ = ["MAX_SILENCED", "SILENCE_SECONDS", "SilencedLinks"]
 
 SILENCE_SECONDS = 600.0  # then it ends by itself
 MAX_SILENCED = 256  # links; one more ends the silence of the oldest
+MAX_CONSOLES = 64  # others that say whom they have silenced; what they silenced ends by itself too
+MAX_ABOVE = 5000  # links above one another, as many as are ever remembered
+CLOCK_SLACK = 2.0  # s that two consoles may say the end of one silence apart
+
+
+def _nobody(link: str) -> str:
+    return ""
 
 
 class SilencedLinks:
-    def __init__(self) -> None:
+    """Of all robots of one console.
+
+    Args:
+        invited_with: the link that a link was invited with; "" for none, or when that is not known
+    """
+
+    def __init__(self, invited_with: Callable[[str], str] = _nobody) -> None:
+        self._invited_with = invited_with
         self._until: dict[str, float] = {}  # link -> s, oldest first
+        self._elsewhere: dict[str, dict[str, float]] = {}  # console -> what it silenced, as `_until`
+        self._heard: dict[str, float] = {}  # link that was silenced elsewhere, and until when that counts no more here
 
     def __len__(self) -> int:
         return len(self._until)
 
     def silence(self, link: str, now: float) -> None:
         self._until.pop(link, None)
+        self._heard.pop(link, None)
         self._until[link] = now + SILENCE_SECONDS
         while len(self._until) > MAX_SILENCED:
             del self._until[next(iter(self._until))]
 
-    def hear(self, link: str) -> bool:
-        """Ends it; whether the link was silenced."""
-        return self._until.pop(link, None) is not None
+    def hear(self, link: str, now: float) -> bool:
+        """Ends every silence that covers this link, also one above it; whether there was any."""
+        found = [each for each in self._above(link) if self._end_of(each) > now]
+        for each in found:
+            self._until.pop(each, None)
+            if (end := self._end_of(each)) > now:
+                self._heard[each] = end + CLOCK_SLACK
+        self._heard = {each: until for each, until in self._heard.items() if until > now}
+        return bool(found)
 
     def holds(self, link: str, now: float) -> bool:
-        return now < self._until.get(link, now)
+        return self._covered_until(link) > now
 
     def ended(self, now: float) -> list[str]:
         """Links whose silence has just run out."""
@@ -32,3 +61,48 @@ class SilencedLinks:
         for link in over:
             del self._until[link]
         return over
+
+    # other consoles
+
+    def told_elsewhere(self, console: str, links: Mapping[str, float], now: float) -> None:
+        """All that another console has silenced now, and until when. What it said before counts no more."""
+        self._elsewhere.pop(console, None)
+        latest = now + SILENCE_SECONDS + CLOCK_SLACK
+        wanted = {link: min(until, latest) for link, until in links.items() if until > now}
+        if not wanted:
+            return
+        self._elsewhere[console] = dict(list(wanted.items())[:MAX_SILENCED])
+        while len(self._elsewhere) > MAX_CONSOLES:
+            del self._elsewhere[next(iter(self._elsewhere))]
+
+    def to_tell(self, known: Iterable[str], now: float) -> dict[str, float]:
+        """What this console has silenced, for others: they do not know what was invited with what here.
+
+        `known`: all links that were invited here. At most `MAX_SILENCED`.
+        """
+        found = {link: until for link, until in self._until.items() if until > now}
+        if found or self._elsewhere:
+            below = ((link, self._covered_until(self._invited_with(link))) for link in known)
+            found.update((link, until) for link, until in below if until > max(now, found.get(link, 0.0)))
+        return dict(list(found.items())[:MAX_SILENCED])
+
+    def _covered_until(self, link: str) -> float:
+        """0: it is not silenced."""
+        if not (self._until or self._elsewhere) or not link:
+            return 0.0
+        return max(map(self._end_of, self._above(link)))
+
+    def _end_of(self, link: str) -> float:
+        """When the silence of this very link ends; 0 when there is none."""
+        elsewhere = max((links.get(link, 0.0) for links in self._elsewhere.values()), default=0.0)
+        if elsewhere <= self._heard.get(link, 0.0):
+            elsewhere = 0.0
+        return max(self._until.get(link, 0.0), elsewhere)
+
+    def _above(self, link: str) -> Iterator[str]:
+        """The link, the one that it was invited with, and so on."""
+        for _ in range(MAX_ABOVE):
+            yield link
+            link = self._invited_with(link)
+            if not link:
+                return

@@ -8,6 +8,9 @@ At most `MAX_PENDING` are kept. One more takes the place of the newest, which fr
 press that took its place: that one was made later, so its stop is the newer one.
 """
 
+import hashlib
+import json
+import re
 import secrets
 import time
 from collections import OrderedDict
@@ -18,8 +21,25 @@ import msgspec
 from robot_bridge.protocol.messages import Stop, StopTaken
 from server.audit import Actor
 
-__all__ = ["AlreadyTaken", "NewPress", "Press", "PressOutcome", "Settled", "StopPresses", "UnderWay", "new_press"]
+__all__ = [
+    "MAX_GIVEN",
+    "MAX_REASON",
+    "AlreadyTaken",
+    "NewPress",
+    "Press",
+    "PressOutcome",
+    "Settled",
+    "StopPresses",
+    "UnderWay",
+    "new_press",
+    "press_id",
+    "stop_text",
+    "told_id",
+]
 
+PRESS_ID = re.compile(r"[0-9a-f]{32}")
+MAX_GIVEN = 64  # characters of an id as a message holds it
+MAX_REASON = 500  # characters, as on the robot link
 MAX_PENDING = 64
 MAX_SAME = 256  # presses that share the outcome of another one; what is more gets no answer of its own
 MAX_REMEMBERED = 512  # outcomes
@@ -28,7 +48,7 @@ MAX_REMEMBERED = 512  # outcomes
 class Press(msgspec.Struct, frozen=True, kw_only=True):
     """One press: who, where, why."""
 
-    id: str  # "5f0c…", 32 hex digits; of older clients any text
+    id: str  # "5f0c…", 32 lower-case hex digits
     by: Actor = Actor()
     where: str = ""  # "http", "board", a channel
     reason: str = ""
@@ -38,9 +58,32 @@ class Press(msgspec.Struct, frozen=True, kw_only=True):
         return Stop(by=self.by.name[:500], reason=self.reason[:500], press=self.id)
 
 
-def new_press(by: Actor, where: str, reason: str, id_: str = "") -> Press:
-    """A press of now; without an id it gets one."""
-    return Press(id=id_ or secrets.token_hex(16), by=by, where=where, reason=reason, time=time.time())
+def new_press(by: Actor, where: str, reason: str, given: str = "") -> Press:
+    """A press of now. `given`: the id that whoever pressed has made; without one it gets one here."""
+    id_ = press_id(by.link, given) if given else secrets.token_hex(16)
+    return Press(id=id_, by=by, where=where, reason=reason, time=time.time())
+
+
+def press_id(link: str, given: str) -> str:
+    """What a press is called here of which its sender says `given`.
+
+    No stop is refused for its id. One that is not 32 lower-case hex digits is replaced by one that is: the same for
+    every repeat by this link, and another one for any other link, so that nobody's stop passes for somebody else's.
+    """
+    if PRESS_ID.fullmatch(given):
+        return given
+    text = f"{link}\n{given}".encode(errors="surrogatepass")
+    return hashlib.sha256(text).hexdigest()[:32]
+
+
+def stop_text(value: object) -> str:
+    """A field of a stop that should be text, and may be any JSON: no stop is refused for it."""
+    return value if isinstance(value, str) else json.dumps(value, sort_keys=True)
+
+
+def told_id(press: Press, given: str) -> str:
+    """What a press is called towards its sender, who said `given`: as it was said, unless that was longer than any."""
+    return given if 0 < len(given) <= MAX_GIVEN else press.id
 
 
 class NewPress(NamedTuple):

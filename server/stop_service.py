@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
+import msgspec
 import structlog
 
 from robot_bridge.protocol.console import Notice
@@ -36,9 +37,9 @@ from server.reset_attempts import RESET_REASONS, ResetAttempts, ResetOutcome
 from server.session_tap import SessionTap
 from server.silenced_links import SilencedLinks
 from server.stop_keeper import StopKeeper
-from server.stop_presses import AlreadyTaken, NewPress, Press, Settled
+from server.stop_presses import AlreadyTaken, NewPress, Press, Settled, told_id
 
-__all__ = ["KEPT", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
+__all__ = ["KEPT", "SILENCED", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
 
 log = structlog.get_logger(__name__)
 
@@ -54,7 +55,10 @@ UNDELIVERED = "The stop could not be delivered: there is no link to the robot. I
 UNWRITTEN = "Stops cannot be kept on this console's disk ({}). They are kept in memory, until this console ends."
 WRITTEN = "Stops can be kept on this console's disk again."
 KEPT = "the stop is kept and sent first when the link is back"
-SILENCED = "A supervisor has silenced the STOP of your link for ten minutes. What you stopped stays stopped."
+SILENCED = (
+    "A supervisor has silenced the STOP of your link, and of all links that you invited with it, for ten minutes. "
+    "What you stopped stays stopped."
+)
 HEARD = "The STOP of your link works again."
 
 
@@ -80,6 +84,11 @@ class StopOutcome(NamedTuple):
     @property
     def delivered(self) -> bool:
         return self.taken is not None
+
+    @property
+    def kept(self) -> bool:
+        """On the robot's disk."""
+        return self.taken is not None and self.taken.kept
 
     @property
     def number(self) -> int:
@@ -119,8 +128,9 @@ class StopService:
         audit: AuditTrail,
         metrics: Metrics,
         tap: SessionTap,
+        silenced: SilencedLinks | None = None,
     ) -> None:
-        """`holder`: the peer that holds the control seat, or ""."""
+        """`holder`: the peer that holds the control seat, or "". `silenced`: of all robots; None: this one's alone."""
         self._robot = robot
         self._keeper = keeper
         self._presses = keeper.presses
@@ -130,12 +140,12 @@ class StopService:
         self._audit = audit
         self._metrics = metrics
         self._tap = tap
-        self._silenced = SilencedLinks()
+        self._silenced = SilencedLinks() if silenced is None else silenced
         self._resets: ResetAttempts[_Asker] = ResetAttempts()
         self._link_resets = RateLimits(RESET_RATE, RESETS)
         self._robot_resets = RateLimits(ROBOT_RESET_RATE, ROBOT_RESETS)
         self._records = RateLimits(RECORD_RATE, RECORDS)
-        self._listeners: dict[str, list[str]] = {}  # press -> peers that wait for its outcome
+        self._listeners: dict[str, list[tuple[str, str]]] = {}  # press -> who waits for it, and calls it what
         self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
         self._deadlines: dict[str, float] = {}  # press -> until when its answer is waited for
         self._newest: Settled | None = None  # stop of this epoch that was said from here
@@ -158,8 +168,8 @@ class StopService:
 
     # STOP
 
-    def stop(self, press: Press) -> None:
-        """Latch the stop. The outcome is that of the first press with this id.
+    def stop(self, press: Press, given: str = "") -> None:
+        """Latch the stop. The outcome is that of the first press with this id; `given`: what its sender calls it.
 
         Raises:
             Silenced: a supervisor has silenced the stops of this link.
@@ -169,7 +179,7 @@ class StopService:
         if by.link and self._silenced.holds(by.link, time.monotonic()):
             self._audit.refused(by, "silenced")
             raise Silenced(SILENCED)
-        self._listen(by.peer, press.id)
+        self._listen(by.peer, press.id, told_id(press, given))
         match self._presses.press(press):
             case AlreadyTaken(taken):
                 self._audit.again("stop", by, f"{where}, again")
@@ -229,19 +239,19 @@ class StopService:
     def _robot_may_answer(self, press: str) -> bool:
         return self._robot.up or press not in self._late
 
-    def _listen(self, peer: str, press: str) -> None:
-        """The connection is told when the robot answers."""
+    def _listen(self, peer: str, press: str, told: str) -> None:
+        """The connection is told when the robot answers, by the id that it knows."""
         if not peer:
             return
         listeners = self._listeners.setdefault(press, [])
-        if peer not in listeners and len(listeners) < MAX_LISTENERS:
-            listeners.append(peer)
+        if (peer, told) not in listeners and len(listeners) < MAX_LISTENERS:
+            listeners.append((peer, told))
 
     def _answer(self, press: str, taken: StopTaken) -> None:
-        for listener in self._listeners.pop(press, []):
+        for listener, told in self._listeners.pop(press, []):
             peer = self._peers.by_id(listener)
             if peer is not None:
-                peer.send("stop", taken)
+                peer.send("stop", msgspec.structs.replace(taken, press=told))
 
     # what the link says
 
@@ -422,17 +432,19 @@ class StopService:
         if silent:
             self._silenced.silence(link, now)
             self._audit.record("silence", by.actor, "silenced", f"{found.name} ({link})")
-            self._wake.set()
-        elif self._silenced.hear(link):
+        elif self._silenced.hear(link, now):
             self._audit.record("silence", by.actor, "heard again", f"{found.name} ({link})")
-        self._tell_silence(link, silent=silent)
+        self.show_silence()
         return None
 
-    def _tell_silence(self, link: str, *, silent: bool) -> None:
-        notice = Notice(level="warning", text=SILENCED) if silent else Notice(level="info", text=HEARD)
+    def show_silence(self) -> None:
+        """Tell those whose stops were silenced, or are heard again, here or at another robot or console."""
+        now = time.monotonic()
         for peer in self._peers:
-            if peer.identity.token_id == link:
+            silent = self._silenced.holds(peer.identity.token_id, now)
+            if silent != peer.silenced:
                 peer.silenced = silent
+                notice = Notice(level="warning", text=SILENCED) if silent else Notice(level="info", text=HEARD)
                 peer.send("session", notice)
 
     def is_silenced(self, link: str) -> bool:
@@ -451,9 +463,6 @@ class StopService:
 
     def _look(self, now: float) -> bool:
         """Whether anything is left to wait for."""
-        for link in self._silenced.ended(now):
-            self._audit.record("silence", what="ended", detail=link)
-            self._tell_silence(link, silent=False)
         late = [press for press in self._presses.pending if now >= self._deadlines.get(press.id, now + 1)]
         for press in late:
             self._not_delivered(press)
@@ -462,7 +471,7 @@ class StopService:
         if now - self._sent_at >= AGAIN_SECONDS and self._presses.pending:
             self.link_up()
         self._settle(self._resets.expire(now))
-        return bool(self._presses.pending or self._resets or self._silenced)
+        return bool(self._presses.pending or self._resets)
 
     def _record(self, press: Press, what: str) -> None:
         """In full for the first of each link; a flood becomes one record a second."""

@@ -1,6 +1,6 @@
 """The board on which consoles behind one entry tell each other what they do. It never moves a robot."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
@@ -62,6 +62,14 @@ class BoardHost(Protocol):
 
     async def stop_robot(self, name: str, press: Press) -> StopAnswer:
         """Latched at once; returns within a second or so, when the robot has answered or has not."""
+        ...
+
+    def silences(self) -> dict[str, float]:
+        """Links whose stops other consoles have to silence too, and until when, in s since 1970."""
+        ...
+
+    def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
+        """What that console says so of; all of it, each time."""
         ...
 
     def links_revoked(self, ended: list[Invitation]) -> None:

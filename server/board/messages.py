@@ -11,6 +11,7 @@ from server.board.board import SharedRecord
 from server.board.errors import InputMalformed
 from server.board.seal import Seal
 from server.board.tile import ROBOT_NAME, Name, Tile, Words
+from server.silenced_links import MAX_SILENCED
 
 __all__ = [
     "MAX_AUDIT_LINE",
@@ -25,6 +26,7 @@ __all__ = [
     "Published",
     "Revoked",
     "RevokedLink",
+    "SilencedLink",
     "StopReply",
     "StopRequest",
     "pack_news",
@@ -48,6 +50,14 @@ RobotName = Annotated[str, Field(pattern=ROBOT_NAME)]
 
 
 @dataclass(frozen=True, kw_only=True)
+class SilencedLink:
+    """A link whose stops a supervisor has silenced."""
+
+    id: Annotated[str, Field(min_length=1, max_length=64, pattern=r"^\S+$")]
+    until: Annotated[float, Field(ge=0, allow_inf_nan=False)]  # s since 1970
+
+
+@dataclass(frozen=True, kw_only=True)
 class Published:
     """All that one console shows."""
 
@@ -55,6 +65,7 @@ class Published:
     name: Name  # for people
     n: Annotated[int, Field(ge=1, lt=2**53)]  # counts up; an old one never stands for a living console
     robots: Annotated[tuple[Tile, ...], Field(max_length=MAX_ROBOTS)]
+    silenced: Annotated[tuple[SilencedLink, ...], Field(max_length=MAX_SILENCED)] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,6 +23,7 @@ from server.board.messages import (
     Outcome,
     Published,
     Revoked,
+    SilencedLink,
     StopReply,
     StopRequest,
     pack_news,
@@ -207,7 +208,8 @@ class RedisBoard:
 
     async def _show(self, store: RedisStore) -> None:
         self._n += 1
-        published = Published(id=self.id, name=self.name, n=self._n, robots=self._tiles)
+        silenced = tuple(SilencedLink(id=link, until=until) for link, until in self._host.silences().items())
+        published = Published(id=self.id, name=self.name, n=self._n, robots=self._tiles, silenced=silenced)
         news = self._pack(Changed(console=self.id)) if self._loud else None
         self._loud = False
         try:
@@ -240,7 +242,9 @@ class RedisBoard:
     async def _look(self, store: RedisStore) -> None:
         async for sealed in store.shown(self.id, self._count):
             try:
-                self._others.heard(unpack_published(self._seal, sealed), time.monotonic())
+                shown = unpack_published(self._seal, sealed)
+                if self._others.heard(shown, time.monotonic()):
+                    self._host.silenced_elsewhere(shown.id, {each.id: each.until for each in shown.silenced})
             except BoardInput as error:
                 self._count(error)
             await asyncio.sleep(0)  # a turn for the sessions between any two consoles

@@ -9,14 +9,13 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from robot_bridge.protocol.console import Role
 from server.access import Right
-from server.api import StopRequest
 from server.board.board import BoardState
 from server.board.tile import Tile
-from server.body import read_json
 from server.errors import LinkOtherRobot
 from server.fleet.fleet import Fleet, Stopped, fleet_caller, fleet_of
 from server.json_answer import json_answer
-from server.stop_presses import new_press
+from server.stop_body import read_stop
+from server.stop_presses import new_press, told_id
 
 __all__ = ["FleetHealth", "FleetInfo", "FleetReadiness", "FleetStop", "RobotTile", "router"]
 
@@ -109,12 +108,12 @@ async def fleet(request: Request, caller: Caller) -> Response:
 async def stop(request: Request, caller: Caller) -> Response:
     """Anyone with a token, for every robot that it is good for."""
     here = fleet_of(request)
-    wanted = await read_json(request, StopRequest)
+    wanted = await read_stop(request)
     press = new_press(caller.actor, "http", wanted.reason, wanted.press)
     stopped = await here.stop_all(caller.identity, press)
     if not stopped:
         raise LinkOtherRobot("this link is good for none of the robots here")
-    return json_answer(FleetStop(press=press.id, robots=[_stopped(each) for each in stopped]))
+    return json_answer(FleetStop(press=told_id(press, wanted.press), robots=[_stopped(each) for each in stopped]))
 
 
 @router.get("/healthz")

@@ -24,6 +24,7 @@ from server.invitations import Invitation
 from server.settings import Settings
 from server.state import robot_place
 from server.stop_presses import Press
+from server.stop_service import SILENCED
 from server.sweeper import sweep_forever
 
 __all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
@@ -140,6 +141,8 @@ class Fleet:
         """`robots`: with the consoles that have them."""
         if not robots:
             return []
+        if self._house is not None and self._house.is_silenced(press.by.link):
+            return [Stopped(name, False, 0, SILENCED, 0, console) for name, console in robots.items()]
         answers = await self.board.stop(robots.keys(), press)
         return [
             Stopped(name, answer.delivered, answer.event, answer.detail, answer.number, robots[name])
@@ -167,6 +170,13 @@ class Fleet:
             return StopAnswer(True, False, 0, "that console does not have this robot")
         stopped = await self._stop(session, press)
         return StopAnswer(True, stopped.delivered, stopped.event, stopped.detail, stopped.number)
+
+    def silences(self) -> dict[str, float]:
+        return {} if self._house is None else self._house.silences()
+
+    def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
+        if self._house is not None:
+            self._house.silenced_elsewhere(console, links)
 
     def links_revoked(self, ended: list[Invitation]) -> None:
         if self._house is not None:

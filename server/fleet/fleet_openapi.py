@@ -2,13 +2,13 @@
 
 from typing import Any
 
-from server.api import StopRequest
 from server.errors import BadParameter, LinkOtherRobot, NotAllowed, NotFound, RobotFailed
 from server.fleet.api_audit import MAX_RECORDS, FleetAudit
 from server.fleet.api_fleet import FleetHealth, FleetInfo, FleetReadiness, FleetStop
 from server.fleet.robot_names import NAME_PATTERN
 from server.openapi import OPERATIONS, WITH_JSON, Operation, Parameter, openapi_document
 from server.robot_paths import ROBOTS
+from server.stop_body import StopRequest
 
 __all__ = ["FLEET_OPERATIONS", "fleet_openapi"]
 

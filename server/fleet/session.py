@@ -10,6 +10,7 @@ from server.access import Access
 from server.app import attach_session, session_app
 from server.audit import AuditRecord
 from server.backoff import Backoff
+from server.errors import Silenced
 from server.fleet.fleet_metrics import FleetMetrics
 from server.fleet.pulse import Pulse
 from server.house import House
@@ -22,7 +23,7 @@ from server.settings import Settings
 from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
 from server.stop_presses import AlreadyTaken, NewPress, Press
-from server.stop_service import KEPT, StopAnswer, StopOutcome
+from server.stop_service import KEPT, SILENCED, StopAnswer, StopOutcome
 
 __all__ = ["FleetSession"]
 
@@ -51,6 +52,7 @@ class FleetSession:
         self._backoff = Backoff(FIRST_WAIT, LONGEST_WAIT)
         self._stops: StopKeeper | None = None  # None before `run`
         self._access: Access | None = None
+        self._house: House | None = None
         self._ended_before = 0  # connections of earlier sessions
 
     @property
@@ -83,8 +85,10 @@ class FleetSession:
         if here is not None:
             return await here.stop(press)
         stops = self._stops
-        if stops is None:
+        if stops is None or self._house is None:
             raise TypeError("the fleet is not running")
+        if press.by.link and self._house.is_silenced(press.by.link):
+            raise Silenced(SILENCED)
         pressed = stops.presses.press(press)
         log.warning("stop kept", by=press.by.name, where=press.where, reason=press.reason, robot=self.name)
         if isinstance(pressed, AlreadyTaken):
@@ -102,7 +106,7 @@ class FleetSession:
         self, house: House, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
     ) -> None:
         """Until cancelled. `told` hears every record of its audit."""
-        self.app.state.house = house
+        self.app.state.house = self._house = house
         self._access = house.state.access.at(self.name)
         stops = self._stops = StopKeeper(directory, self.settings.robot)
         self.app.state.stop_keeper = self

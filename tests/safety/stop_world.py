@@ -32,7 +32,7 @@ from server.peers import Peers
 from server.seat import ControlSeat, SeatOutcome, SeatTimes
 from server.session_tap import SessionTap
 from server.stop_keeper import StopKeeper
-from server.stop_presses import Press, new_press
+from server.stop_presses import Press
 from server.stop_service import StopService
 from tests.robot_bridge.bridge_model import BridgeModel
 from tests.robot_bridge.core_helpers import AXES, NEUTRAL
@@ -236,7 +236,7 @@ class ConsoleModel:
 
     def press(self, person: str, id_: str, *, http: bool) -> None:
         actor = self.people.all[person].actor
-        press = new_press(actor._replace(peer="") if http else actor, "http" if http else "stop", "", id_)
+        press = Press(id=id_, by=actor._replace(peer="") if http else actor, where="http" if http else "stop")
         try:
             self.service.stop(press)
         except Silenced:

@@ -1,5 +1,7 @@
 """The HTTP API of a console that runs, with a real bridge."""
 
+import re
+
 import pytest
 
 from robot_bridge.protocol.console import StopStateNotice
@@ -105,8 +107,7 @@ async def test_a_stop_needs_no_body() -> None:
     ("body", "status", "name"),
     [
         (b"{", 400, "bad_json"),
-        (b'{"reason": 5}', 400, "bad_json"),
-        (b'{"reason": "' + b"x" * 501 + b'"}', 400, "bad_json"),
+        (b'{"number": "x"}', 400, "bad_json"),
         (b"\xff\xfe", 400, "bad_json"),
         (b"[" * 3000, 400, "bad_json"),
         (b"x" * 5000, 413, "too_large"),
@@ -114,10 +115,55 @@ async def test_a_stop_needs_no_body() -> None:
 )
 async def test_a_body_that_is_not_understood_is_refused_by_name(body: bytes, status: int, name: str) -> None:
     async with running_rig() as rig:
-        answer = await rig.http.post("/api/stop", headers=rig.token("operator"), content=body)
+        answer = await rig.http.post("/api/reset", headers=rig.token("operator"), content=body)
         assert (answer.status_code, answer.json()["error"]) == (status, name)
         assert rig.count("lockstep_bad_input_total", where="http", reason=name) == 1
-        assert (await rig.session())["stopped"] is False
+
+
+@pytest.mark.parametrize(
+    ("body", "reason", "refused"),
+    [
+        (b"{", "", "bad_json"),
+        (b"a person is in the cell", "", "bad_json"),
+        (b"\xff\xfe", "", "bad_json"),
+        (b"[" * 3000, "", "bad_json"),
+        (b"x" * 5000, "", "too_large"),
+        (b'{"reason": 5, "press": null}', "5", ""),
+        (b'{"reason": "' + b"x" * 501 + b'"}', "x" * 500, ""),
+    ],
+)
+async def test_a_stop_is_a_stop_whatever_its_body_is(body: bytes, reason: str, refused: str) -> None:
+    async with running_rig() as rig:
+        answer = await rig.http.post("/api/stop", headers=rig.token("observer"), content=body)
+        assert (answer.status_code, answer.json()["delivered"]) == (200, True), answer.text
+        assert stop_words(await _stop_state(rig, stopped=True)) == ("observer", reason)
+        assert rig.count("lockstep_bad_input_total", where="http", reason=refused) == (1 if refused else 0)
+
+
+@pytest.mark.parametrize("given", ["estop", "5F" * 16, "x" * 64, "\u2028\N{SNOWMAN}", "../../etc/passwd", "0" * 31])
+async def test_a_press_with_an_id_of_any_kind_is_one_stop_and_is_told_by_that_id(given: str) -> None:
+    async with running_rig() as rig:
+        headers, other = rig.token("observer"), rig.token("observer")
+        first, again = [
+            (await rig.http.post("/api/stop", headers=headers, json={"press": given})).json() for _ in range(2)
+        ]
+        assert first["press"] == again["press"] == given
+        assert first["number"] == again["number"]
+        assert first["kept"] is False, "this bridge has no disk"
+        shown = (await _stop_state(rig, stopped=True)).press
+        assert re.fullmatch("[0-9a-f]{32}", shown), "what others are told, and what is written down"
+        theirs = (await rig.http.post("/api/stop", headers=other, json={"press": given})).json()
+        assert theirs["number"] == first["number"] + 1, "another link's press is another stop"
+        assert theirs["press"] == given
+
+
+async def test_an_id_that_is_longer_than_any_is_told_as_it_is_called_here() -> None:
+    async with running_rig() as rig:
+        headers = rig.token("observer")
+        answers = [await rig.http.post("/api/stop", headers=headers, json={"press": "x" * 900}) for _ in range(2)]
+        first, again = [answer.json() for answer in answers]
+        assert first == again
+        assert re.fullmatch("[0-9a-f]{32}", first["press"])
 
 
 async def test_unknown_paths_and_methods_are_refused_by_name() -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from robot_bridge.protocol.console import Rename, Report, SeatRelease, SeatRequest, encode_console_message
 from robot_bridge.protocol.messages import Command, Ping, Reset, Rest, Stop
-from server.channels import CHANNELS, MAX_MESSAGE, ChannelName, MessageBudget, channel_name, parse_message
+from server.channels import CHANNELS, MAX_MESSAGE, ChannelName, MessageBudget, channel_name, parse_message, stop_in
 from server.errors import (
     BinaryMessage,
     ChannelError,
@@ -126,3 +126,31 @@ def test_silence_saves_up_no_more_than_one_burst() -> None:
         budget.spend(1000.0)
     with pytest.raises(Flood):
         budget.spend(1000.0)
+
+
+@pytest.mark.parametrize(
+    ("data", "reason", "press"),
+    [
+        ('{"type": "stop", "press": "%s"}' % ("x" * 65), "", "x" * 65),
+        ('{"type": "stop", "press": 17, "reason": null}', "null", "17"),
+        ('{"type": "stop", "by": [], "reason": "dog"}', "dog", ""),
+        ('{"type": "stop", "reason": "%s"}' % ("x" * 501), "x" * 500, ""),
+        (b'{"type": "stop", "reason": "dog"}', "dog", ""),
+    ],
+)
+def test_what_says_that_it_is_a_stop_is_one_whatever_else_is_wrong_with_it(
+    data: str | bytes, reason: str, press: str
+) -> None:
+    with pytest.raises(ChannelError):
+        parse_message("stop", data)
+    assert stop_in(data) == Stop(reason=reason, press=press)
+
+
+@given(st.text() | st.binary() | st.none())
+def test_what_does_not_say_so_is_none(data: object) -> None:
+    assert stop_in(data) is None
+
+
+@pytest.mark.parametrize("data", ['{"type": "reset"}', '{"type": "stop"', '"stop"', "[" * 9000, "x" * 99_999, 5])
+def test_nothing_else_becomes_a_stop(data: object) -> None:
+    assert stop_in(data) is None

@@ -1,13 +1,15 @@
 """Host names, and requests of an address; over real HTTP where the console's own answer matters."""
 
 import asyncio
+from collections import Counter
+from collections.abc import Callable
 
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from server.client_address import NO_ADDRESS
 from server.errors import HostRefused
-from server.front_door import FrontDoor, HostNames, client_address
+from server.front_door import STOP_BURST, STOP_RATE, FrontDoor, HostNames, client_address
 from server.rate_limits import RateLimits
 from tests.server.rig import running_rig
 
@@ -70,6 +72,102 @@ async def test_an_address_that_asks_too_often_is_refused_but_may_still_stop_the_
         assert health == [200, 200, 200, 429], "counted apart"
 
 
+def _stop_door(
+    answered: list[str], turned_away: list[str], silenced: tuple[str, ...] = (), now: Callable[[], float] = lambda: 0.0
+) -> FrontDoor:
+    """One that takes two requests of an address. The link of a request is its header x-link."""
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        answered.append(scope["link"])
+
+    return FrontDoor(
+        app,
+        HostNames(()),
+        RateLimits(0.001, 2),
+        lambda scope, name: turned_away.append(scope["link"]),
+        now,
+        link_of=lambda scope: str(scope["link"]),
+        is_silenced=lambda scope, link: link in silenced,
+    )
+
+
+async def _ask(door: FrontDoor, link: str, path: str = "/api/stop", method: str = "POST", kind: str = "http") -> None:
+    async def receive() -> Message:
+        raise AssertionError("nothing to receive")
+
+    async def send(message: Message) -> None:
+        pass
+
+    scope = {"type": kind, "path": path, "headers": [(b"host", b"localhost")], "link": link}
+    await door(scope | ({"method": method} if kind == "http" else {}), receive, send)
+
+
+@pytest.mark.parametrize("path", ["/api/stop", "/api/fleet/stop", "/robots/left/api/stop"])
+async def test_stops_of_one_link_pass_the_limits_up_to_a_rate_and_anothers_pass_all_the_same(path: str) -> None:
+    answered: list[str] = []
+    turned_away: list[str] = []
+    now = [0.0]
+    door = _stop_door(answered, turned_away, now=lambda: now[0])
+    for _ in range(1000):
+        await _ask(door, "flood", path)
+    assert len(answered) == STOP_BURST + 2, "those of its own bucket, and those of the address"
+    assert len(turned_away) == 1000 - len(answered)
+    for _ in range(STOP_BURST):
+        await _ask(door, "other", path)  # of the same address
+    assert answered.count("other") == STOP_BURST
+    now[0] = 1.0
+    for _ in range(1000):
+        await _ask(door, "flood", path)
+    assert answered.count("flood") == STOP_BURST + 2 + STOP_RATE
+
+
+async def test_a_silenced_link_has_no_stops_that_pass_the_limits() -> None:
+    answered: list[str] = []
+    turned_away: list[str] = []
+    door = _stop_door(answered, turned_away, silenced=("flood",))
+    for _ in range(100):
+        await _ask(door, "flood")
+    assert (len(answered), len(turned_away)) == (2, 98)
+    await _ask(door, "other")
+    assert answered[-1] == "other"
+
+
+@pytest.mark.parametrize(
+    ("path", "method", "kind"),
+    [
+        ("/api/stop", "GET", "http"),
+        ("/api/stop", "HEAD", "http"),
+        ("/api/stop", "OPTIONS", "http"),
+        ("/api/fleet/stop", "DELETE", "http"),
+        ("/api/stop/", "POST", "http"),
+        ("/api//stop", "POST", "http"),
+        ("//api/stop", "POST", "http"),
+        ("/robots/left/right/api/stop", "POST", "http"),
+        ("/robots/left/robots/left/api/stop", "POST", "http"),
+        ("/whep", "POST", "http"),
+        ("/api/stop", "", "websocket"),
+    ],
+)
+async def test_nothing_else_that_looks_like_a_stop_passes_the_limits(path: str, method: str, kind: str) -> None:
+    answered: list[str] = []
+    turned_away: list[str] = []
+    door = _stop_door(answered, turned_away)
+    for _ in range(50):
+        await _ask(door, "flood", path, method, kind)
+    assert (len(answered), len(turned_away)) == (2, 48)
+
+
+async def test_one_link_that_floods_the_stop_loads_nobody_and_the_stops_of_others_are_answered() -> None:
+    async with running_rig(max_request_burst=5, max_request_rate=0.001) as rig:
+        flood, other = rig.token("observer"), rig.token("observer")
+        asked = [rig.http.post("/api/stop", headers=flood) for _ in range(200)]
+        codes = Counter([answer.status_code for answer in await asyncio.gather(*asked)])
+        assert set(codes) == {200, 429}
+        assert rig.count("lockstep_stops_total", where="http") == codes[200]
+        assert codes[429] > 100, "twenty at once, twenty in each second that this took, and five of the address"
+        assert (await rig.http.post("/api/stop", headers=other)).status_code == 200
+
+
 async def test_who_fails_to_say_who_they_are_too_often_is_told_so_and_others_are_not_disturbed() -> None:
     async with running_rig(max_refused_burst=2, max_refused_rate=0.001) as rig:
         answers = [await rig.http.get("/api/session", headers={"Authorization": "Bearer x"}) for _ in range(3)]
@@ -117,7 +215,9 @@ async def test_a_stop_does_not_wait_for_the_turn_of_others() -> None:
     door = FrontDoor(app, HostNames(()), RateLimits(1, 9), lambda scope, name: None, lambda: 0.0, link_of=link_of)
     paths = ("/api/session", "/metrics", "/api/invitations", "/api/stop")
     requests = [
-        asyncio.create_task(door({"type": "http", "path": path, "headers": [(b"host", b"localhost")]}, receive, send))
+        asyncio.create_task(
+            door({"type": "http", "method": "POST", "path": path, "headers": [(b"host", b"localhost")]}, receive, send)
+        )
         for path in paths
     ]
     await asyncio.gather(*requests)

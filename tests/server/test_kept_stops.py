@@ -1,4 +1,5 @@
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,18 @@ def test_a_file_that_cannot_be_read_is_a_stop_too_and_goes_when_that_has_arrived
     (again,) = kept.load()
     kept.drop(again.id)
     assert kept.load() == []
+
+
+def test_a_file_of_an_id_that_no_message_can_hold_or_of_any_name_is_a_stop_that_can_be_sent(tmp_path: Path) -> None:
+    kept = _kept(tmp_path)
+    kept.keep(_press("x" * 65))
+    place = kept_stops_place(tmp_path, "tcp://a:1")
+    (place / f"{'y' * 200}.json").write_text("{}")
+    found = kept.load()
+    assert all(re.fullmatch("[0-9a-f]{32}", press.id) for press in found)
+    for press in found:
+        kept.drop(press.id)
+    assert (len(found), kept.load()) == (2, [])
 
 
 def test_a_file_that_can_neither_be_read_nor_moved_hides_no_other_stop(

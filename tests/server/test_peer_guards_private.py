@@ -9,7 +9,7 @@ import pytest
 from aiortc import RTCConfiguration, RTCPeerConnection
 from aiortc.rtcsctptransport import DataChunk, ForwardTsnChunk, InboundStream
 
-from robot_bridge.protocol.messages import Ping, Pong
+from robot_bridge.protocol.messages import Ping, Pong, StopTaken
 from server import peer_guards_private
 from server.peer_guards_private import (
     CHECK_BURST,
@@ -139,6 +139,20 @@ async def test_an_observer_may_say_less_than_an_operator_but_always_stop() -> No
         peer.send_raw("control", '{"type":"stop","by":"","reason":"dog"}')
         await eventually(lambda: rig.services.console.clock.stop.stopped)
         assert rig.count("lockstep_bad_input_total", where="control", reason="flood") >= 15
+
+
+async def test_a_stop_that_is_malformed_is_counted_and_stops_all_the_same_and_its_sender_hears_of_it_by_its_id() -> (
+    None
+):
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        peer.send_raw("stop", '{"type":"stop","reason":5,"press":"my stop"}')
+        taken = await peer.until(lambda each: isinstance(each, StopTaken))
+        assert isinstance(taken, StopTaken)
+        assert taken.press == "my stop"
+        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        stop = rig.services.console.clock.stop
+        assert (stop.reason, len(stop.press)) == ("5", 32)
+        assert rig.count("lockstep_bad_input_total", where="stop", reason="malformed") == 1
 
 
 async def test_peers_that_do_not_connect_take_no_more_than_their_places() -> None:

@@ -1,3 +1,5 @@
+import re
+
 from robot_bridge.protocol.messages import Stop, StopTaken
 from server.audit import Actor
 from server.stop_presses import (
@@ -11,6 +13,8 @@ from server.stop_presses import (
     StopPresses,
     UnderWay,
     new_press,
+    press_id,
+    told_id,
 )
 
 
@@ -88,4 +92,19 @@ def test_a_press_without_an_id_gets_one_of_its_own() -> None:
     first, second = (new_press(Actor("Ann"), "http", "") for _ in range(2))
     assert first.id != second.id
     assert len(first.id) == 32
-    assert new_press(Actor("Ann"), "http", "", "given").id == "given"
+    assert press_id("", first.id) == first.id
+
+
+def test_an_id_that_is_none_becomes_one_the_same_for_every_repeat_by_that_link_and_for_no_other() -> None:
+    assert new_press(Actor(link="a"), "http", "", "5f" * 16).id == "5f" * 16
+    odd = ("stop", "5F" * 16, "5f" * 16 + "\n", "5f" * 17, "x" * 10_000, "\ud800", " ")
+    found = [press_id(link, given) for link in ("a", "b") for given in odd]
+    assert all(re.fullmatch("[0-9a-f]{32}", each) for each in found)
+    assert len(set(found)) == len(found)
+    assert found == [press_id(link, given) for link in ("a", "b") for given in odd]
+
+
+def test_a_sender_is_told_of_its_press_by_the_id_that_it_gave() -> None:
+    press = new_press(Actor(link="a"), "http", "", "stop")
+    assert told_id(press, "stop") == "stop"
+    assert told_id(press, "") == told_id(press, "x" * 65) == press.id

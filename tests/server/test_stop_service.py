@@ -1,6 +1,7 @@
 """The life of a STOP at the console, with a robot that answers when the test says so."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any, cast
@@ -31,6 +32,7 @@ from server.metrics import Metrics
 from server.peer import Peer
 from server.peers import Peers
 from server.session_tap import SessionTap
+from server.silenced_links import SILENCE_SECONDS
 from server.stop_keeper import StopKeeper
 from server.stop_presses import Press, new_press
 from server.stop_service import StopService
@@ -115,7 +117,7 @@ class Bench:
         )
 
     def press(self, who: str, id_: str, where: str = "stop") -> Press:
-        press = new_press(self.peers.all[who].actor, where, "smoke", id_)
+        press = Press(id=id_, by=self.peers.all[who].actor, where=where, reason="smoke")
         self.service.stop(press)
         return press
 
@@ -380,13 +382,29 @@ async def test_only_supervisors_silence_and_nobody_silences_them(bench: Bench, w
 
 
 async def test_a_silence_ends_by_itself_and_the_person_is_told(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.silenced_links.SILENCE_SECONDS", 0.0)
     olga = bench.peers.all["olga"]
     bench.service.silence(cast(Peer, bench.peers.all["sue"]), olga.id, silent=True)
-    async with asyncio.timeout(PATIENCE):
-        while olga.silenced:  # noqa: ASYNC110
-            await asyncio.sleep(0.001)
-    assert bench.heard("olga", Notice)[-1].level == "info"
+    assert olga.silenced
+    bench.service.show_silence()
+    assert [each.level for each in bench.heard("olga", Notice)] == ["warning"], "said once"
+    later = time.monotonic() + SILENCE_SECONDS
+    monkeypatch.setattr(time, "monotonic", lambda: later)
+    bench.service.show_silence()
+    assert [each.level for each in bench.heard("olga", Notice)] == ["warning", "info"]
+    bench.press("olga", "p")
+
+
+async def test_a_press_is_told_to_each_sender_by_the_id_that_it_gave(bench: Bench) -> None:
+    press = new_press(bench.peers.all["olga"].actor, "stop", "smoke", "my stop")
+    for given in ("my stop", "my stop", "x" * 65):
+        bench.service.stop(press, given)
+    (sent,) = bench.robot.sent
+    assert isinstance(sent, Stop)
+    assert sent.press == press.id != "my stop"
+    bench.take(press.id, 4)
+    assert [each.press for each in bench.heard("olga", StopTaken)] == ["my stop", press.id]
+    bench.service.stop(press, "my stop")
+    assert bench.heard("olga", StopTaken)[-1] == StopTaken(press="my stop", number=4)
 
 
 # reset

@@ -33,6 +33,14 @@ class FakeHost:
         self.presses: list[str] = []
         self.away: set[str] = set()
         self.ended: list[Invitation] = []
+        self.silenced: dict[str, float] = {}
+        self.elsewhere: dict[str, dict[str, float]] = {}
+
+    def silences(self) -> dict[str, float]:
+        return self.silenced
+
+    def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
+        self.elsewhere[console] = dict(links)
 
     async def stop_robot(self, name: str, press: Press) -> StopAnswer:
         self.stops.append((name, press.by.name, press.reason))

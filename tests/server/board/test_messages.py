@@ -1,5 +1,6 @@
 import json
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,6 +17,7 @@ from server.board.messages import (
     Published,
     Revoked,
     RevokedLink,
+    SilencedLink,
     StopReply,
     StopRequest,
     pack_news,
@@ -52,8 +54,16 @@ def test_news_come_out_as_they_went_in(news: News) -> None:
 
 
 def test_what_a_console_shows_comes_out_as_it_went_in() -> None:
-    published = Published(id=ID, name="one", n=9, robots=(GOOD,))
+    published = Published(id=ID, name="one", n=9, robots=(GOOD,), silenced=(SilencedLink(id="x", until=9.5),))
     assert unpack_published(SEAL, pack_published(SEAL, published)) == published
+
+
+def test_a_console_that_silences_nobody_or_says_more_than_is_known_here_is_understood() -> None:
+    """Consoles of two versions may share a board."""
+    told = msgspec.to_builtins(Published(id=ID, name="one", n=9, robots=(GOOD,)))
+    del told["silenced"]
+    assert unpack_published(SEAL, SEAL.put("console", json.dumps(told).encode())).silenced == ()
+    assert unpack_published(SEAL, SEAL.put("console", json.dumps(told | {"new": [1]}).encode())).n == 9
 
 
 def test_an_audit_record_is_the_very_line_of_the_file() -> None:

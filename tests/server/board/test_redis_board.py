@@ -1,6 +1,7 @@
 """The board on a real Redis."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Mapping, Sequence
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from tests.server.board.boards import eventually, running_board, tile
 from tests.support.redis_server import RedisServer
 
 ANN = Actor("Ann", "operator", "peer", "link")
+PRESS = "5f" * 16
 
 
 @pytest.fixture
@@ -48,10 +50,10 @@ async def test_a_stop_reaches_the_robot_of_another_console_once_and_is_answered(
     ):
         await eventually(lambda: len(two.others()) == 2, "the robots")
         one.host.away.add("right")
-        answers = await two.stop(["left", "right"], new_press(ANN, "http", "smoke", "p"))
+        answers = await two.stop(["left", "right"], new_press(ANN, "http", "smoke", PRESS))
         assert one.host.stops == [("left", "Ann", "smoke"), ("right", "Ann", "smoke")]
         assert answers["left"] == (True, True, 7, "", 3)
-        assert one.host.presses == ["p", "p"], "the press of whoever asked"
+        assert one.host.presses == [PRESS, PRESS], "the press of whoever asked"
         assert (answers["right"].confirmed, answers["right"].delivered) == (True, False)
         assert "sent first when the link is back" in answers["right"].detail
 
@@ -152,3 +154,15 @@ async def test_two_living_consoles_that_claim_one_robot_both_say_so_and_the_log_
 
 def _named(logs: Sequence[Mapping[str, object]]) -> int:
     return sum(each.get("error") == "robot_claimed_twice" and each.get("robot") == "left" for each in logs)
+
+
+async def test_whom_one_console_silences_the_others_silence_too_and_hear_again_with_it(server: RedisServer) -> None:
+    until = round(time.time() + 300, 3)
+    async with (
+        running_board(server.url, "one", tile("left")) as one,
+        running_board(server.url, "two", tile("far")) as two,
+    ):
+        one.host.silenced = {"link": until}
+        await eventually(lambda: two.host.elsewhere.get(one.id) == {"link": until}, "the silence")
+        one.host.silenced = {}
+        await eventually(lambda: two.host.elsewhere.get(one.id) == {}, "its end")

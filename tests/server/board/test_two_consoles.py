@@ -5,7 +5,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import httpx
 import pytest
@@ -14,10 +14,11 @@ from pydantic import SecretStr
 
 from client import Console
 from client.errors import ConsoleLost
-from robot_bridge.protocol.console import Role
+from robot_bridge.protocol.console import Notice, Role, SilenceStops, Welcome
 from robot_bridge.protocol.messages import Feedback
 from server.settings import Settings
 from server.state import open_state
+from tests.server.rig import Rig, TestPeer
 from tests.support.redis_server import RedisServer, free_port
 from tests.support.stack import Stack, running_fleet
 
@@ -276,3 +277,32 @@ async def _notes(place: Place, supervisor: Mapping[str, str]) -> list[Answer]:
         for each in answer.json()["records"]
         if each["record"]["kind"] == "note" and "squeaks" in each["record"].get("detail", "")
     ]
+
+
+async def test_who_is_silenced_at_one_console_is_silenced_at_the_other_by_every_link_of_theirs(world: World) -> None:
+    made, token = world.one.invite("operator")
+    bad = {"Authorization": f"Bearer {token}"}
+    wanted = {"role": "operator", "seconds": 600, "robots": []}
+    below = (await world.two.http.post("/robots/right/api/invitations", headers=bad, json=wanted)).json()["link"]
+    sue, mal = TestPeer(), TestPeer()
+    try:
+        for peer, headers in ((sue, world.one.token(world.one.stack.supervisor)), (mal, bad)):
+            await peer.join(cast(Rig, world.one), headers, ("session",), "/robots/left/whep")
+        welcome = await mal.until(lambda each: isinstance(each, Welcome))
+        sue.send("session", SilenceStops(peer=cast(Welcome, welcome).peer))
+        await mal.until(lambda each: isinstance(each, Notice) and "silenced" in each.text)
+    finally:
+        await sue.close()
+        await mal.close()
+    ways = [
+        (world.one, "left", bad),
+        (world.one, "left", world.one.token(below)),
+        (world.two, "right", bad),
+        (world.two, "right", world.two.token(below)),
+    ]
+    async with asyncio.timeout(PATIENCE):
+        for place, robot, headers in ways:
+            while (await place.http.post(f"/robots/{robot}/api/stop", headers=headers)).status_code != 403:  # noqa: ASYNC110
+                await asyncio.sleep(0.1)
+    refused = await world.two.http.post("/robots/right/api/stop", headers=world.two.token(below))
+    assert refused.json()["error"] == "silenced"

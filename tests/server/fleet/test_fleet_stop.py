@@ -2,9 +2,12 @@
 
 import pytest
 
+from robot_bridge.protocol.console import Notice, SilenceStops
+from robot_bridge.protocol.messages import Refusal, Stop
+from server.app import attach_session
 from server.fleet.tiles import UNREADABLE
 from tests.server.fleet.rig import running_fleet, running_fleet_rig
-from tests.server.rig import eventually, running_bridge, stop_words
+from tests.server.rig import TestPeer, eventually, running_bridge, stop_words
 
 
 async def test_stop_for_all_stops_those_that_the_link_is_good_for() -> None:
@@ -69,3 +72,39 @@ async def test_a_stop_for_all_is_never_turned_away_for_the_rate_of_requests() ->
         assert (await rig.http.get("/api/fleet", headers=rig.token("operator"))).status_code == 429
         for path in ("/api/fleet/stop", "/robots/left/api/stop"):
             assert (await rig.http.post(path, headers=rig.token("operator"))).status_code == 200
+
+
+async def test_who_is_silenced_at_one_robot_is_silenced_at_all_with_every_link_that_it_invited() -> None:
+    async with running_fleet_rig("left", "right") as rig, rig.peer("left", "supervisor") as supervisor:
+        bad, good = rig.token("operator"), rig.token("operator")
+        wanted = {"role": "operator", "seconds": 3600, "robots": []}
+        invite = "/robots/right/api/invitations"
+        made = (await rig.http.post(invite, headers=bad, json=wanted)).json()["link"]
+        below = {"Authorization": f"Bearer {made.partition('#token=')[2]}"}
+        peer, guest = TestPeer(), TestPeer()
+        await rig.join("left", peer, bad)
+        await rig.join("right", guest, below)
+        try:
+            here = next(each for each in rig.session("left").console.peers if each.role == "operator")
+            supervisor.send("session", SilenceStops(peer=here.id))
+            await peer.until(lambda each: isinstance(each, Notice) and "silenced" in each.text)
+            await guest.until(lambda each: isinstance(each, Notice) and "silenced" in each.text)
+            for headers in (bad, below):
+                for path in ("/robots/left/api/stop", "/robots/right/api/stop"):
+                    refused = await rig.http.post(path, headers=headers)
+                    assert (refused.status_code, refused.json()["error"]) == (403, "silenced")
+                invited = await rig.http.post(invite, headers=headers, json=wanted)
+                assert (invited.status_code, invited.json()["error"]) == (403, "silenced")
+                answers = (await rig.http.post("/api/fleet/stop", headers=headers)).json()["robots"]
+                assert [each["delivered"] for each in answers] == [False, False]
+            guest.send("stop", Stop(press="5f" * 16))
+            await guest.until(lambda each: isinstance(each, Refusal) and each.reason == "silenced")
+            right = rig.session("right")
+            attach_session(rig.fleet.sessions["right"].app, None)  # it has failed
+            assert (await rig.http.post("/robots/right/api/stop", headers=below)).status_code == 403
+            attach_session(rig.fleet.sessions["right"].app, right)
+            assert not rig.session("right").console.clock.stop.stopped
+            assert (await rig.http.post("/robots/right/api/stop", headers=good)).status_code == 200
+        finally:
+            await peer.close()
+            await guest.close()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from robot_bridge.protocol.console import Notice, SilenceStops
 from robot_bridge.protocol.messages import Command
 from robot_bridge.protocol.serial import event_after
 from server.audit import Actor
@@ -113,6 +114,18 @@ async def test_who_may_not_stop_a_robot_may_not_while_its_session_has_failed(fau
         assert not rig.session("left").console.clock.stop.stopped
 
 
+async def test_a_silence_outlives_the_session_of_the_robot_where_it_was_said(faults: Faults) -> None:
+    async with running_fleet_rig("left") as rig:
+        async with rig.peer("left", "supervisor") as supervisor, rig.peer("left", "observer") as loud:
+            here = next(each for each in rig.session("left").console.peers if each.role == "observer")
+            supervisor.send("session", SilenceStops(peer=here.id))
+            await loud.until(lambda each: isinstance(each, Notice))
+            await faults.end(rig, "left")
+        await faults.back(rig, "left")
+        refused = await rig.http.post("/robots/left/api/stop", headers=loud.headers)
+        assert (refused.status_code, refused.json()["error"]) == (403, "silenced")
+
+
 async def test_a_stop_that_the_robot_has_not_heard_of_outlives_a_session_that_fails(faults: Faults) -> None:
     async with running_bridge() as first:
         port = first.address[1]
@@ -120,13 +133,13 @@ async def test_a_stop_that_the_robot_has_not_heard_of_outlives_a_session_that_fa
             await rig.all_reached()
             await first.close()
             await eventually(lambda: not rig.session("left").console.robot.up)
-            rig.session("left").console.stops.stop(new_press(Actor("Ann"), "stop", "smoke", "p"))
+            rig.session("left").console.stops.stop(new_press(Actor("Ann"), "stop", "smoke", "5f" * 16))
             await faults.end(rig, "left")
             async with running_bridge(port):
                 await faults.back(rig, "left")
                 clock = rig.session("left").console.clock
                 await eventually(lambda: clock.stop.stopped)
-                assert (clock.stop.by, clock.stop.reason, clock.stop.press) == ("Ann", "smoke", "p")
+                assert (clock.stop.by, clock.stop.reason, clock.stop.press) == ("Ann", "smoke", "5f" * 16)
                 kept, sent = _stops(rig, "left")
                 assert kept == ("Ann", "stop, not delivered yet")
                 assert sent[1].startswith(f"stop, sent again, stop {clock.stop.number}")

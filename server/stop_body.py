@@ -1,0 +1,35 @@
+"""The body of a STOP by HTTP: whatever it is, it is a stop. What cannot be read of it is left out."""
+
+from typing import Annotated
+
+import msgspec
+from fastapi import Request
+
+from server.body import read_json
+from server.error_answers import count_refused
+from server.errors import RequestError, http_error
+from server.stop_presses import MAX_REASON, stop_text
+
+__all__ = ["StopRequest", "read_stop"]
+
+
+class StopRequest(msgspec.Struct, frozen=True):
+    """Body of POST /api/stop. Repeats of one press carry its id, which is 32 random hex digits; "": a new one."""
+
+    reason: Annotated[str, msgspec.Meta(max_length=MAX_REASON)] = ""
+    press: Annotated[str, msgspec.Meta(pattern="^([0-9a-f]{32})?$")] = ""
+
+
+class _AnyBody(msgspec.Struct, frozen=True):
+    reason: object = ""
+    press: object = ""
+
+
+async def read_stop(request: Request) -> StopRequest:
+    """What the body says, its id as it was given. What is wrong with it is counted, and refuses nothing."""
+    try:
+        found = await read_json(request, _AnyBody)
+    except RequestError as error:
+        count_refused(request.scope, http_error(error).name)
+        return StopRequest()
+    return StopRequest(stop_text(found.reason)[:MAX_REASON], stop_text(found.press))
