@@ -141,9 +141,7 @@ async def test_an_observer_may_say_less_than_an_operator_but_always_stop() -> No
         assert rig.count("lockstep_bad_input_total", where="control", reason="flood") >= 15
 
 
-async def test_a_stop_that_is_malformed_is_counted_and_stops_all_the_same_and_its_sender_hears_of_it_by_its_id() -> (
-    None
-):
+async def test_a_malformed_stop_is_counted_and_stops_all_the_same_and_its_sender_hears_of_it_by_its_id() -> None:
     async with running_rig() as rig, rig.peer("observer") as peer:
         peer.send_raw("stop", '{"type":"stop","reason":5,"press":"my stop"}')
         taken = await peer.until(lambda each: isinstance(each, StopTaken))
