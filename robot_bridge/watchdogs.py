@@ -22,7 +22,7 @@ class Watchdog(Protocol):
 class Held(NamedTuple):
     """The ticks were held up."""
 
-    seconds: float  # since the last one
+    seconds: float  # since the last one; at least the limit
     acted: bool  # the robot was brought to rest beside the loop
 
 
@@ -54,7 +54,9 @@ class Watchdogs:
             self._gauge = StallGauge(self._limit, now)
         seconds, self._last = now - self._last, now
         gap = self._gauge.tick(now, moving)
-        return Held(seconds, acted) if acted or gap is not None else None
+        if acted:  # perhaps while the tick before this one began: what it had waited counts
+            return Held(max(seconds, self._limit), acted)
+        return None if gap is None else Held(seconds, acted)
 
     def ticked(self, now: float, moving: bool) -> None:
         """The tick goes on; `moving`: what it applies is not at rest.

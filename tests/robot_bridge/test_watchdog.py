@@ -14,6 +14,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from robot_bridge import clock
 from robot_bridge.bridge import Bridge
 from robot_bridge.errors import RobotFailed, RobotUnavailable
 from robot_bridge.protocol.description import RobotDescription
@@ -22,6 +23,7 @@ from robot_bridge.robots.base import Measurement
 from robot_bridge.settings import BridgeSettings
 from robot_bridge.watchdog_process import LEAVING, MOVING, RESTING, WatchdogProcess, watch
 from robot_bridge.watchdog_thread import WatchdogThread
+from robot_bridge.watchdogs import Watchdogs
 from tests.robot_bridge.bridge_helpers import NEUTRAL, Operator, RecordingRobot, log_lines, operator, running_bridge
 
 LIMIT = 0.1  # s
@@ -143,6 +145,25 @@ async def test_a_command_of_before_a_suspend_is_late() -> None:
 
 
 # the thread
+
+
+async def test_a_watchdog_that_acts_while_a_tick_begins_is_told_with_the_time_that_it_waited() -> None:
+    robot = RecordingRobot()
+    acted = threading.Event()
+    robot.rest_from_thread = acted.set  # type: ignore[method-assign]
+    watchdogs = Watchdogs(robot, LIMIT, clock.now)
+    await watchdogs.start()
+    try:
+        began = clock.now()
+        assert watchdogs.begin(began, False) is None
+        watchdogs.ticked(began, True)
+        assert await asyncio.to_thread(acted.wait, PATIENCE)
+        held = watchdogs.begin(began + 0.004, True)
+    finally:
+        watchdogs.close()
+    assert held is not None
+    assert held.acted
+    assert held.seconds >= LIMIT
 
 
 def test_the_thread_acts_again_and_again_while_nothing_comes_and_only_for_a_robot_that_moves() -> None:
