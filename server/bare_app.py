@@ -112,6 +112,7 @@ def _link_of(scope: Scope, known: KnownTokens) -> str:
         # Enough to stop the robot with, so also while nobody knows which links are revoked.
         link = house.state.access.at(None).bearer_to_stop(f"Bearer {token}").token_id
     except AccessError:
+        known.forget(token)
         return ""
     known.add(token)
     return link

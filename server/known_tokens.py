@@ -22,3 +22,7 @@ class KnownTokens:
         self._tokens.move_to_end(token)
         if len(self._tokens) > self._most:
             self._tokens.popitem(last=False)
+
+    def forget(self, token: str) -> None:
+        """It is good no more: who brings it is a stranger."""
+        self._tokens.pop(token, None)

@@ -343,7 +343,10 @@ def test_the_nonce_belongs_to_the_issue_that_the_command_names() -> None:
 
 
 def test_a_drawn_nonce_is_never_that_of_a_command_without_one() -> None:
-    assert all(0 < draw_nonce() < 2**53 for _ in range(1000))
+    drawn = {draw_nonce() for _ in range(1000)}
+    assert all(0 < each < 2**53 for each in drawn)
+    assert len(drawn) == 1000, "nobody guesses the next one"
+    assert max(drawn) > 2**52, "all bits are drawn"
 
 
 def test_a_late_command_is_called_late_whatever_nonce_it_names() -> None:

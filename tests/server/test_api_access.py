@@ -20,7 +20,7 @@ from robot_bridge.robots.registry import create_robot
 from robot_bridge.settings import BridgeSettings
 from server.access import Identity
 from server.invitation_store import InvitationStore
-from server.invitations import MAX_LIVE, Invitations
+from server.invitations import MAX_LIVE, MIN_SECONDS, Invitations
 from server.state_dir import StateDir, StateDirUnusable
 from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_console, running_rig
 
@@ -203,21 +203,28 @@ LATE = [
     ("POST", "/api/recordings", b'{"name": "x"}', "application/json"),
     ("POST", "/api/stop", b'{"reason": "x"}', "application/json"),
     ("POST", "/whep", b"v=0", "application/sdp"),
+    ("PATCH", "/whep", b"a=ice-ufrag:other\r\n", "application/trickle-ice-sdpfrag"),
+    ("POST", "/api/reset", b'{"number": 1}', "application/json"),
 ]
 
 
-@pytest.mark.parametrize(("method", "path", "body", "kind"), LATE, ids=[each[1] for each in LATE])
+@pytest.mark.parametrize(("method", "path", "body", "kind"), LATE, ids=[" ".join(each[:2]) for each in LATE])
 async def test_a_request_that_was_begun_before_its_link_was_revoked_has_no_effect_after_that(
     method: str, path: str, body: bytes, kind: str
 ) -> None:
     async with running_rig() as rig:
         made = (await _invite(rig, "supervisor", role="operator")).json()
+        headers = _bearer(made["link"])
         if path == "/whep":
             peer = TestPeer()
             peer.pc.createDataChannel("session")
-            body = (await peer.offer()).encode()
+            offer = (await peer.offer()).encode()
             await peer.close()
-        late = _LateBody(rig, _bearer(made["link"]), method, path, body, kind)
+            body = offer if method == "POST" else body
+        if method == "PATCH":
+            answer = await rig.http.post("/whep", content=offer, headers=headers | {"Content-Type": "application/sdp"})
+            path, headers["If-Match"] = answer.headers["location"], answer.headers["etag"]
+        late = _LateBody(rig, headers, method, path, body, kind)
         async with asyncio.TaskGroup() as tasks:
             asked = tasks.create_task(late.answer())
             await late.begun.wait()
@@ -229,7 +236,23 @@ async def test_a_request_that_was_begun_before_its_link_was_revoked_has_no_effec
         assert (answer.status_code, answer.json()["error"]) == (401, "link_revoked")
         assert len(rig.services.state.invitations.known.all) == known
         assert not rig.services.console.clock.stop.stopped
-        assert len(rig.services.console.peers) == 0
+        await eventually(lambda: len(rig.services.console.peers) == 0)
+
+
+async def test_a_link_that_another_process_has_just_revoked_invites_and_revokes_nobody(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(InvitationStore, "refresh", lambda store: [])  # the console has not looked yet
+    async with running_console(NOWHERE, state_dir=tmp_path) as rig:
+        ann = (await _invite(rig, "supervisor", role="supervisor")).json()
+        bob = (await _invite(rig, "supervisor", role="observer")).json()
+        beside = InvitationStore(StateDir(tmp_path))
+        beside.update(lambda known: known.revoke(None, ann["id"], time.time()))
+        for method, path in (("POST", "/api/invitations"), ("DELETE", f"/api/invitations/{bob['id']}")):
+            answer = await rig.http.request(method, path, headers=_bearer(ann["link"]))
+            assert (answer.status_code, answer.json()["error"]) == (401, "link_revoked"), method
+        beside.refresh()
+        assert [each.id for each in beside.known.all if each.is_good(time.time())] == [bob["id"]]
 
 
 async def test_an_expired_link_invites_nobody_though_its_request_began_before() -> None:
@@ -248,6 +271,23 @@ async def test_an_expired_link_invites_nobody_though_its_request_began_before() 
 def jwt_end(token: str) -> float:
     end: float = jwt.decode(token, options={"verify_signature": False})["exp"]
     return end
+
+
+async def test_a_console_writes_down_that_a_link_has_expired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.house.CHECK_SECONDS", 0.05)
+    store = InvitationStore(StateDir(tmp_path))
+    soon = store.update(lambda known: known.invite(None, "observer", "x", MIN_SECONDS, store.now() - MIN_SECONDS + 2.0))
+    async with running_console(NOWHERE, state_dir=tmp_path):
+        wrong = time.time() - 3600
+
+        def next_run() -> float:
+            """What time a console takes it for whose clock has gone back meanwhile."""
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr("server.invitation_store.time.time", lambda: wrong)
+                return InvitationStore(StateDir(tmp_path)).now()
+
+        assert next_run() < soon.expires, "its end is not there yet"
+        await eventually(lambda: next_run() >= soon.expires)
 
 
 async def test_while_the_list_of_links_cannot_be_read_nobody_gets_in_and_everybody_can_still_stop(

@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.types import Receive, Scope, Send
 
 from robot_bridge.protocol.console import Role, SeatRequest
 from server.access import Identity
+from server.ending_response import EndingResponse
 from server.recording.reader import RecordingReader
 from server.recording.settings import RecordingSettings
 from server.settings import Settings
@@ -114,6 +116,29 @@ async def test_a_link_reads_nothing_that_was_recorded_before_it_was_made_and_all
         assert done == [*[("operator", "downloaded", "one")] * 2, ("supervisor", "deleted", "one")]
         read = {each.role: each.count for each in audit if each.kind == "reading" and each.what == "one"}
         assert read == {"operator": 3, "supervisor": 1}
+
+
+async def test_what_is_sent_for_long_ends_with_its_link(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends: list[tuple[str, str]] = []
+
+    class Watched(EndingResponse):
+        async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+            ends.append((scope["path"].rpartition("/")[2], self.right.token_id))
+            await super().__call__(scope, receive, send)
+
+    monkeypatch.setattr("server.api_recordings.EndingResponse", Watched)
+    Story(events=20).write(tmp_path / "one.mcap")
+    async with running_rig(recording=RecordingSettings(directory=tmp_path, free_bytes=0)) as rig:
+        headers, base = _issued(rig, "operator", START // SECOND - 1000), "/api/recordings/one"
+        link = rig.access.bearer(headers["Authorization"]).token_id
+        ticket = (await rig.http.post(f"{base}/ticket", headers=headers)).json()["path"]
+        assert (await rig.http.get(ticket)).status_code == 200
+        for path in (f"{base}/file", f"{base}/records?from=1&to=9"):
+            answer = await rig.http.get(path, headers=headers)
+            assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
+        part = await rig.http.get(f"{base}/file", headers=headers | {"Range": "bytes=8-"})
+        assert part.status_code == 206
+    assert ends == [(each, link) for each in ("file", "file", "records", "file")]
 
 
 async def test_who_starts_and_ends_a_recording_is_audited_and_an_automatic_one_ends_only_from_the_seat(

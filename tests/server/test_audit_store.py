@@ -3,6 +3,7 @@
 from itertools import count
 from pathlib import Path
 
+import msgspec
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
@@ -11,7 +12,7 @@ from server.audit import AuditKind, AuditRecord
 from server.audit_file import chatter_path, rotated, stored_records
 from server.audit_store import AuditStore
 from server.cli_audit import AuditVerdict, verify_audit
-from server.evidence.anchors import AnchorFile
+from server.evidence.anchors import Anchor, AnchorFile, anchor_text, parse_anchor, sign_anchor
 from server.evidence.signer import Signer
 
 
@@ -127,6 +128,25 @@ def test_a_tail_that_was_cut_off_a_last_record_that_was_changed_and_a_chain_that
     assert verdict.own.faults[0].kind == "anchor", "its chain fits, what was signed does not"
     chatter_path(made.path).unlink()
     assert made.verdict().chatter.faults[0].kind == "cut"
+
+
+def test_a_signed_record_that_was_taken_out_is_missed_though_the_chain_was_made_anew_around_it(tmp_path: Path) -> None:
+    made = Made(tmp_path)
+    made.write("start", "seat", "stop")
+    made.store.close()
+    made.path.unlink()
+    forged = AuditStore(made.path, 100_000, 3)
+    forged.write([AuditRecord(n=n, time=1.0, kind="seat") for n in (1, 2, 4)])
+    forged.close()
+    assert [fault.kind for fault in made.verdict().own.faults] == ["cut"]
+
+
+def test_a_signature_for_something_else_is_none_for_a_head() -> None:
+    signer = Signer(Ed25519PrivateKey.generate())
+    head = Anchor(log="audit", n=1, head="0", chatter_n=0, chatter_head="0", time=1.0, key=signer.public_key)
+    assert parse_anchor(anchor_text(sign_anchor(head, signer))) is not None
+    forged = msgspec.structs.replace(head, signature=signer.sign(msgspec.json.encode(head)))
+    assert parse_anchor(anchor_text(forged)) is None
 
 
 def test_heads_of_another_key_of_another_audit_and_with_a_changed_text_say_nothing(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ class FakeFile:
         self.go = threading.Event()
         self.go.set()
         self.closed = False
+        self.settled: list[int] = []  # how much was written, each time that nothing waited
         self.attempted = threading.Event()
 
     def write(self, records: list[AuditRecord]) -> None:
@@ -28,7 +29,7 @@ class FakeFile:
         self.written += [record.n for record in records]
 
     def settle(self) -> None:
-        pass
+        self.settled.append(len(self.written))
 
     def close(self) -> None:
         self.closed = True
@@ -74,6 +75,19 @@ def test_everything_is_written_in_order_before_it_closes(file: FakeFile) -> None
     writer.close()
     assert file.written == list(range(100))
     assert (file.closed, writer.lost, writer.failures) == (True, 0, 0)
+
+
+def test_when_nothing_waits_the_file_may_settle_what_it_has(file: FakeFile) -> None:
+    told = Told()
+    file.full = True
+    writer = _writer(file, told)
+    writer.append(_record(1))
+    told.until(["No space left on device"])
+    assert file.settled == [], "what waits is written first"
+    file.full = False
+    told.until(["No space left on device", ""])
+    writer.close()
+    assert set(file.settled) == {1}
 
 
 def test_a_full_disk_is_told_once_and_nothing_is_lost_when_there_is_room_again(file: FakeFile) -> None:

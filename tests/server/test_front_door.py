@@ -68,6 +68,9 @@ async def test_an_address_that_asks_too_often_is_refused_but_may_still_stop_the_
         assert (await rig.http.post("/api/stop")).status_code == 429
         for _ in range(5):
             assert (await rig.http.post("/api/stop", headers=rig.token("observer"))).status_code == 200
+        for method in ("GET", "HEAD", "OPTIONS", "DELETE"):
+            no_stop = await rig.http.request(method, "/api/stop", headers=rig.token("observer"))
+            assert no_stop.status_code == 429, method
         health = [(await rig.http.get("/healthz")).status_code for _ in range(4)]
         assert health == [200, 200, 200, 429], "counted apart"
 

@@ -2,8 +2,10 @@
 
 import asyncio
 import datetime
+import math
 import os
 import socket
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -12,6 +14,7 @@ from typing import Any
 import pytest
 
 from server import body
+from server.access import Identity
 from server.front_door import PATIENCE as PATIENCE_OF_THE_DOOR
 from server.tls import self_signed
 from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console
@@ -122,6 +125,23 @@ async def test_who_brought_a_good_token_keeps_the_connection_when_strangers_take
         assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
         for _, each in (*strangers, (reader, writer)):
             each.close()
+
+
+async def test_a_link_that_has_ended_is_a_strangers_and_no_longer_comes_first() -> None:
+    async with guarded_console() as (rig, port):
+        token = rig.access.sign(Identity("observer", "x", "id", time.time() + 3600), time.time())
+        request = HEAD + b"Authorization: Bearer " + token.encode() + b"\r\n\r\n"
+        reader, writer = await _open(port, request)
+        assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
+        await reader.readuntil(b"}")
+        assert token in rig.app.state.known_tokens
+        assert rig.app.state.connection_places.known == 1
+        assert rig.services.state.invitations.revoked_elsewhere({"id": math.inf})
+        writer.write(request)
+        assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
+        assert token not in rig.app.state.known_tokens
+        assert rig.app.state.connection_places.known == 0
+        writer.close()
 
 
 async def test_a_body_that_was_announced_does_not_keep_a_connection_that_was_answered() -> None:

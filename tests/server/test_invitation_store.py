@@ -236,3 +236,26 @@ def test_whoever_was_revoked_while_their_request_waited_changes_nothing(director
 
     with pytest.raises(LinkRevoked):
         store.update(invite)
+
+
+def test_whoever_was_revoked_here_or_elsewhere_and_not_on_this_disk_yet_changes_nothing(directory: StateDir) -> None:
+    store = InvitationStore(directory)
+    ann, bob = (store.update(lambda known: known.invite(None, "operator", "x", HOUR, time.time())) for _ in range(2))
+    store.revoked_elsewhere({ann.id: ann.expires})
+    store.end_at_once(Identity("supervisor", "Sue", "s", time.time() + HOUR), bob.id)
+    for each in (ann, bob):
+        assert not store.known.revoked()
+        with pytest.raises(LinkRevoked):
+            store.update(lambda known, each=each: store.check(each.identity, known))
+
+
+def test_of_two_processes_the_later_time_is_kept(directory: StateDir, monkeypatch: pytest.MonkeyPatch) -> None:
+    wall = _Wall(monkeypatch)
+    store, other = InvitationStore(directory), InvitationStore(directory)
+    store.update(_invite)
+    wall.ahead = YEAR
+    store.keep_time()
+    wall.ahead = 0.0
+    other.keep_time()
+    assert other.now() > time.time() + YEAR - HOUR
+    assert InvitationStore(directory).now() > time.time() + YEAR - HOUR

@@ -25,6 +25,7 @@ SECRET = "0123456789abcdef"
         {"tls_key": "a.pem"},
         {"tls": "self-signed", "tls_cert": "a.pem", "tls_key": "b.pem"},
         {"turn_seconds": 1},
+        {"turn_seconds": 601},
     ],
 )
 def test_what_cannot_work_is_refused_before_anything_runs(wrong: dict[str, object]) -> None:

@@ -2,6 +2,8 @@
 
 import asyncio
 import os
+import time
+from contextlib import ExitStack
 from typing import Any, cast
 
 import aioice.stun
@@ -9,8 +11,11 @@ import pytest
 from aiortc import RTCConfiguration, RTCPeerConnection
 from aiortc.rtcsctptransport import DataChunk, ForwardTsnChunk, InboundStream
 
+from robot_bridge.protocol.console import Role
 from robot_bridge.protocol.messages import Ping, Pong, StopTaken
 from server import peer_guards_private
+from server.access import Identity
+from server.errors import TooManyPeers
 from server.peer_guards_private import (
     CHECK_BURST,
     MAX_ADDRESSES,
@@ -188,6 +193,27 @@ async def test_the_last_places_are_not_for_observers() -> None:
             await peer.close()
         async with rig.peer("operator"):
             pass
+
+
+async def test_one_link_cannot_take_all_places_and_leaves_a_supervisor_one() -> None:
+    end = time.time() + 3600
+    async with running_rig(max_peers=20, reserved_places=4) as rig:
+        peers = rig.services.console.peers
+
+        def taken_by(identity: Identity, places: ExitStack) -> int:
+            """So many places it gets."""
+            for number in range(30):
+                try:
+                    places.enter_context(peers.place(identity))
+                except TooManyPeers:
+                    return number
+            return 30
+
+        with ExitStack() as places:
+            roles: list[Role] = ["observer", "observer", "operator", "operator", "supervisor"]
+            got = [taken_by(Identity(role, role, f"link {number}", end), places) for number, role in enumerate(roles)]
+            assert got == [12, 4, 2, 1, 1]
+        assert peers.taken == 0
 
 
 async def test_offers_of_one_link_are_limited() -> None:

@@ -111,6 +111,16 @@ async def test_a_scene_that_is_open_ends_when_its_link_expires_and_no_other_open
         assert (await rig.http.get(path)).json()["error"] == "link_expired"
 
 
+async def test_the_page_of_the_scene_comes_from_memory_and_asks_nobody() -> None:
+    async with running_rig(scene=True) as rig:
+        path, _ = await _scene_url(rig)
+        rig.services.scene_or_error().port = 1  # where nobody listens
+        for encoding in ("gzip", "identity"):
+            answer = await rig.http.get(path, headers={"Accept-Encoding": encoding})
+            assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
+            assert b"<head><script>" in answer.content
+
+
 async def test_the_page_of_the_scene_needs_a_ticket() -> None:
     async with running_rig(scene=True) as rig:
         path, _ = await _scene_url(rig)

@@ -66,6 +66,8 @@ def test_an_answer_to_a_feedback_that_is_not_remembered_says_nothing() -> None:
         cap.fed_back(Feedback(event=event, issue=1, time=0.0, axes=[]), 0.0)
     cap.answered("ada", 1, Command(event=2, issue=1, values=[]), 1.0)
     assert cap.delay(1.0) == pytest.approx(0.03)
+    cap.answered("ada", REMEMBERED + 1, Command(event=2, issue=1, values=[], nonce=7), 1.0)
+    assert cap.delay(1.0) == pytest.approx(0.03), "it names another feedback"
     cap.forget()
     cap.answered("ada", REMEMBERED, Command(event=2, issue=1, values=[]), 1.0)
     assert cap.delay(1.0) == pytest.approx(0.03)

@@ -33,7 +33,7 @@ def test_an_untouched_chain_has_no_fault() -> None:
 
 @given(st.data())
 def test_any_single_edit_but_of_the_last_record_is_found(data: st.DataObject) -> None:
-    """The last one is not followed by a hash: a signed head finds that (test_anchors.py)."""
+    """The last one is not followed by a hash: a signed head finds that (test_audit_store.py)."""
     lines = _lines()
     at = data.draw(st.integers(0, RECORDS - 2))
     position = data.draw(st.integers(0, len(lines[at]) - 1))
@@ -57,6 +57,12 @@ def test_two_records_that_changed_places_are_found_and_called_reordered(places: 
     one, other = places
     lines[one], lines[other] = lines[other], lines[one]
     assert "reordered" in {fault.kind for fault in _check(lines).faults}
+
+
+def test_a_number_that_comes_again_is_found_also_where_the_hashes_fit() -> None:
+    lines = _lines()
+    lines.append(json.dumps({"n": RECORDS, "before": line_hash(lines[-1])}).encode())
+    assert [fault.kind for fault in _check(lines).faults] == ["reordered"]
 
 
 @given(st.integers(0, RECORDS), st.booleans())

@@ -1,11 +1,17 @@
 """A console with several robots, over HTTP and with peers."""
 
 import json
+import time
+from contextlib import ExitStack
+from itertools import cycle
 
+import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from robot_bridge.protocol.console import Participants, SeatRequest, Welcome
 from robot_bridge.protocol.messages import Stop
+from server.access import Identity
+from server.errors import TooManyPeers
 from tests.server.fleet.rig import drive_once, running_fleet_rig
 from tests.server.rig import eventually
 
@@ -97,6 +103,18 @@ async def test_all_robots_together_have_only_so_many_places() -> None:
         await eventually(lambda: len(rig.session("left").console.peers) == 0)
         async with rig.peer("right", "observer"):
             pass
+
+
+async def test_one_link_cannot_take_all_places_by_way_of_several_robots() -> None:
+    async with running_fleet_rig("left", "right", max_total_peers=10, reserved_places=2) as rig:
+        link = Identity("observer", "x", "x", time.time() + 3600)
+        robots = cycle([rig.session("left").console.peers, rig.session("right").console.peers])
+        with ExitStack() as places:
+            for _ in range(6):
+                places.enter_context(next(robots).place(link))
+            with pytest.raises(TooManyPeers, match="one link gets 6"):
+                places.enter_context(next(robots).place(link))
+            places.enter_context(next(robots).place(link._replace(token_id="y")))
 
 
 async def test_a_thumbnail_is_counted_and_takes_part_in_nothing() -> None:

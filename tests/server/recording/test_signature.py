@@ -1,6 +1,7 @@
 """A signed recording verifies, and whatever is done to it afterwards is named."""
 
 import random
+import zlib
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -12,7 +13,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Chunk, Message
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import breakup_chunk
 
 from server.evidence.signer import Signer
@@ -182,6 +183,93 @@ def test_what_was_put_behind_the_signature_of_a_chunk_is_named(path: Path) -> No
     assert "the end of chunk 2 was signed by nobody" in faults(verify_file(path))
 
 
+def _raw(opcode: Opcode, record: McapRecord) -> RawRecord:
+    builder = RecordBuilder()
+    record.write(builder)
+    return RawRecord(opcode, 0, builder.end()[9:])
+
+
+def put_in(path: Path, further: list[RawRecord]) -> None:
+    """At the end of the data; offsets and checksum of the summary are made to fit by who has no key."""
+
+    def written(records: list[RawRecord]) -> bytes:
+        return b"".join(bytes([raw.opcode]) + len(raw.content).to_bytes(8, "little") + raw.content for raw in records)
+
+    def moved(offset: bytes) -> bytes:
+        return (int.from_bytes(offset, "little") + len(written(further))).to_bytes(8, "little")
+
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        *records, footer = raw_records(file)
+    end = next(number for number, raw in enumerate(records) if raw.opcode == Opcode.DATA_END)
+    summary = [
+        raw._replace(content=raw.content[:1] + moved(raw.content[1:9]) + raw.content[9:])
+        if raw.opcode == Opcode.SUMMARY_OFFSET
+        else raw
+        for raw in records[end + 1 :]
+    ]
+    last = footer._replace(content=moved(footer.content[:8]) + moved(footer.content[8:16]) + footer.content[16:])
+    checked = written([*summary, last])[:-4]
+    front = written([*records[:end], *further, records[end]])
+    path.write_bytes(MAGIC + front + checked + zlib.crc32(checked).to_bytes(4, "little") + MAGIC)
+
+
+def _message(block: Block) -> Message:
+    parts = breakup_chunk(Chunk.read(ReadDataStream(BytesIO(block[0].content))))
+    return next(each for each in parts if isinstance(each, Message))
+
+
+@pytest.mark.parametrize(
+    ("opcode", "record", "named"),
+    [
+        (Opcode.MESSAGE, None, "a message outside of all chunks"),
+        (Opcode.METADATA, Metadata(name="x", metadata={"a": "b"}), "metadata that nobody signed"),
+        (
+            Opcode.ATTACHMENT,
+            Attachment(log_time=1, create_time=1, name="x", media_type="text/plain", data=b"x"),
+            "an attachment that nobody signed",
+        ),
+        (Opcode.SCHEMA, Schema(id=900, name="x", encoding="", data=b""), "a schema that nobody signed"),
+        (
+            Opcode.CHANNEL,
+            Channel(id=900, topic="/x", message_encoding="json", metadata={}, schema_id=1),
+            "a topic that nobody signed",
+        ),
+    ],
+    ids=lambda value: value.name if isinstance(value, Opcode) else "",
+)
+def test_what_was_put_outside_of_the_chunks_is_named(
+    path: Path, opcode: Opcode, record: McapRecord | None, named: str
+) -> None:
+    found: list[Block] = []
+    rebuilt(path, lambda blocks: found.extend(blocks) or blocks)  # type: ignore[func-returns-value]
+    put_in(path, [_raw(opcode, record or _message(found[2]))])
+    assert named in faults(verify_file(path))
+
+
+def test_a_topic_and_a_schema_that_were_said_anew_in_another_way_are_named(path: Path) -> None:
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    schema, channel = next(iter(summary.schemas.values())), next(iter(summary.channels.values()))
+    schema.data += b" "
+    channel.topic += "x"
+    others = [_raw(Opcode.SCHEMA, schema), _raw(Opcode.CHANNEL, channel)]
+    put_in(path, others)
+    found = faults(verify_file(path))
+    assert "another schema than the one that was signed" in found
+    assert "another topic than the one that was signed" in found
+
+
+def test_a_signature_that_was_moved_in_time_is_named(path: Path) -> None:
+    def later(messages: list[Message]) -> list[Message]:
+        messages[-1].log_time += 1
+        return messages
+
+    rebuilt(path, lambda blocks: [*blocks[:2], with_messages(blocks[2], later), *blocks[3:]])
+    assert "stands at another event or time than it says" in faults(verify_file(path))
+
+
 def test_a_tail_that_was_cut_off_is_named_with_the_event_up_to_which_it_is_signed(path: Path) -> None:
     rebuilt(path, lambda blocks: blocks[:-2])
     verdict = verify_file(path)
@@ -209,6 +297,16 @@ def test_another_signer_than_the_one_that_is_asked_for_is_named(tmp_path: Path) 
     assert verify_file(path).signature.signer == OTHER.public_key
     verdict = verify_file(path, KEY.public_key)
     assert f"signed by {OTHER.public_key}, not by {KEY.public_key}" in faults(verdict)
+
+
+def test_who_makes_all_anew_under_a_name_that_is_not_theirs_has_signed_nothing(tmp_path: Path) -> None:
+    liar = Signer(Ed25519PrivateKey.generate())
+    liar.public_key = KEY.public_key
+    path = tmp_path / "a.mcap"
+    Story(events=EVENTS).write(path, signing=signing(liar))
+    verdict = verify_file(path, KEY.public_key)
+    assert not verdict.ok
+    assert f"signature 1 is not one of {KEY.public_key}: it was changed or forged" in faults(verdict)
 
 
 def test_a_stranger_who_signs_changed_chunks_anew_is_another_key(path: Path, tmp_path: Path) -> None:

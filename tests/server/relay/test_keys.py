@@ -28,8 +28,8 @@ class _Keyed(Relays):
 class _Watcher:
     relay, role = "0", "observer"
 
-    def __init__(self, link: str) -> None:
-        self.identity = Identity("observer", "", link, 1000.0)
+    def __init__(self, link: str, expires: float) -> None:
+        self.identity = Identity("observer", "", link, expires)
 
 
 class _Hall:
@@ -41,12 +41,13 @@ class _Hall:
         self.ended: set[str] = set()
         self.now = 100.0
         settings = RelaySettings(relay=("janus:ws://a.example/1",), observers_direct=0)
-        self.desk = RelayDesk(
-            settings, {"janus": self.relays}, lambda: self.here, lambda link, _: link in self.ended, lambda: self.now
-        )
+        self.desk = RelayDesk(settings, {"janus": self.relays}, lambda: self.here, self.has_ended, lambda: self.now)
 
-    def watch(self, link: str) -> _Watcher:
-        watcher = _Watcher(link)
+    def has_ended(self, link: str, expires: float) -> bool:
+        return link in self.ended or self.now >= expires
+
+    def watch(self, link: str, expires: float = 1e9) -> _Watcher:
+        watcher = _Watcher(link, expires)
         self.here.append(watcher)
         return watcher
 
@@ -81,6 +82,18 @@ async def test_when_the_link_of_anybody_who_has_the_key_ends_it_is_made_anew(mon
         assert ticket.pin == str(first.feed)
         hall.here.remove(watcher)  # the line is closed, the key is kept
         hall.ended.add("mallory")
+        second = await hall.another(first)
+        assert first.why == desk.ENDED
+        assert second.feed != first.feed
+
+
+async def test_when_the_link_of_somebody_who_has_the_key_expires_it_is_made_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with _hall(monkeypatch) as hall:
+        first = hall.relays.carrying["0"]
+        hall.desk.key(hall.watch("mallory", expires=hall.now + 5))
+        hall.now += 6
         second = await hall.another(first)
         assert first.why == desk.ENDED
         assert second.feed != first.feed

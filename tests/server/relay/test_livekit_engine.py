@@ -14,6 +14,7 @@ from robot_bridge.protocol.carriers import split_trailer
 from server.relay import desk
 from server.relay.desk import ENDED
 from tests.server.rig import Rig, TestPeer, running_rig
+from tests.server.watch_lines import ticket as watch_ticket
 from tests.support.livekit_stand_in import KEY, SECRET, LiveKitStandIn, livekit_stand_in
 
 pytestmark = pytest.mark.timeout(120)
@@ -45,6 +46,15 @@ async def _with_token(rig: Rig) -> dict[str, Any]:
         return found
     finally:
         await peer.close()
+
+
+async def _only_on_the_way(rig: Rig) -> None:
+    """Whoever has asked for a place and opens no line takes no part, and gets no key."""
+    headers, known = rig.token("observer"), set(rig.services.console.peers)
+    await watch_ticket(rig, headers)
+    (waiting,) = set(rig.services.console.peers) - known
+    answer = await rig.http.get("/api/relay", params={"peer": waiting.id}, headers=headers)
+    assert answer.json()["relay"]["token"] == ""
 
 
 def _relay(server: LiveKitStandIn, **settings: Any) -> dict[str, Any]:
@@ -93,6 +103,7 @@ async def test_a_ticket_lets_in_to_watch_one_publication_and_the_next_one_has_an
     async with livekit_stand_in() as server, running_rig(**_relay(server)) as rig:
         first = await _ticket(rig)
         assert first["token"] == "", "nobody gets in who takes no part"
+        await _only_on_the_way(rig)
         claims = verifier.verify((await _with_token(rig))["token"])
         assert claims.video is not None
         assert claims.video.room == f"demo-{first['feed']:x}" == server.members[0].room
