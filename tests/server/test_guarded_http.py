@@ -127,6 +127,27 @@ async def test_who_brought_a_good_token_keeps_the_connection_when_strangers_take
             each.close()
 
 
+async def test_strangers_wait_for_their_pace_and_who_brings_a_good_token_does_not() -> None:
+    async with guarded_console(max_stranger_burst=4, max_stranger_rate=0.001) as (rig, port):
+        token = rig.token("observer")["Authorization"].encode()
+        known, writer = await _open(port, HEAD + b"Authorization: " + token + b"\r\n\r\n")
+        assert (await _answer(known)).startswith(b"HTTP/1.1 200")
+        await known.readuntil(b"}")
+        stranger, other = await _open(port, HEAD + b"\r\n")
+        assert (await _answer(stranger)).startswith(b"HTTP/1.1 200")
+        await stranger.readuntil(b"}")
+        other.write(HEAD + b"\r\n")
+        waiting = asyncio.create_task(_answer(stranger))
+        for _ in range(3):
+            writer.write(HEAD + b"Authorization: " + token + b"\r\n\r\n")
+            assert (await _answer(known)).startswith(b"HTTP/1.1 200")
+            await known.readuntil(b"}")
+        assert not waiting.done(), "it has used up what strangers have"
+        waiting.cancel()
+        for each in (writer, other):
+            each.close()
+
+
 async def test_a_link_that_has_ended_is_a_strangers_and_no_longer_comes_first() -> None:
     async with guarded_console() as (rig, port):
         token = rig.access.sign(Identity("observer", "x", "id", time.time() + 3600), time.time())

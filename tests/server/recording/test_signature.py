@@ -78,12 +78,15 @@ def rebuilt(path: Path, change: Callable[[list[Block]], list[Block]]) -> None:
     complete_file(path, INFO)
 
 
-def with_messages(block: Block, change: Callable[[list[Message]], list[Message]]) -> Block:
-    """The same chunk with other messages, a checksum that fits, and no message indexes."""
+def with_messages(block: Block, change: Callable[[list[Message]], list[Message]], schema_end: bytes = b"") -> Block:
+    """The same chunk with other messages or schemas, a checksum that fits, and no message indexes."""
     chunk = Chunk.read(ReadDataStream(BytesIO(block[0].content)))
     parts = breakup_chunk(chunk)
     builder = RecordBuilder()
     messages = [part for part in parts if isinstance(part, Message)]
+    for part in parts:
+        if isinstance(part, Schema):
+            part.data += schema_end
     for part in [*(each for each in parts if not isinstance(each, Message)), *change(messages)]:
         part.write(builder)
     data = builder.end()
@@ -189,8 +192,11 @@ def _raw(opcode: Opcode, record: McapRecord) -> RawRecord:
     return RawRecord(opcode, 0, builder.end()[9:])
 
 
-def put_in(path: Path, further: list[RawRecord]) -> None:
-    """At the end of the data; offsets and checksum of the summary are made to fit by who has no key."""
+def remade(path: Path, further: list[RawRecord], change: Callable[[RawRecord], RawRecord] = lambda raw: raw) -> None:
+    """Other records of the same length, and `further` ones at the end of the data.
+
+    Offsets and checksum of the summary are made to fit by who has no key.
+    """
 
     def written(records: list[RawRecord]) -> bytes:
         return b"".join(bytes([raw.opcode]) + len(raw.content).to_bytes(8, "little") + raw.content for raw in records)
@@ -201,6 +207,7 @@ def put_in(path: Path, further: list[RawRecord]) -> None:
     with path.open("rb") as file:
         file.seek(len(MAGIC))
         *records, footer = raw_records(file)
+    records = [change(raw) for raw in records]
     end = next(number for number, raw in enumerate(records) if raw.opcode == Opcode.DATA_END)
     summary = [
         raw._replace(content=raw.content[:1] + moved(raw.content[1:9]) + raw.content[9:])
@@ -243,7 +250,7 @@ def test_what_was_put_outside_of_the_chunks_is_named(
 ) -> None:
     found: list[Block] = []
     rebuilt(path, lambda blocks: found.extend(blocks) or blocks)  # type: ignore[func-returns-value]
-    put_in(path, [_raw(opcode, record or _message(found[2]))])
+    remade(path, [_raw(opcode, record or _message(found[2]))])
     assert named in faults(verify_file(path))
 
 
@@ -255,10 +262,33 @@ def test_a_topic_and_a_schema_that_were_said_anew_in_another_way_are_named(path:
     schema.data += b" "
     channel.topic += "x"
     others = [_raw(Opcode.SCHEMA, schema), _raw(Opcode.CHANNEL, channel)]
-    put_in(path, others)
+    remade(path, others)
     found = faults(verify_file(path))
     assert "another schema than the one that was signed" in found
     assert "another topic than the one that was signed" in found
+
+
+def test_an_index_that_leads_elsewhere_is_named(path: Path, whole: bytes) -> None:
+    for opcode, place, named in [
+        (Opcode.MESSAGE_INDEX, -1, "the message index of chunk"),
+        (Opcode.CHUNK_INDEX, 16, "the summary names other chunks than there are"),
+    ]:
+
+        def elsewhere(raw: RawRecord, opcode: Opcode = opcode, place: int = place) -> RawRecord:
+            if raw.opcode != opcode:
+                return raw
+            content = bytearray(raw.content)
+            content[place] ^= 1
+            return raw._replace(content=bytes(content))
+
+        path.write_bytes(whole)
+        remade(path, [], elsewhere)
+        assert named in faults(verify_file(path))
+
+
+def test_a_schema_that_was_changed_in_every_chunk_is_not_the_one_that_was_signed(path: Path) -> None:
+    rebuilt(path, lambda blocks: [with_messages(block, lambda messages: messages, b" ") for block in blocks])
+    assert "are not those that were signed" in faults(verify_file(path))
 
 
 def test_a_signature_that_was_moved_in_time_is_named(path: Path) -> None:
