@@ -127,6 +127,19 @@ async def test_who_brought_a_good_token_keeps_the_connection_when_strangers_take
             each.close()
 
 
+async def test_a_proxy_on_this_machine_holds_as_many_connections_as_it_needs_and_nobody_else_does() -> None:
+    async with guarded_console(max_connections=20, max_address_connections=2) as (rig, port):
+        for address, most, turned_away in (("127.0.0.1", 6, 0), ("127.0.0.2", 2, 4)):
+            held = [await asyncio.open_connection("127.0.0.1", port, local_addr=(address, 0)) for _ in range(6)]
+            async with asyncio.timeout(PATIENCE):
+                while len(rig.app.state.connection_places) + _refused(rig, "too_many_connections") < len(held):  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            assert (len(rig.app.state.connection_places), _refused(rig, "too_many_connections")) == (most, turned_away)
+            for _, each in held:
+                each.transport.abort()
+            await eventually(lambda: len(rig.app.state.connection_places) == 0)
+
+
 async def test_strangers_wait_for_their_pace_and_who_brings_a_good_token_does_not() -> None:
     async with guarded_console(max_stranger_burst=4, max_stranger_rate=0.001) as (rig, port):
         token = rig.token("observer")["Authorization"].encode()
