@@ -74,7 +74,7 @@ def exists(path: str, name: str) -> bool:
     text = (ROOT / path).read_text()
     if path.endswith(".py"):
         return re.search(rf"^((async )?def {re.escape(name)}\(|{re.escape(name)} = )", text, re.MULTILINE) is not None
-    return f'it("{name}"' in text
+    return f'it("{name}"' in text or f'test("{name}"' in text
 
 
 def flaws_of_rows(group: str) -> Iterator[str]:
