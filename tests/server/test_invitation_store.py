@@ -1,4 +1,5 @@
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -246,7 +247,7 @@ def test_whoever_was_revoked_here_or_elsewhere_and_not_on_this_disk_yet_changes_
     for each in (ann, bob):
         assert not store.known.revoked()
         with pytest.raises(LinkRevoked):
-            store.update(lambda known, each=each: store.check(each.identity, known))
+            store.update(partial(store.check, each.identity))
 
 
 def test_of_two_processes_the_later_time_is_kept(directory: StateDir, monkeypatch: pytest.MonkeyPatch) -> None:
