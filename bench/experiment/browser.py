@@ -54,14 +54,13 @@ class BrowserClient:
     """The same verbs as `HeadlessClient`."""
 
     def __init__(
-        self, page: ConsolePage, record: ClientRecord, description: RobotDescription, clock: PageClock, checks: bool
+        self, page: ConsolePage, record: ClientRecord, description: RobotDescription, clock: PageClock
     ) -> None:
         self.record = record
         self.description = description
         self._page = page
         self._clock = clock
         self._camera = description.cameras[0].name
-        self._checks = checks
         self._streams = [self._camera, *(microphone.name for microphone in description.microphones)]
 
     async def take_seat(self) -> None:
@@ -104,7 +103,7 @@ class BrowserClient:
 
     async def _check_pixels(self) -> None:
         """Now and then: the canvas shows what its stamp says."""
-        while self._checks:
+        while True:
             await asyncio.sleep(STRIP_STEP)
             found = await self._page.strip(self._camera)
             if found is None:
@@ -153,7 +152,7 @@ async def browser_client(link: str, choices: Choices) -> AsyncIterator[BrowserCl
         )
         record = ClientRecord("operator", "chromium", choices.gate, choices.pacing, True, choices.tolerance)
         description = await robot_description(link)
-        yield BrowserClient(console, record, description, await read_page_clock(page), choices.robot == "planar")
+        yield BrowserClient(console, record, description, await read_page_clock(page))
 
 
 async def robot_description(link: str) -> RobotDescription:

@@ -7,13 +7,18 @@ from bench.emulator.profile import Profile
 from client.command_gate import Pacing
 from client.media_gate import GateMode
 
-__all__ = ["MODES", "PROFILES", "THESIS_PROFILES", "Choices", "MediaChoice", "Mode", "media_of", "round_trip_of"]
+__all__ = ["MODES", "PROFILES", "THESIS_ROBOTS", "Choices", "MediaChoice", "Mode", "media_of", "round_trip_of"]
 
 Mode = Literal["off", "age", "feedback", "media"]
 MODES: tuple[Mode, ...] = ("off", "age", "feedback", "media")
 
-THESIS_PROFILES = ("macro-lan", "micro-lan", "hong-kong")
-PROFILES = (*THESIS_PROFILES, "lte-drive", "wifi-handover", "satellite", "bursty-loss", "narrow-uplink")
+# The thesis' networks, and of our robots the kind that was driven over each.
+THESIS_ROBOTS = {
+    "macro-lan": "mobile-manipulator",
+    "micro-lan": "micromanipulator",
+    "hong-kong": "mobile-manipulator",
+}
+PROFILES = (*THESIS_ROBOTS, "lte-drive", "wifi-handover", "satellite", "bursty-loss", "narrow-uplink")
 
 
 # What the console sends by itself; profiles say otherwise where they have a reason to.

@@ -16,7 +16,7 @@ from bench.experiment.choices import PROFILES, Choices, Mode, media_of, round_tr
 from bench.experiment.endurance_run import EnduranceClient, run_endurance
 from bench.experiment.findings import Cell, Findings
 from bench.experiment.growth import run_growth
-from bench.experiment.matrix import GROWTH_SECONDS, OUTAGE_SECONDS, matrix_of
+from bench.experiment.matrix import GROWTH_SECONDS, OUTAGE_SECONDS, matrix_of, thesis_matrix_of
 from bench.experiment.outage import run_outages
 from bench.experiment.results import result_of
 from bench.experiment.run import run_experiment
@@ -32,6 +32,7 @@ EXIT_BROKEN = 1  # a verdict is false
 EXIT_USAGE = 2
 EXIT_FAILED = 3  # something did not run
 GROWTH_PROFILE = "hong-kong"
+OWN_ROBOT = "planar"
 RUN_SECONDS = 25.0
 ENDURANCE_SECONDS = 600.0
 ENDURANCE_WORDS = ("connections", "reconnections", "seat_losses", "pictures", "violations")
@@ -45,7 +46,8 @@ def experiment_command(
         str,
         typer.Argument(
             help=f"A network: {', '.join(PROFILES)}, or the file of one. Or growth: how large the gap gets without a "
-            "gate. Or outage: the network is cut in mid-drive. Or all of these. Or endurance: whether connections last."
+            "gate. Or outage: the network is cut in mid-drive. Or all of these. Or thesis: its three experiments, "
+            "without and with, each with a robot of its kind. Or endurance: whether connections last."
         ),
     ],
     mode: Annotated[
@@ -62,7 +64,10 @@ def experiment_command(
         int | None, typer.Option(min=0, max=1000, help="Largest gap, in events; unless given, the profile's own.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Of the network and the operator.")] = 1,
-    robot: Annotated[str, typer.Option(help=f"{', '.join(robot_names())}.")] = "planar",
+    robot: Annotated[
+        str | None,
+        typer.Option(help=f"{', '.join(robot_names())}; unless given planar, and for thesis one of the thesis' kind."),
+    ] = None,
     browser: Annotated[bool, typer.Option("--browser", help="The operator is a page in Chromium.")] = False,
     network: Annotated[str, typer.Option(help="Of endurance: a network, or the file of one.")] = "satellite",
     client: Annotated[
@@ -85,7 +90,7 @@ def experiment_command(
         seconds=seconds or RUN_SECONDS,
         tolerance=OWN_TOLERANCE if tolerance is None else tolerance,
         seed=seed,
-        robot=robot,
+        robot=robot or OWN_ROBOT,
         browser=browser,
         adapts=quality,
         watchers=not browser if watchers is None else watchers,
@@ -96,13 +101,13 @@ def experiment_command(
             lasting = replace(choices, profile=network, seconds=seconds or ENDURANCE_SECONDS)
             session.endure(lasting, client or ("chromium" if browser else "headless"))
         else:
-            _work(session, choices, seconds)
+            _work(session, choices, seconds, robot)
     except KeyboardInterrupt:
         _say("interrupted: this is what was found so far")
     session.publish(json_to)
 
 
-def _work(session: "_Session", choices: Choices, seconds: float | None) -> None:
+def _work(session: "_Session", choices: Choices, seconds: float | None, robot: str | None) -> None:
     if choices.profile == "outage":
         session.outage(replace(choices, seconds=seconds or OUTAGE_SECONDS))
     elif choices.profile == "growth":
@@ -112,6 +117,9 @@ def _work(session: "_Session", choices: Choices, seconds: float | None) -> None:
         for each in matrix_of(choices):
             session.drive(each)
         session.outage(replace(choices, seconds=OUTAGE_SECONDS))
+    elif choices.profile == "thesis":
+        for each in thesis_matrix_of(choices, robot):
+            session.drive(each)
     else:
         session.drive(choices)
 

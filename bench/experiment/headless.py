@@ -29,11 +29,10 @@ TICK = 0.005  # s; the loop's own timers are no finer under load
 class HeadlessClient:
     """One client of a run. `observe` around the run; `drive` inside it."""
 
-    def __init__(self, console: Console, record: ClientRecord, camera: str, draws_events: bool) -> None:
+    def __init__(self, console: Console, record: ClientRecord, camera: str) -> None:
         self.record = record
         self._console = console
         self._camera = camera
-        self._draws_events = draws_events
         self._streams = [camera, *(microphone.name for microphone in console.description.microphones)]
 
     @property
@@ -70,8 +69,6 @@ class HeadlessClient:
         )
 
     async def _check_pixels(self) -> None:
-        if not self._draws_events:
-            return
         try:
             async for picture in self._console.pictures(self._camera, keep=30):
                 drawn = _drawn_event(picture)
@@ -126,4 +123,4 @@ async def headless_client(
     ) as console:
         record = ClientRecord(name, "headless", gate, pacing, drives, choices.tolerance)
         camera = console.description.cameras[0].name
-        yield HeadlessClient(console, record, camera, choices.robot == "planar")
+        yield HeadlessClient(console, record, camera)

@@ -98,8 +98,15 @@ def _verdicts(choices: Choices, run: Run, clients: dict[str, Result], round_trip
     paced = choices.mode == "media" and round_trip <= LONG_ROUND_TRIP
     return {
         "no_violation": all(stream["violations"] == 0 and stream["beyond_tolerance"] == 0 for stream in streams),
-        "pixels_agree": all(client["drawn"]["wrong"] == 0 for client in clients.values()),
+        "pixels_agree": _pixels_agree([client["drawn"] for client in clients.values()]),
         "nobody_lost": not any(client["lost"] for client in clients.values()),
         "rendered_90_percent": bool(picture and (picture["rendered_share"] or 0) >= RENDERED_SHARE) if paced else None,
         "within_99_percent": bool(picture and (picture["within_share"] or 0) >= WITHIN_SHARE) if paced else None,
     }
+
+
+def _pixels_agree(drawn: list[Result]) -> bool | None:
+    """None: no picture was read."""
+    if any(each["wrong"] for each in drawn):
+        return False
+    return True if any(each["right"] for each in drawn) else None

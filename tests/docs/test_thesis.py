@@ -31,3 +31,20 @@ def test_every_section_figure_and_table_is_named() -> None:
     assert set(TABLES) <= named("table"), set(TABLES) - named("table")
     for what in ("theorem 1", "definition 1", "Future work"):
         assert what in TEXT
+
+
+def rows() -> list[tuple[str, str]]:
+    """Part, and where it is in Lockstep."""
+    cells = [line.strip("|").split(" | ") for line in TEXT.splitlines() if line.startswith("| ")]
+    return [(part.strip(), where.strip()) for part, where in cells if part.strip() not in ("part", "section")]
+
+
+@pytest.mark.parametrize(("part", "where"), rows(), ids=lambda text: text[:30])
+def test_every_row_names_a_test_or_another_row(part: str, where: str) -> None:
+    elsewhere = ("this page", "as for 4.1", "as for 4.1.1", "as table 4.1", "as above")
+    assert re.search(r"`(?:tests/|web/test/)[\w/.]+`", where) or any(each in where for each in elsewhere), part
+
+
+def test_nothing_that_is_there_is_said_not_to_be_built() -> None:
+    assert "not built yet" not in TEXT
+    assert "are not built |" not in TEXT

@@ -2,7 +2,7 @@ import pytest
 
 from bench.emulator.profile import load_profile
 from bench.experiment.choices import MODES, PROFILES, media_of, round_trip_of
-from bench.experiment.matrix import matrix_of
+from bench.experiment.matrix import matrix_of, thesis_matrix_of
 from tests.bench.experiment.made_up import choices
 
 
@@ -58,3 +58,16 @@ def test_the_matrix_has_every_profile_in_every_mode_with_watchers_where_no_gate_
     cells = list(matrix_of(choices()))
     assert [(cell.profile, cell.mode) for cell in cells] == [(name, mode) for name in PROFILES for mode in MODES]
     assert {cell.mode for cell in cells if cell.watchers} == {"off"}
+
+
+def test_the_thesis_experiments_are_its_three_networks_without_and_with_and_each_has_a_robot_of_its_kind() -> None:
+    cells = [(cell.profile, cell.mode, cell.robot, cell.watchers) for cell in thesis_matrix_of(choices())]
+    assert cells == [
+        ("macro-lan", "off", "mobile-manipulator", True),
+        ("macro-lan", "feedback", "mobile-manipulator", False),
+        ("micro-lan", "off", "micromanipulator", True),
+        ("micro-lan", "feedback", "micromanipulator", False),
+        ("hong-kong", "off", "mobile-manipulator", True),
+        ("hong-kong", "feedback", "mobile-manipulator", False),
+    ]
+    assert {cell.robot for cell in thesis_matrix_of(choices(), "planar")} == {"planar"}

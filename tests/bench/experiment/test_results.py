@@ -50,7 +50,13 @@ def test_a_gate_that_does_not_count_its_violations_is_found_out() -> None:
 def test_a_picture_whose_pixels_say_another_event_is_a_broken_promise() -> None:
     record = client()
     record.drawn_wrong = 1
-    assert not found(record)["verdicts"]["pixels_agree"]
+    assert found(record)["verdicts"]["pixels_agree"] is False
+
+
+def test_where_no_event_could_be_read_in_a_picture_nothing_is_said_of_the_pixels() -> None:
+    record = client()
+    record.drawn_right, record.drawn_unreadable = 0, 10
+    assert found(record)["verdicts"]["pixels_agree"] is None
 
 
 def test_the_shares_are_promised_for_media_pacing_up_to_350_ms_alone() -> None:

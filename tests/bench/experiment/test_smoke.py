@@ -73,6 +73,17 @@ def test_the_command_runs_an_experiment_and_prints_its_figures() -> None:
     assert result["verdicts"]["no_violation"]
 
 
+@pytest.mark.parametrize("robot", ["mobile-manipulator", "micromanipulator"])
+def test_the_robots_of_the_thesis_kind_draw_the_event_that_is_looked_for_in_their_pictures(robot: str) -> None:
+    command = ["experiment", "micro-lan", "--robot", robot, "--seconds", "3", "--no-watchers", "--json", "-"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert result["robot"] == robot
+    assert result["clients"]["operator"]["drawn"]["right"] > 5
+    assert (result["verdicts"]["no_violation"], result["verdicts"]["pixels_agree"]) == (True, True)
+
+
 async def test_after_an_outage_nothing_that_was_queued_is_executed_and_the_operator_drives_again() -> None:
     found = await run_outages(choices(seconds=2.5), lambda _: None, ways=[True])
     [outage] = found["outages"]
