@@ -4,7 +4,8 @@ from typing import Any
 
 from bench.experiment.choices import Choices, MediaChoice
 from bench.experiment.measures import beyond, event_rate, share_within, spread
-from bench.experiment.record import ClientRecord, Run
+from bench.experiment.playout import heard
+from bench.experiment.record import ClientRecord, Rendered, Run
 
 __all__ = ["Result", "result_of"]
 
@@ -74,6 +75,24 @@ def _stream(client: ClientRecord, name: str, run: Run) -> Result:
         "rendered_share": round(counts["rendered"] / counts["received"], 4) if counts["received"] else None,
         "within_share": None if within is None else round(within, 4),
         "age_ms": spread(each.age for each in rendered if each.age is not None),
+        "thesis_player": _thesis_player(client, rendered) if not is_video else None,
+    }
+
+
+def _thesis_player(client: ClientRecord, rendered: list[Rendered]) -> Result | None:
+    """Sound as the thesis' player would have played it. None: a gate or a player of its own stands before it, or
+    nothing says when it was captured."""
+    if client.gate != "off" or client.kind != "headless":
+        return None
+    segments = [(each.at, each.stamp, each.age) for each in rendered if each.stamp is not None and each.age is not None]
+    if not segments:
+        return None
+    found = heard(client.feedbacks, segments, client.tolerance)
+    return {
+        "max_gap": found.max_gap,
+        "beyond_tolerance": found.beyond_tolerance,
+        "thrown_away": found.thrown_away,
+        "longest_delay_ms": round(found.longest_delay * 1000, 1),
     }
 
 

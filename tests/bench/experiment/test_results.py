@@ -84,3 +84,10 @@ def test_the_table_has_a_line_for_each_client_and_stream() -> None:
     ]
     assert {len(row) for row in rows} == {len(COLUMNS)}
     assert len(render_table([result]).splitlines()) == 5
+
+
+def test_without_a_gate_sound_is_judged_as_the_thesis_player_would_have_played_it_too() -> None:
+    streams = found(client(gate="off"))["clients"]["operator"]["streams"]
+    assert streams["overview"]["thesis_player"] is None
+    assert streams["microphone"]["thesis_player"]["max_gap"] in (1, 2)
+    assert found()["clients"]["operator"]["streams"]["microphone"]["thesis_player"] is None
