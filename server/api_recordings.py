@@ -25,6 +25,7 @@ from server.errors import (
     RecordingUnreadable,
     RobotFailed,
 )
+from server.names import printable
 from server.recording.errors import RecordingError
 from server.recording.event_index import EventIndex
 from server.recording.library import Library
@@ -117,7 +118,7 @@ async def recordings(request: Request, caller: Caller) -> Response:
 async def start(request: Request, caller: Caller) -> Response:
     require_role(caller, "operator", "supervisor")
     wanted = await read_json(request, RecordingRequest)
-    state = _service(request).library.start(caller.name, wanted.name.strip())
+    state = _service(request).library.start(caller.name, printable(wanted.name))
     _told_audit(request, caller, "started", state.recording)
     return _json(state, 201)
 

@@ -26,6 +26,7 @@ from server.evidence.anchors import ANCHORS_NAME
 from server.evidence.signer import KEY_FILE, evidence_signer, is_public_key
 from server.invitations import Invitation
 from server.links import console_link
+from server.names import printable
 from server.recording.errors import RecordingError
 from server.settings import Settings
 from server.state import ConsoleState, open_state, robot_directory, state_path
@@ -242,7 +243,8 @@ def _line(record: AuditRecord, as_json: bool) -> str:
         return msgspec.json.encode(record).decode()
     when = datetime.fromtimestamp(record.time).astimezone().strftime("%Y-%m-%d %H:%M:%S")
     who = f"{record.who} ({record.role})" if record.role else record.who
-    words = "  ".join(each for each in (who, record.what, record.detail) if each)
+    # What stands in the file may be from anybody, and a terminal obeys what it prints.
+    words = "  ".join(printable(each) for each in (who, record.what, record.detail) if each)
     times = f"  x{record.count}" if record.count > 1 else ""
     return f"{record.n:6}  {when}  s={record.event:<7} {record.kind:10}  {words}{times}"
 

@@ -19,6 +19,7 @@ from server.cli_extras import load_extra
 from server.console_address import read_address
 from server.evidence.anchors import parse_anchor
 from server.evidence.signer import is_public_key
+from server.names import printable
 from server.recording.errors import RecordingError
 from server.recording.replay_app import create_replay_app
 from server.recording.settings import recordings_directory
@@ -246,16 +247,18 @@ def _line(entry: RecordingEntry) -> str:
     interrupted = "  interrupted" if entry.interrupted else ""
     size = f"{entry.bytes / 1e6:.1f} MB"
     return (
-        f"{entry.id:28}  {began}  {seconds:7.1f} s  {events:18}  {size:>10}  {entry.robot}  {entry.name}{interrupted}"
+        f"{printable(entry.id):28}  {began}  {seconds:7.1f} s  {events:18}  {size:>10}"
+        f"  {printable(entry.robot)}  {printable(entry.name)}{interrupted}"
     )
 
 
 def _in_words(verdict: Verdict) -> str:
+    """Names and topics in it are from the file: printed as they stand, they could write a verdict of their own."""
     lines = [f"{verdict.commands} commands, {verdict.events} events, {verdict.pictures_and_sounds} pictures and sounds"]
     for name, check in verdict.checks.items():
         looked = f" ({check.looked} looked at)" if check.looked else ""
         lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name}{looked}{'' if check.ok else f': {check.count} times'}")
-        lines += [f"        s={each.event}: {each.text}" for each in check.violations[:5]]
+        lines += [f"        s={each.event}: {printable(each.text)}" for each in check.violations[:5]]
     return "\n".join([*lines, *_signature_words(verdict.signature)]) + "\n"
 
 
@@ -265,10 +268,11 @@ def _signature_words(report: SignatureReport) -> list[str]:
     until = datetime.fromtimestamp(report.until_time / 1e6).astimezone().isoformat(timespec="milliseconds")
     lines = [f"{report.state}: {report.signatures} signatures, the last one up to s={report.until_event}, {until}"]
     if report.signer:
-        lines.append(f"        by {report.signer}")
+        lines.append(f"        by {printable(report.signer)}")
     anchor = parse_anchor(report.audit)
     if anchor is not None:
-        lines.append(f"        with a signed head of the audit {anchor.log}: record {anchor.n}, {anchor.head}")
+        log, head = printable(anchor.log), printable(anchor.head)
+        lines.append(f"        with a signed head of the audit {log}: record {anchor.n}, {head}")
     return lines
 
 

@@ -1,16 +1,38 @@
-"""What people call themselves: only what can be printed, of bounded length, and never two the same."""
+"""What people write: only what can be printed and seen. Names are of bounded length besides, and never two the same."""
 
-from collections.abc import Sequence
+import unicodedata
+from collections.abc import Iterator, Sequence
 from enum import IntEnum
 
 __all__ = ["MAX_NAME", "clean_name", "printable", "unique_names"]
 
 MAX_NAME = 40  # characters
+MAX_MARKS = 4  # on one character: more are drawn over the lines above and below
+
+# Letters, marks and symbols of Unicode that show nothing: a name with one looks like the name without it.
+_BLANK = {0x034F, 0x115F, 0x1160, 0x17B4, 0x17B5, 0x2800, 0x3164, 0xFFA0}
+_BLANK |= {*range(0x180B, 0x1810), *range(0xFE00, 0xFE10), *range(0xE0100, 0xE01F0)}
 
 
 def printable(text: str) -> str:
-    """`text` without control, formatting and direction characters; any white space becomes one space."""
-    return " ".join("".join(each if each.isprintable() else " " if each.isspace() else "" for each in text).split())
+    """`text` in normal form C, without control, formatting, direction and invisible characters, and few marks on each.
+
+    Any white space becomes one space.
+    """
+    return " ".join("".join(_shown(unicodedata.normalize("NFC", text))).split())
+
+
+def _shown(text: str) -> Iterator[str]:
+    marks = 0
+    for each in text:
+        if not each.isprintable():
+            if each.isspace():
+                marks = 0
+                yield " "
+            continue
+        marks = marks + 1 if unicodedata.category(each) in ("Mn", "Me") else 0
+        if marks <= MAX_MARKS and ord(each) not in _BLANK:
+            yield each
 
 
 def clean_name(wanted: str, fallback: str) -> str:
@@ -19,7 +41,7 @@ def clean_name(wanted: str, fallback: str) -> str:
 
 
 def unique_names(people: Sequence[tuple[str, str]]) -> list[str]:
-    """What each of `people` is called, so that no two are called the same.
+    """What each of `people` is called, so that no two are called the same, or by what looks the same.
 
     Each is given by the name that is wanted and the one that others see now, "" for a newcomer, in the order in which
     they came. Nobody takes a name from who has it, and a number behind a name stays until the name itself is free.
@@ -30,14 +52,19 @@ def unique_names(people: Sequence[tuple[str, str]]) -> list[str]:
     for place in sorted(range(len(people)), key=lambda each: _claim(*people[each])):
         wanted, current = people[place]
         name = wanted
-        if name.casefold() in taken and _claim(wanted, current) is _Claim.NUMBERED:
+        if _key(name) in taken and _claim(wanted, current) is _Claim.NUMBERED:
             name = current
-        while name.casefold() in taken:
-            number = numbers[wanted.casefold()] = numbers.get(wanted.casefold(), 1) + 1
+        while _key(name) in taken:
+            number = numbers[_key(wanted)] = numbers.get(_key(wanted), 1) + 1
             name = f"{wanted} {number}"
-        taken.add(name.casefold())
+        taken.add(_key(name))
         names[place] = name
     return names
+
+
+def _key(name: str) -> str:
+    """The same for names that differ in case, or in forms of the same characters."""
+    return unicodedata.normalize("NFKC", name).casefold()
 
 
 class _Claim(IntEnum):
@@ -49,7 +76,7 @@ class _Claim(IntEnum):
 
 
 def _claim(wanted: str, current: str) -> _Claim:
-    if current.casefold() == wanted.casefold():
+    if _key(current) == _key(wanted):
         return _Claim.HAS_IT
     name, _, number = current.rpartition(" ")
-    return _Claim.NUMBERED if name.casefold() == wanted.casefold() and number.isdecimal() else _Claim.WANTS_IT
+    return _Claim.NUMBERED if _key(name) == _key(wanted) and number.isdecimal() else _Claim.WANTS_IT

@@ -20,6 +20,7 @@ import msgspec
 
 from robot_bridge.protocol.messages import Stop, StopTaken
 from server.audit import Actor
+from server.names import printable
 
 __all__ = [
     "MAX_GIVEN",
@@ -59,9 +60,12 @@ class Press(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def new_press(by: Actor, where: str, reason: str, given: str = "") -> Press:
-    """A press of now. `given`: the id that whoever pressed has made; without one it gets one here."""
+    """A press of now. `given`: the id that whoever pressed has made; without one it gets one here.
+
+    Of the reason everybody sees what can be printed.
+    """
     id_ = press_id(by.link, given) if given else secrets.token_hex(16)
-    return Press(id=id_, by=by, where=where, reason=reason, time=time.time())
+    return Press(id=id_, by=by, where=where, reason=printable(reason)[:MAX_REASON], time=time.time())
 
 
 def press_id(link: str, given: str) -> str:

@@ -8,6 +8,7 @@ import msgspec
 from robot_bridge.protocol.serial import event_gap, is_newer
 from server.recording.errors import RecordingDamaged
 from server.recording.marks import Mark
+from server.recording.records import Whole
 
 __all__ = ["INDEX_NAME", "ChunkEntry", "EventEntry", "EventIndex", "IndexBuilder", "TopicEntry", "decode_index"]
 
@@ -17,24 +18,24 @@ MAX_MARKS = 20_000
 
 
 class TopicEntry(msgspec.Struct, frozen=True):
-    id: int  # MCAP's channel
+    id: Whole  # MCAP's channel
     topic: str
     schema: str
     encoding: str
 
 
 class ChunkEntry(msgspec.Struct, array_like=True):
-    offset: int  # bytes, where the chunk's record begins
-    first_event: int  # smallest of its records
-    last_event: int
-    started: int  # µs since 1970, arrival of its first record
-    ended: int
+    offset: Whole  # bytes, where the chunk's record begins
+    first_event: Whole  # smallest of its records
+    last_event: Whole
+    started: Whole  # µs since 1970, arrival of its first record
+    ended: Whole
 
 
 class EventEntry(msgspec.Struct, frozen=True, array_like=True):
-    event: int
-    arrived: int  # µs since 1970
-    chunk: int
+    event: Whole
+    arrived: Whole  # µs since 1970
+    chunk: Whole
 
 
 class EventIndex(msgspec.Struct, kw_only=True):
@@ -43,18 +44,18 @@ class EventIndex(msgspec.Struct, kw_only=True):
     version: Literal[1] = 1
     epoch: str = ""
     recording: str = ""
-    part: int = 1
-    started: int = 0
-    ended: int = 0
-    first_event: int = 0  # 0: no feedback
-    last_event: int = 0
+    part: Whole = 1
+    started: Whole = 0
+    ended: Whole = 0
+    first_event: Whole = 0  # 0: no feedback
+    last_event: Whole = 0
     topics: list[TopicEntry] = []
     chunks: list[ChunkEntry] = []
     events: list[EventEntry] = []
     keyframes: dict[str, list[EventEntry]] = {}
     marks: list[Mark] = []
-    counts: dict[str, int] = {}
-    lost: int = 0
+    counts: dict[str, Whole] = {}
+    lost: Whole = 0
 
     def chunks_with(self, first_event: int, last_event: int) -> Iterator[int]:
         """Numbers of the chunks that can hold records of these events."""

@@ -6,6 +6,7 @@ is the median one of the events that were recorded.
 """
 
 import json
+import re
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from itertools import pairwise
@@ -138,7 +139,7 @@ def _pictures(path: Path, topic: str) -> Iterator[Picture]:
 
 
 def _write_video(path: Path, root: Path, topic: str, events: list[int], fps: int) -> ExportedCamera:
-    key = "observation.images." + topic.removeprefix(CAMERA).replace("/", "_")
+    key = "observation.images." + re.sub(r"[^\w. -]", "_", topic.removeprefix(CAMERA))
     target = root / "videos" / key / f"{FILE}.mp4"
     target.parent.mkdir(parents=True)
     every = max(1, len(events) // SAMPLES)

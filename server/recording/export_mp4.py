@@ -4,6 +4,7 @@ Only where the size of the pictures changed on the way, or where there is VP8, w
 anew, all in the largest size.
 """
 
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 from io import BytesIO
@@ -25,6 +26,7 @@ __all__ = ["export"]
 VIDEO_BASE = Fraction(1, 90_000)
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
+MAX_CAMERA = 60  # characters of its name that are taken into a file's
 
 
 class Timed(NamedTuple):
@@ -54,6 +56,8 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         written = []
         for topic in cameras:
             target = _target(path, out, topic.removeprefix(CAMERA), len(cameras) == 1)
+            while target in written:  # names that differ in what no file's name has
+                target = target.with_stem(f"{target.stem}_")
             target.parent.mkdir(parents=True, exist_ok=True)
             _write(reader, topic, sound, target)
             written.append(target)
@@ -69,7 +73,9 @@ def _first_sound(reader: RecordingReader) -> str | None:
 def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
     if out is not None and only and out.suffix == ".mp4":
         return out
-    return (out or path.parent) / f"{path.stem}-{camera}.mp4"
+    # The camera's name is the robot's word, or of whoever made the file: it names no folder.
+    name = re.sub(r"[^\w. -]", "_", camera)[:MAX_CAMERA]
+    return (out or path.parent) / f"{path.stem}-{name}.mp4"
 
 
 def _write(reader: RecordingReader, topic: str, sound: str | None, target: Path) -> None:

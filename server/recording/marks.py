@@ -13,6 +13,7 @@ from server.recording.records import (
     RefusalRecord,
     RobotRecord,
     SeatRecord,
+    Whole,
 )
 
 __all__ = ["Mark", "MarkFinder", "MarkKind"]
@@ -24,8 +25,8 @@ RELEASE_SHARE = 0.6  # of the threshold: a contact ends below it, so that a trem
 
 
 class Mark(msgspec.Struct, frozen=True):
-    event: int
-    time: int  # µs since 1970, arrival
+    event: Whole
+    time: Whole  # µs since 1970, arrival
     kind: MarkKind
     text: str = ""
 

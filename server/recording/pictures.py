@@ -7,6 +7,8 @@ from server.recording.payload import RecordedPicture
 
 __all__ = ["RecordedPictures", "picture_size"]
 
+MAX_PIXELS = 4096 * 2304  # of a picture
+
 
 class RecordedPictures:
     """`decode` each in turn, from a keyframe on; `flush` at the end.
@@ -28,6 +30,7 @@ class RecordedPictures:
             self._decoder = (
                 av.CodecContext.create("vp8", "r") if picture.format == "vp8" else av.CodecContext.create("h264", "r")
             )
+            self._decoder.options = {"max_pixels": str(MAX_PIXELS)}
         packet = av.Packet(picture.data)
         packet.pts = number
         return found + self._decoder.decode(packet)

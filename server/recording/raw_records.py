@@ -1,4 +1,4 @@
-"""The records of an MCAP file in the order in which they lie there, without any index."""
+"""The records of an MCAP file in the order in which they lie there, without any index, and what a chunk holds."""
 
 import os
 import struct
@@ -6,13 +6,15 @@ from collections.abc import Iterator
 from typing import BinaryIO, NamedTuple
 
 from mcap.exceptions import McapError
-from mcap.stream_reader import CRCValidationError
-from zstandard import ZstdError
+from mcap.records import Chunk, McapRecord
+from mcap.stream_reader import CRCValidationError, breakup_chunk
+from zstandard import ZstdError, frame_content_size
 
-__all__ = ["BROKEN", "HEAD", "MAGIC", "RawRecord", "raw_records"]
+__all__ = ["BROKEN", "HEAD", "MAGIC", "MAX_RECORD", "RawRecord", "check_packed", "chunk_records", "raw_records"]
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = 9  # bytes of opcode and length
+MAX_RECORD = 256 * 1024 * 1024  # bytes, of a chunk also unpacked
 
 # What the mcap library raises where bytes are not what they should be.
 BROKEN = (McapError, CRCValidationError, ZstdError, struct.error, ValueError, KeyError, EOFError, RuntimeError)
@@ -38,3 +40,21 @@ def raw_records(file: BinaryIO) -> Iterator[RawRecord]:
         if len(head) < HEAD or offset + HEAD + length > size:
             return
         yield RawRecord(head[0], offset, file.read(length))
+
+
+def check_packed(chunk: Chunk) -> None:
+    """Whether it may be unpacked: no few bytes that would become more than fits in memory, and no lz4.
+
+    Raises ValueError.
+    """
+    if chunk.compression not in ("", "zstd"):
+        raise ValueError(f"compressed as {chunk.compression!r}")
+    unpacked = frame_content_size(chunk.data) if chunk.compression else len(chunk.data)
+    if unpacked != chunk.uncompressed_size or unpacked > MAX_RECORD:
+        raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes, or {unpacked}")
+
+
+def chunk_records(chunk: Chunk) -> list[McapRecord]:
+    """What is in it. Raises one of BROKEN."""
+    check_packed(chunk)
+    return breakup_chunk(chunk, validate_crc=True)

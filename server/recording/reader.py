@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Chunk, Footer, Message, Metadata
-from mcap.stream_reader import CRCValidationError, breakup_chunk
+from mcap.stream_reader import CRCValidationError
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.serial import is_newer
@@ -26,7 +26,7 @@ from server.recording.payload import (
     picture_of,
     sound_of,
 )
-from server.recording.raw_records import BROKEN, HEAD, MAGIC
+from server.recording.raw_records import BROKEN, HEAD, MAGIC, MAX_RECORD, chunk_records
 from server.recording.records import RobotRecord
 from server.recording.scan import scan_file
 from server.recording.topics import OWN_TOPICS
@@ -34,7 +34,6 @@ from server.recording.topics import OWN_TOPICS
 __all__ = ["Record", "RecordingReader"]
 
 FOOTER = HEAD + 20 + len(MAGIC)
-MAX_RECORD = 256 * 1024 * 1024  # bytes
 
 
 class Record(NamedTuple):
@@ -176,7 +175,7 @@ class RecordingReader:
             content = Chunk.read(
                 ReadDataStream(BytesIO(self._record_at(self.index.chunks[number].offset, Opcode.CHUNK)))
             )
-            parts = breakup_chunk(content, validate_crc=True)
+            parts = chunk_records(content)
         except CRCValidationError as error:
             raise RecordingTampered(f"chunk {number} is not what was written") from error
         except BROKEN as error:

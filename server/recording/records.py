@@ -29,10 +29,12 @@ __all__ = [
     "SignatureRecord",
     "StopRecord",
     "Vector",
+    "Whole",
     "WrenchRecord",
 ]
 
 Count = Annotated[int, msgspec.Meta(ge=0)]
+Whole = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # what a JavaScript number holds exactly
 
 # What became of a command at the console. Only a forwarded one reached the robot bridge.
 CommandOutcome = Literal["forwarded", "repeated", "refused", "undelivered"]

@@ -25,14 +25,13 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from mcap.stream_reader import breakup_chunk
 
 from server.recording.errors import DiskTrouble, RecordingDamaged
 from server.recording.event_index import INDEX_NAME, EventIndex, IndexBuilder, TopicEntry
 from server.recording.info import METADATA_NAME, RecordingInfo
 from server.recording.marks import MarkFinder
 from server.recording.payload import VIDEO, own_record_of, picture_of
-from server.recording.raw_records import BROKEN, HEAD, MAGIC, RawRecord, raw_records
+from server.recording.raw_records import BROKEN, HEAD, MAGIC, RawRecord, chunk_records, raw_records
 from server.recording.records import Degraded, FeedbackRecord
 
 __all__ = ["Scan", "complete_file", "scan_file"]
@@ -67,7 +66,7 @@ class Scan:
         return True
 
     def _chunk(self, raw: RawRecord, chunk: Chunk) -> None:
-        parts = breakup_chunk(chunk, validate_crc=True)
+        parts = chunk_records(chunk)
         self.chunks.append(
             ChunkIndex(
                 chunk_length=HEAD + len(raw.content),

@@ -17,7 +17,7 @@ from server.recording.errors import RecordingError
 from server.recording.event_index import INDEX_NAME, EventIndex
 from server.recording.info import RecordingInfo
 from server.recording.payload import own_record
-from server.recording.raw_records import BROKEN, RawRecord
+from server.recording.raw_records import BROKEN, RawRecord, check_packed
 from server.recording.records import SignatureRecord
 from server.recording.signature import RecordingChain, TopicText, is_valid
 from server.recording.topics import SIGNATURE
@@ -136,6 +136,7 @@ class SignatureChecker:
             self._fault(f"chunk {number - 1} has no message index")
         self._positions = None
         try:
+            check_packed(chunk)
             stream, length = get_chunk_data_stream(chunk, validate_crc=True)
         except BROKEN as error:
             self._fault(f"chunk {number} is not what was written: {type(error).__name__}")

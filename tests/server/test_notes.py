@@ -106,3 +106,22 @@ def test_a_bucket_gives_a_burst_and_then_its_rate() -> None:
     assert [bucket.take(0.5) for _ in range(2)] == [True, False]
     assert [bucket.take(100.0) for _ in range(4)] == [True, True, True, False]
     assert not bucket.has(100.0)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "shown"),
+    [
+        ("Ada\u3164", "Ada"),  # letters that show nothing
+        ("\u2800\uffa0", "operator"),
+        ("Ada\ufe0f\u034f", "Ada"),
+        ("e\u0301", "\u00e9"),
+        ("A" + "\u0335" * 30 + "b", "A" + "\u0335" * 4 + "b"),  # drawn over the lines around it
+    ],
+)
+def test_what_nobody_sees_is_in_no_name_and_marks_are_few(wanted: str, shown: str) -> None:
+    assert clean_name(wanted, "operator") == shown
+    assert printable(shown) == shown
+
+
+def test_nobody_has_a_name_that_looks_like_that_of_another() -> None:
+    assert unique_names([("Ada", ""), ("\uff21da", "")]) == ["Ada", "\uff21da 2"]

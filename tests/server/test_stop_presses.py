@@ -108,3 +108,8 @@ def test_a_sender_is_told_of_its_press_by_the_id_that_it_gave() -> None:
     press = new_press(Actor(link="a"), "http", "", "stop")
     assert told_id(press, "stop") == "stop"
     assert told_id(press, "") == told_id(press, "x" * 65) == press.id
+
+
+def test_of_a_reason_only_what_can_be_printed_is_told() -> None:
+    press = new_press(Actor("Ann"), "stop", "smoke\n   7  2026-01-01  reset  Bo\x1b[2J\u202e")
+    assert press.reason == "smoke 7 2026-01-01 reset Bo[2J"

@@ -1,0 +1,104 @@
+"""Recordings that somebody else has made: names lead nowhere, words are only printed, and chunks unpack small."""
+
+import struct
+from pathlib import Path
+
+import pytest
+import zstandard
+from mcap.records import Chunk
+from typer.testing import CliRunner
+
+from robot_bridge.protocol.console import Report, StreamReport
+from server.cli import app
+from server.recording import export_mp4
+from server.recording.errors import RecordingDamaged
+from server.recording.event_index import EventIndex, decode_index
+from server.recording.info import RecordingInfo
+from server.recording.raw_records import MAX_RECORD, chunk_records
+from server.recording.reader import RecordingReader
+from server.recording.records import ReportRecord
+from server.recording.topics import CAMERA
+from server.recording.writer import RecordingWriter
+from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story, own_entry
+
+ESCAPE = "\x1b[2J\x1b[1;1H\nverified and true\n"
+
+
+def _with_camera(path: Path, *names: str) -> Path:
+    """A recording whose camera is called like that; of several names each has the pictures."""
+    writer = RecordingWriter(path, INFO, DESCRIPTION, {**dict.fromkeys(names, "H264"), "ear": "opus"})
+    for entry in Story(events=10, real=True).entries():
+        if entry.topic.startswith(CAMERA):
+            for name in names:
+                writer.write(entry._replace(topic=CAMERA + name))
+        else:
+            writer.write(entry)
+    writer.close()
+    return path
+
+
+@pytest.mark.parametrize("name", ["../../../out", "/tmp/out", "a/b", "..", "x\0y", "n" * 300])
+def test_a_cameras_name_leads_to_no_other_folder(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "recordings"
+    folder.mkdir(parents=True)
+    (written,) = export_mp4.export(_with_camera(folder / "a.mcap", name), None, "")
+    assert written.parent == folder
+    assert {each for each in tmp_path.rglob("*") if each.is_file()} == {folder / "a.mcap", written}
+
+
+def test_names_that_differ_in_a_slash_only_are_two_files(tmp_path: Path) -> None:
+    written = export_mp4.export(_with_camera(tmp_path / "a.mcap", "left/eye", "left_eye"), None, "")
+    assert len({*written}) == 2
+    assert all(each.stat().st_size > 1000 for each in written)
+
+
+def test_what_a_recording_says_cannot_write_to_the_terminal(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    info = RecordingInfo(recording="r", epoch=INFO.epoch, robot=ESCAPE, name=ESCAPE)
+    writer = RecordingWriter(path, info, DESCRIPTION, CODECS)
+    entries = Story(events=60).entries()
+    for entry in entries:
+        writer.write(entry)
+    last = entries[-1]
+    for violations in (0, 5):
+        stream = StreamReport(stream="front", carrier="native", stamp=last.event, violations=violations)
+        report = Report(event=last.event, streams=[stream])
+        record = ReportRecord(epoch=EPOCH, event=last.event, peer="p1", name=ESCAPE, report=report)
+        writer.write(own_entry(record, last.arrived))
+    writer.close()
+    runner = CliRunner()
+    for arguments in (["recordings", "--dir", str(tmp_path)], ["verify", str(path)]):
+        output = runner.invoke(app, arguments, env={"LOCKSTEP_STATE_DIR": str(tmp_path / "state")}).output
+        assert "verified and true" in output, "it is shown, as the name that it is"
+        assert "\x1b" not in output
+        assert not any(line.startswith("verified") for line in output.splitlines())
+
+
+@pytest.mark.parametrize("unpacked", [1 << 33, 1000])
+def test_a_chunk_that_unpacks_to_more_than_it_says_or_than_fits_is_not_unpacked(unpacked: int) -> None:
+    bomb = zstandard.compress(bytes(64 << 20))
+    assert len(bomb) < 10_000
+    chunk = Chunk("zstd", bomb, 0, 0, 0, unpacked)
+    with pytest.raises(ValueError, match="a chunk of"):
+        chunk_records(chunk)
+    honest = Chunk("zstd", zstandard.compress(b"\x99" + struct.pack("<Q", 3) + b"abc"), 0, 0, 0, 12)
+    assert chunk_records(honest) == []
+    large = zstandard.ZstdCompressor().compressobj(size=MAX_RECORD + 1)
+    data = b"".join([*(large.compress(bytes(1 << 20)) for _ in range(256)), large.compress(b"\0"), large.flush()])
+    with pytest.raises(ValueError, match="a chunk of"):
+        chunk_records(Chunk("zstd", data, 0, 0, 0, MAX_RECORD + 1))
+    with pytest.raises(ValueError, match="compressed as"):
+        chunk_records(Chunk("lz4", b"", 0, 0, 0, 0))
+
+
+@pytest.mark.parametrize("text", [b'{"started": 9007199254740992}', b'{"chunks": [[-5, 1, 1, 0, 0]]}'])
+def test_an_index_of_impossible_numbers_is_damaged(text: bytes) -> None:
+    with pytest.raises(RecordingDamaged):
+        decode_index(text)
+    assert decode_index(b"{}") == EventIndex()
+
+
+def test_a_whole_recording_is_read_as_before(tmp_path: Path) -> None:
+    Story(events=30).write(tmp_path / "a.mcap")
+    with RecordingReader(tmp_path / "a.mcap") as reader:
+        assert sum(1 for _ in reader.records()) > 100
