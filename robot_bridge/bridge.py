@@ -28,7 +28,7 @@ from robot_bridge.link_session import BadInput
 from robot_bridge.lockout_file import LockoutFile
 from robot_bridge.metronome import Metronome
 from robot_bridge.motion_limits import MotionLimits
-from robot_bridge.protocol.messages import Command, Media, Refusal, Reset, Rest, Stop
+from robot_bridge.protocol.messages import MAX_FAULTS, Command, Media, Refusal, Reset, Rest, Stop
 from robot_bridge.robots.base import Measurement, MediaSource, Robot, Stamp
 from robot_bridge.robots.event_strip import with_event_strip
 from robot_bridge.settings import BridgeSettings
@@ -41,6 +41,7 @@ from robot_bridge.watchdogs import Held, Watchdogs
 __all__ = ["Bridge"]
 
 REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
+MAX_FAULT = 500  # characters, of one
 MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
 
 _logger = logging.getLogger(__name__)
@@ -474,7 +475,10 @@ class Bridge:
             blind = [f"no motion: the position is unknown ({name})" for name in sorted(self._limits.blind)]
             held = [self._held] if self._held else []
             measured = measured._replace(faults=[*measured.faults, *held, *self._source_faults, *blind])
-        measured = measured._replace(at_rest=measured.at_rest and self._shaper.at_rest)
+        measured = measured._replace(
+            at_rest=measured.at_rest and self._shaper.at_rest,
+            faults=[fault[:MAX_FAULT] for fault in measured.faults[-MAX_FAULTS:]],
+        )
         limits = sorted(self._acted | self._acting)
         feedback = self._core.issue(measured, self._now(), limits, unknown, time=taken)
         measured_by = time.monotonic()  # what was captured before may show less than this feedback says

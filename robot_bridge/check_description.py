@@ -1,13 +1,40 @@
-"""Whether a robot's description makes sense, checked once before the bridge listens."""
+"""Whether a robot's description makes sense: checked by the bridge before it listens, and by whoever connects to it."""
 
 import math
-from collections.abc import Iterable
+import unicodedata
+from collections.abc import Iterable, Sequence
 
 from robot_bridge.check_limits import check_limits
 from robot_bridge.errors import DescriptionError
-from robot_bridge.protocol.description import Axis, Camera, ForceFeeling, RobotDescription, StartWarning
+from robot_bridge.protocol.description import (
+    Axis,
+    Body,
+    Camera,
+    ControlLayer,
+    ForceFeeling,
+    Geofence,
+    Microphone,
+    PositionLimit,
+    RangeRing,
+    RobotDescription,
+    StartWarning,
+)
+from robot_bridge.protocol.messages import MAX_AXES, MAX_RAYS
 
 __all__ = ["check_description"]
+
+MAX_STREAMS = 32  # cameras and microphones
+MAX_BODIES = 1024
+MAX_GEOMS = 4096
+MAX_LAYERS = 32
+MAX_LIMITS = 256
+MAX_NAME = 200  # characters, of a name or a label
+SIDES = range(1, 8193)  # pixels
+FRAME_RATES = 240.0  # Hz
+SAMPLE_RATES = range(8000, 192_001)  # Hz
+CHANNELS = range(1, 9)
+# Characters that end a line, command a terminal, or turn the direction of what is written around them.
+_CONTROL = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
 
 def check_description(description: RobotDescription) -> None:
@@ -16,6 +43,8 @@ def check_description(description: RobotDescription) -> None:
     """
     if not description.axes:
         raise DescriptionError("a robot needs at least one axis")
+    _check_counts(description)
+    _check_texts(description)
     if not 0 < description.hold <= 5:
         raise DescriptionError(f"hold must be in (0, 5] s, not {description.hold}")
     if description.watchdog is not None and not 0 < description.watchdog < description.hold:
@@ -33,7 +62,12 @@ def check_description(description: RobotDescription) -> None:
         "stream", [camera.name for camera in description.cameras] + [source.name for source in description.microphones]
     )
     for camera in description.cameras:
-        _check_scale(camera)
+        _check_camera(camera)
+    for microphone in description.microphones:
+        _check_microphone(microphone)
+    if description.ranges is not None:
+        _check_ranges(description.ranges)
+    _check_bodies(description.bodies)
     _check_references(description)
     if description.force_feeling is not None:
         _check_feeling(description.force_feeling)
@@ -58,10 +92,89 @@ def _check_axis(axis: Axis, hold: float) -> None:
         )
 
 
-def _check_scale(camera: Camera) -> None:
+def _check_counts(description: RobotDescription) -> None:
+    counts = (
+        ("axes", len(description.axes), MAX_AXES),
+        ("joints", len(description.joints), MAX_AXES),
+        ("cameras and microphones", len(description.cameras) + len(description.microphones), MAX_STREAMS),
+        ("bodies", len(description.bodies), MAX_BODIES),
+        ("geoms", sum(len(body.geoms) for body in description.bodies), MAX_GEOMS),
+        ("layers", len(description.layers), MAX_LAYERS),
+        ("bindings", sum(len(layer.bindings) for layer in description.layers), MAX_GEOMS),
+        ("position limits", len(description.position_limits), MAX_LIMITS),
+        ("body twists", len(description.body_twists), MAX_LIMITS),
+    )
+    for kind, count, most in counts:
+        if count > most:
+            raise DescriptionError(f"{count} {kind}, the bound is {most}")
+
+
+def _check_texts(description: RobotDescription) -> None:
+    """Of all that is shown to people, or names something."""
+    texts = [description.name, description.label]
+    for axis in description.axes:
+        texts += [axis.name, axis.label, axis.unit]
+    texts += [joint.name for joint in description.joints] + [body.name for body in description.bodies]
+    labelled: list[Camera | Microphone | ControlLayer | PositionLimit | Geofence] = [
+        *description.cameras,
+        *description.microphones,
+        *description.layers,
+        *description.position_limits,
+        *description.geofences,
+    ]
+    for each in labelled:
+        texts += [each.name, each.label]
+    for text in texts:
+        if len(text) > MAX_NAME:
+            raise DescriptionError(f"a name or label of {len(text)} characters, the bound is {MAX_NAME}")
+        if any(unicodedata.category(each) in ("Cc", "Cs", "Zl", "Zp") or each in _CONTROL for each in text):
+            raise DescriptionError(f"{text!r} has characters that cannot be printed")
+
+
+def _check_camera(camera: Camera) -> None:
+    if camera.width not in SIDES or camera.height not in SIDES:
+        raise DescriptionError(f"camera {camera.name}: a picture of {camera.width}x{camera.height} is not possible")
+    if not 0 < camera.frame_rate <= FRAME_RATES:
+        raise DescriptionError(f"camera {camera.name}: frame_rate must be in (0, 240] Hz, not {camera.frame_rate}")
     scale = camera.metres_per_pixel
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise DescriptionError(f"camera {camera.name}: metres_per_pixel must be positive, not {scale}")
+
+
+def _check_microphone(microphone: Microphone) -> None:
+    if microphone.sample_rate not in SAMPLE_RATES or microphone.channels not in CHANNELS:
+        raise DescriptionError(
+            f"microphone {microphone.name}: {microphone.channels} channels of {microphone.sample_rate} Hz"
+        )
+
+
+def _check_ranges(ranges: RangeRing) -> None:
+    if not 1 <= ranges.count <= MAX_RAYS:
+        raise DescriptionError(f"ranges {ranges.name}: from 1 to {MAX_RAYS} rays, not {ranges.count}")
+    _check_finite(
+        f"ranges {ranges.name}", (ranges.angle_min, ranges.angle_increment, ranges.range_min, ranges.range_max)
+    )
+
+
+def _check_bodies(bodies: Sequence[Body]) -> None:
+    parents = {body.name: body.parent for body in bodies}
+    for body in bodies:
+        where = f"body {body.name}"
+        _check_finite(where, (*body.position, *body.orientation))
+        for joint in body.joints:
+            _check_finite(where, joint.axis)
+        for geom in body.geoms:
+            _check_finite(where, (*geom.size, *geom.position, *geom.orientation, *geom.rgba))
+        above, steps = body.parent, 0
+        while above in parents:
+            above, steps = parents[above], steps + 1
+            if steps > len(bodies):
+                raise DescriptionError(f"{where} is a part of itself")
+
+
+def _check_finite(where: str, numbers: Iterable[float]) -> None:
+    if not all(map(math.isfinite, numbers)):
+        raise DescriptionError(f"{where}: every number must be finite")
 
 
 def _check_feeling(feeling: ForceFeeling) -> None:

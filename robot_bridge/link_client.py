@@ -9,8 +9,9 @@ from types import TracebackType
 from typing import Self
 
 from robot_bridge.link_session import BadInput, ClientSession, kind_of
-from robot_bridge.link_transport import TICK_INTERVAL, LinkTransport
+from robot_bridge.link_transport import TICK_INTERVAL
 from robot_bridge.media_outbox import MediaOutbox
+from robot_bridge.paced_transport import PacedTransport
 from robot_bridge.protocol.errors import HandshakeError, LinkError, LinkLost, LinkRefused
 from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.protocol.messages import Goodbye, Hello, LinkMessage, LinkRole, Media
@@ -224,12 +225,12 @@ class RobotLink:
         text = f"{ended.error}: {ended.detail}"
         if self._session.hello is not None or ended.error == "lost":
             return LinkLost(text)
-        if ended.error in ("handshake", "version", "framing", "silent"):
+        if ended.error in ("handshake", "version", "description", "framing", "silent"):
             return HandshakeError(text)
         return LinkRefused(text)
 
 
-class _ClientTransport(LinkTransport):
+class _ClientTransport(PacedTransport):
     def __init__(self, link: RobotLink, session: ClientSession) -> None:
         super().__init__(session)
         self._link = link

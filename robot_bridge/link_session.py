@@ -11,6 +11,9 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
+from robot_bridge.check_description import check_description
+from robot_bridge.errors import DescriptionError
+from robot_bridge.feedback_fit import misfit
 from robot_bridge.protocol.errors import FramingError, MessageError
 from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader
 from robot_bridge.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
@@ -98,6 +101,11 @@ class LinkSession:
         link that waited for a second alone would end with nearly every loss.
         """
         return min(SILENCE + ROUND_TRIPS * self._round_trip, MOST_SILENCE)
+
+    @property
+    def missing(self) -> int:
+        """Bytes that a large message still needs; 0: none is on its way."""
+        return self._reader.missing
 
     def receive(self, data: bytes, now: float) -> list[LinkMessage | BadInput]:
         """What these bytes bring, in order; heartbeats are answered here and not returned."""
@@ -278,7 +286,7 @@ class ClientSession(LinkSession):
     """
 
     def __init__(self, now: float, role: LinkRole, name: str = "", secret: LinkSecret | None = None) -> None:
-        super().__init__(now, max_frame=MAX_MEDIA_FRAME if role == "media" else MAX_CONTROL_FRAME)
+        super().__init__(now, max_frame=MAX_CONTROL_FRAME)
         if role not in FROM_ROBOT:
             raise ValueError(f"a client cannot have the role {role}")
         self.role = role
@@ -302,11 +310,26 @@ class ClientSession(LinkSession):
             return self._reject("handshake", "the bridge sent no description")
         if not self._is_proven(message):
             return self._reject("unauthorised", "the bridge does not prove that it knows the link secret")
+        try:
+            if message.description is not None:
+                check_description(message.description)
+        except DescriptionError as error:
+            return self._reject("description", f"the bridge's description makes no sense: {error}")
         assert self.role is not None  # set by __init__
         self._measured(now - self._opened)
         self._open(self.role, FROM_ROBOT[self.role], now)
+        self._reader.max_frame = MAX_MEDIA_FRAME if self.role == "media" else MAX_CONTROL_FRAME
         self.hello = message
         return message
+
+    def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        """A feedback that does not fit the description is bad input: nobody could show or record it."""
+        described = None if self.hello is None else self.hello.description
+        if isinstance(message, Feedback) and isinstance(message, self._allowed) and described is not None:
+            wrong = misfit(message, described)
+            if wrong:
+                return BadInput("malformed", wrong)
+        return super()._receive_open(message, now)
 
     def _answer(self, challenge: Challenge) -> BadInput | None:
         if self._secret is None:

@@ -301,8 +301,7 @@ class Console:
         self._metrics.feedback.inc()
         self._metrics.event.set(feedback.event)
         self._metrics.stopped.set(feedback.stop.stopped)
-        for limit in feedback.limits:
-            self._metrics.limited.labels(limit).inc()
+        self._metrics.limits_acted(feedback.limits)
         if feedback.stop != self._shown_stop:
             self._shown_stop = feedback.stop
             self.peers.tell("stop", StopStateNotice(stop=feedback.stop, event=feedback.event))

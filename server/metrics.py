@@ -2,6 +2,7 @@
 
 import platform
 from collections import Counter as Totals
+from collections.abc import Sequence
 from importlib.metadata import version
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
@@ -9,7 +10,9 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Proc
 from server.exposition import Exposition
 from server.faults import Faults
 
-__all__ = ["Metrics", "certificate_end", "describe_process"]
+__all__ = ["MAX_LIMITS", "Metrics", "certificate_end", "describe_process"]
+
+MAX_LIMITS = 300  # names of limits that are told apart, whatever robots there were
 
 
 def describe_process(registry: CollectorRegistry) -> None:
@@ -66,6 +69,7 @@ class Metrics:
             ["limit"],
             registry=registry,
         )
+        self._limits: set[str] = set()  # that have a counter
         self.stopped = Gauge("lockstep_stopped", "1 while the robot is stopped", registry=registry)
         self.recording_failed = Gauge(
             "lockstep_recording_failed", "1 while a recording is wanted and cannot be written", registry=registry
@@ -87,6 +91,14 @@ class Metrics:
             buckets=(0.001, 0.002, 0.004, 0.006, 0.008, 0.012, 0.02, 0.05, 0.1, 0.5, 1.0),
             registry=registry,
         )
+
+    def limits_acted(self, names: Sequence[str]) -> None:
+        """Count limits by name. Names are the robot's word: those beyond `MAX_LIMITS` are counted as `other`."""
+        for name in names:
+            if name not in self._limits and len(self._limits) >= MAX_LIMITS:
+                name = "other"
+            self._limits.add(name)
+            self.limited.labels(name).inc()
 
     def collect(self, bad_input: Totals[str], drops: Totals[str]) -> None:
         """Bring up to date what the robot links count for themselves, as totals."""

@@ -79,7 +79,9 @@ Role = Literal["operator", "observer", "supervisor"]
 SpeedCapMode = Literal["on", "off", "operator"]  # the console's setting; "operator": as the holder of the seat wants
 Tier = Literal["operator", "high", "low"]  # of the encoded media: the operator's own, and the observers' two
 Name = Annotated[str, msgspec.Meta(max_length=60)]
-Count = Annotated[int, msgspec.Meta(ge=0)]
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # what a JavaScript number holds exactly
+Difference = Annotated[int, msgspec.Meta(ge=-(2**53 - 1), le=2**53 - 1)]
+Milliseconds = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
 MAX_STREAMS = 32
 
 
@@ -88,14 +90,14 @@ class StreamReport(msgspec.Struct, frozen=True, kw_only=True):
 
     stream: Name
     carrier: Carrier
-    stamp: Annotated[int, msgspec.Meta(ge=0)] = 0  # last one seen; 0 before the first
-    gap: int = 0  # at the last rendering
-    max_gap: int = 0  # largest |gap| rendered
+    stamp: Count = 0  # last one seen; 0 before the first
+    gap: Difference = 0  # at the last rendering
+    max_gap: Difference = 0  # largest |gap| rendered
     rendered: Count = 0
     discarded: Count = 0
     held: Count = 0
     tolerance: Count = 0  # events; what the person at the client allows
-    lag: int = 0  # largest feedback - stamp among what arrived since the last report, rendered or not
+    lag: Difference = 0  # largest feedback - stamp among what arrived since the last report, rendered or not
     violations: Count = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
     gate: Literal["event", "off", "age"] = "event"  # how it is gated now
 
@@ -103,13 +105,13 @@ class StreamReport(msgspec.Struct, frozen=True, kw_only=True):
 class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="report"):
     """A client's statistics, a few times a second; also its heartbeat for the control seat."""
 
-    event: Annotated[int, msgspec.Meta(ge=0)] = 0  # newest feedback; 0 before the first
+    event: Count = 0  # newest feedback; 0 before the first
     armed: bool = False
     streams: Annotated[list[StreamReport], msgspec.Meta(max_length=MAX_STREAMS)] = []
-    picture_delay_ms: float | None = None  # command to picture, on the client's own clock; None: not known now
-    round_trip_ms: float | None = None
+    picture_delay_ms: Milliseconds | None = None  # command to picture, on the client's own clock; None: not known now
+    round_trip_ms: Milliseconds | None = None
     speed_cap: bool = False  # whether the operator wants the speed capped by the delay
-    ping: int | None = None  # id of a ping that travels with it; answered as a ping is
+    ping: Difference | None = None  # id of a ping that travels with it; answered as a ping is
 
 
 class SeatRequest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_request"):

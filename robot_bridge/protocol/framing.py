@@ -32,6 +32,11 @@ class FrameReader:
         self._large: bytearray | None = None  # a frame that is being filled, so that its bytes are copied once
         self._filled = 0  # bytes of it
 
+    @property
+    def missing(self) -> int:
+        """Bytes that a large frame still needs; 0: none is being read."""
+        return 0 if self._large is None else len(self._large) - self._filled
+
     def feed(self, data: bytes) -> None:
         if self._large is None:
             self._buffer += data

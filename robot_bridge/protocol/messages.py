@@ -12,6 +12,9 @@ from robot_bridge.protocol.errors import MessageError
 from robot_bridge.protocol.serial import MAX_EVENT
 
 __all__ = [
+    "MAX_AXES",
+    "MAX_FAULTS",
+    "MAX_RAYS",
     "PROTOCOL_VERSION",
     "Challenge",
     "Command",
@@ -39,14 +42,19 @@ __all__ = [
 
 PROTOCOL_VERSION = 2
 MAX_AXES = 256
+MAX_RAYS = 4096  # of a range ring
+MAX_FAULTS = 64
+MAX_LIMITS = 512
 
 EventReference = Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]
-IssueNumber = Annotated[int, msgspec.Meta(ge=1)]
+IssueNumber = Annotated[int, msgspec.Meta(ge=1, le=2**53 - 1)]  # what a JavaScript number holds exactly
+PingId = Annotated[int, msgspec.Meta(ge=-(2**53 - 1), le=2**53 - 1)]
 AxisValues = Annotated[list[float], msgspec.Meta(max_length=MAX_AXES)]
 Text = Annotated[str, msgspec.Meta(max_length=500)]
+Texts = Annotated[list[Text], msgspec.Meta(max_length=MAX_LIMITS)]
 Proof = Annotated[bytes, msgspec.Meta(max_length=64)]
 PressId = Annotated[str, msgspec.Meta(max_length=64)]
-StopNumber = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # what a JavaScript number holds exactly
+StopNumber = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
 Nonce = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
 
 LinkRole = Literal["robot", "operator", "events", "media"]
@@ -81,12 +89,12 @@ class StopState(msgspec.Struct, frozen=True):
     """The latched stop, and the number of the newest one. `by` and `reason` are empty unless stopped."""
 
     stopped: bool = False
-    by: str = ""  # who said the first stop since the last reset
-    reason: str = ""
+    by: Text = ""  # who said the first stop since the last reset
+    reason: Text = ""
     number: StopNumber = 0  # of the newest stop, also after its reset; never given twice; 0 before the first
     press: PressId = ""  # id of the press that became the newest stop
     kept: bool = True  # whether this state is on the robot's disk
-    locked_out: str = ""  # why somebody at the robot keeps it from being driven; "" when nobody does
+    locked_out: Text = ""  # why somebody at the robot keeps it from being driven; "" when nobody does
 
 
 class Hello(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
@@ -125,15 +133,17 @@ class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     event: EventReference
     issue: IssueNumber
     time: float  # s, the bridge's monotonic clock when it was issued
-    axes: list[float]  # measured, in the axes' units
-    joints: list[float] = []
-    wrench: list[float] = []  # fx fy fz (N), tx ty tz (N m), in the sensor's frame; empty without a sensor
-    ranges: list[float] = []  # m; range_max means nothing seen
+    axes: AxisValues  # measured, in the axes' units
+    joints: AxisValues = []
+    wrench: Annotated[
+        list[float], msgspec.Meta(max_length=6)
+    ] = []  # fx fy fz (N), tx ty tz (N m), in the sensor's frame; empty without a sensor
+    ranges: Annotated[list[float], msgspec.Meta(max_length=MAX_RAYS)] = []  # m; range_max means nothing seen
     at_rest: bool = True
     stop: StopState = StopState()
-    faults: list[str] = []
-    limits: list[str] = []  # names of the position limits and geofences that slowed the robot since the last feedback
-    unknown: list[str] = []  # names of axes and joints that could not be measured: their values are old
+    faults: Annotated[list[Text], msgspec.Meta(max_length=MAX_FAULTS)] = []
+    limits: Texts = []  # names of the position limits and geofences that slowed the robot since the last feedback
+    unknown: Texts = []  # names of axes and joints that could not be measured: their values are old
     nonce: Nonce = 0  # 53 random bits, new in every issue
     neutral_needed: bool = False  # no moving command executes before a neutral one
     warning: float = 0.0  # s that the robot still warns before it may move
@@ -142,7 +152,7 @@ class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
 class Refusal(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="refusal"):
     """Why a command was not executed, and which event is current."""
 
-    event: int  # the refused command's event; 0 when it could not be read
+    event: Annotated[int, msgspec.Meta(ge=0, le=MAX_EVENT)]  # the refused command's event; 0 when it could not be read
     reason: RefusalReason
     current: EventReference
     detail: Text = ""
@@ -203,11 +213,11 @@ class Reset(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="re
 class Ping(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="ping"):
     """Heartbeat; answered at once by a pong with the same id."""
 
-    id: int
+    id: PingId
 
 
 class Pong(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="pong"):
-    id: int
+    id: PingId
 
 
 class Goodbye(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="goodbye"):

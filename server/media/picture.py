@@ -16,6 +16,7 @@ from server.media.errors import PayloadError, UnsupportedCodecError
 __all__ = ["PictureDecoder"]
 
 MIN_SIDE = 16  # pixels
+MAX_JPEG, MAX_H264 = 8192 * 4096, 4096 * 2304  # pixels; of H.264 a decoder keeps up to seventeen pictures
 
 Plane = npt.NDArray[np.uint8]
 
@@ -51,6 +52,7 @@ class PictureDecoder:
     def _from_mjpeg(self, media: Media) -> av.VideoFrame:
         if self._mjpeg is None:
             self._mjpeg = av.CodecContext.create("mjpeg", "r")
+            self._mjpeg.options = {"max_pixels": str(MAX_JPEG)}  # a few bytes can say that they are any number
             self._mjpeg.thread_count = 1
         try:
             frames = self._mjpeg.decode(av.Packet(media.payload))
@@ -67,6 +69,7 @@ class PictureDecoder:
             raise PayloadError("there is no keyframe to begin with yet")
         if self._h264 is None:
             self._h264 = av.CodecContext.create("h264", "r")
+            self._h264.options = {"max_pixels": str(MAX_H264)}
             self._h264.thread_count = 1
             self._h264.flags |= Flags.low_delay  # one in, one out: there are no B-frames
         frame = None

@@ -31,6 +31,10 @@ def with_change(**changes: object) -> RobotDescription:
     return msgspec.structs.replace(DESCRIPTION, **changes)
 
 
+def _camera(**changes: object) -> Camera:
+    return msgspec.structs.replace(DESCRIPTION.cameras[0], **changes)
+
+
 def test_the_planar_robots_description_is_sound() -> None:
     check_description(DESCRIPTION)
     check_description(with_axis())
@@ -55,6 +59,16 @@ def test_the_planar_robots_description_is_sound() -> None:
         (with_change(joints=(Joint(name="", unit="m"),)), "joint name ''"),
         (with_change(microphones=(Microphone(name="front", label="F", sample_rate=8000),)), "stream name 'front'"),
         (with_change(cameras=DESCRIPTION.cameras * 2), "stream name"),
+        (with_change(axes=tuple(with_axis(name=f"a{n}").axes[0] for n in range(300)), layers=()), "300 axes"),
+        (with_change(cameras=tuple(_camera(name=f"c{n}") for n in range(40)), microphones=()), "40 cameras"),
+        (with_change(cameras=(_camera(width=65_535),)), "65535x"),
+        (with_change(cameras=(_camera(frame_rate=math.nan),)), "frame_rate"),
+        (with_change(cameras=(_camera(label="ok\x1b[2J"),)), "cannot be printed"),
+        (with_change(label="\u202eknalP"), "cannot be printed"),
+        (with_change(label="x" * 201), "201 characters"),
+        (with_change(microphones=(Microphone(name="m", label="M", sample_rate=0),)), "0 Hz"),
+        (with_change(bodies=(Body(name="a", parent="b"), Body(name="b", parent="a"))), "part of itself"),
+        (with_change(bodies=(Body(name="a", parent="", position=(0.0, math.nan, 0.0)),)), "body a: every number"),
         (
             with_change(cameras=(msgspec.structs.replace(DESCRIPTION.cameras[0], metres_per_pixel=0.0),)),
             "metres_per_pixel must be positive",

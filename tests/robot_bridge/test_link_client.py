@@ -232,7 +232,8 @@ async def test_bad_input_from_the_bridge_is_counted_and_skipped() -> None:
 
 async def test_a_reader_that_falls_behind_loses_the_oldest_and_knows_how_many() -> None:
     count = MAX_INBOX + 10
-    feedbacks = [Feedback(event=n, issue=1, time=0.0, axes=[]) for n in range(1, count + 1)]
+    axes, joints = ([0.0] * len(each) for each in (DESCRIPTION.axes, DESCRIPTION.joints))
+    feedbacks = [Feedback(event=n, issue=1, time=0.0, axes=axes, joints=joints) for n in range(1, count + 1)]
     async with (
         fake_bridge(wire(HELLO, *feedbacks, Goodbye(error="closing"))) as bridge,
         RobotLink("127.0.0.1", bridge.port, "operator") as link,

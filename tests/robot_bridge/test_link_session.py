@@ -165,7 +165,7 @@ ONE_OF_EACH: list[LinkMessage] = [
     Rest(event=2),
     Stop(),
     Reset(),
-    Feedback(event=1, issue=1, time=0.0, axes=[]),
+    Feedback(event=1, issue=1, time=0.0, axes=[0.0] * len(DESCRIPTION.axes), joints=[0.0] * len(DESCRIPTION.joints)),
     EventNotice(event=1, time=0.0),
     Media(stream="a", codec="mjpeg", stamp=1, time=0.0, payload=b""),
     Hello(role="operator"),

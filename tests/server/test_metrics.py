@@ -2,7 +2,7 @@ import platform
 from collections import Counter
 from importlib.metadata import version
 
-from server.metrics import Metrics
+from server.metrics import MAX_LIMITS, Metrics
 
 
 def test_what_the_links_count_is_added_once() -> None:
@@ -27,3 +27,15 @@ async def test_what_runs_is_said_once_and_no_series_says_when_it_was_made() -> N
     text = (await metrics.exposition.text()).decode()
     assert f'lockstep_build_info{{python="{platform.python_version()}",version="{version("lockstep")}"}} 1.0' in text
     assert "_created" not in text
+
+
+def test_a_robot_that_calls_its_limits_ever_new_names_makes_no_series_without_end() -> None:
+    metrics = Metrics()
+    for number in range(2 * MAX_LIMITS):
+        metrics.limits_acted([f"limit {number}", "limit 0"])
+    found_all = (sample for metric in metrics.limited.collect() for sample in metric.samples)
+    series = [each for each in found_all if each.name.endswith("_total")]
+    assert len(series) == MAX_LIMITS + 1
+    found = metrics.registry.get_sample_value
+    assert found("lockstep_limited_feedback_total", {"limit": "other"}) == MAX_LIMITS
+    assert found("lockstep_limited_feedback_total", {"limit": "limit 0"}) == 2 * MAX_LIMITS + 1

@@ -67,6 +67,15 @@ def test_a_client_cannot_speak_as_the_server() -> None:
         '{"type": "rename", "name": "' + "x" * 61 + '"}',
         '{"type": "report", "streams": ' + json.dumps([{"stream": "a", "carrier": "none"}] * 33) + "}",
         '{"type": "ping", "id": "\ud800"}',
+        # A page reads numbers as long as these as infinite, and refuses the whole message that shares them with it.
+        *(f'{{"type": "report", "{field}": 1{"0" * 400}}}' for field in ("event", "ping")),
+        *(
+            f'{{"type": "report", "streams": [{{"stream": "a", "carrier": "none", "{field}": 1{"0" * 400}}}]}}'
+            for field in ("stamp", "gap", "max_gap", "lag", "tolerance", "rendered")
+        ),
+        '{"type": "report", "picture_delay_ms": 1e300}',
+        '{"type": "report", "round_trip_ms": -1e300}',
+        '{"type": "command", "event": 2, "issue": 9007199254740992, "values": [0]}',
         "[" * 100_000,
     ],
 )

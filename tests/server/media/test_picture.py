@@ -105,3 +105,14 @@ def test_a_payload_of_another_length_than_its_size_says_is_refused(more: int) ->
         PictureDecoder().decode(
             Media(**{**{f: getattr(whole, f) for f in whole.__struct_fields__}, "payload": payload})
         )
+
+
+def test_a_picture_that_says_it_is_huge_is_refused_before_there_is_memory_for_it() -> None:
+    small = jpeg(64, 64).payload
+    size = small.index(b"\xff\xc0") + 5  # in the frame header (ITU-T T.81 B.2.2)
+    side = 16_000
+    huge = small[:size] + side.to_bytes(2, "big") * 2 + small[size + 4 : -2] + bytes(side * side // 250) + small[-2:]
+    decoder = PictureDecoder()
+    with pytest.raises(PayloadError):
+        decoder.decode(Media(stream="camera", codec="mjpeg", stamp=1, time=0.0, payload=huge, width=64, height=64))
+    assert decoder.decode(jpeg(64, 64)).width == 64, "and the next one is decoded"

@@ -1,0 +1,30 @@
+"""Whether a feedback is one of the robot that a description tells of. No I/O."""
+
+import math
+from collections.abc import Sequence
+
+from robot_bridge.protocol.description import RobotDescription
+from robot_bridge.protocol.messages import Feedback
+
+__all__ = ["misfit"]
+
+WRENCH = 6  # values
+
+
+def misfit(feedback: Feedback, description: RobotDescription) -> str:
+    """What does not fit: a value too many or too few, or one that is no number; "" when all does."""
+    rays = 0 if description.ranges is None else description.ranges.count
+    values: tuple[tuple[str, Sequence[float], tuple[int, ...]], ...] = (
+        ("axes", feedback.axes, (len(description.axes),)),
+        ("joints", feedback.joints, (len(description.joints),)),
+        ("wrench", feedback.wrench, (0, WRENCH)),
+        ("ranges", feedback.ranges, (0, rays)),
+    )
+    for name, found, lengths in values:
+        if len(found) not in lengths:
+            return f"a feedback with {len(found)} {name}"
+        if not all(map(math.isfinite, found)):
+            return f"a feedback whose {name} are no numbers"
+    if not (math.isfinite(feedback.time) and math.isfinite(feedback.warning)):
+        return "a feedback without a time"
+    return ""
