@@ -9,13 +9,14 @@ from collections.abc import Iterator
 from robot_bridge.protocol.console import Role, SharedNote
 from robot_bridge.protocol.messages import RefusalReason
 from server.names import printable
+from server.rate_limits import RateLimits
 from server.token_bucket import TokenBucket
 
 __all__ = ["NoteBoard"]
 
 KEPT = 100
-BURST = 5.0  # notes of one peer at once
-PEER_RATE = 0.5  # notes a second of one peer
+BURST = 5  # notes of one link at once, however many connections it has
+LINK_RATE = 0.5  # notes a second of one link
 BOARD_BURST = 20.0  # of all peers together: every note goes to everyone
 BOARD_RATE = 4.0
 
@@ -27,23 +28,22 @@ class NoteBoard:
         self._kept: deque[SharedNote] = deque(maxlen=KEPT)
         self._next_id = 1
         self._all = TokenBucket(BOARD_RATE, BOARD_BURST, now)
-        self._peers: dict[str, TokenBucket] = {}
+        self._links = RateLimits(LINK_RATE, BURST)
 
     def __iter__(self) -> Iterator[SharedNote]:
         """The last ones, oldest first."""
         return iter(list(self._kept))
 
     def write(
-        self, peer: str, name: str, role: Role, text: str, epoch: str, event: int, now: float, clock: float
+        self, link: str, peer: str, name: str, role: Role, text: str, epoch: str, event: int, now: float, clock: float
     ) -> SharedNote | RefusalReason:
-        """Keep a note; or why not: this peer or all together write too often, or nothing in it can be printed."""
+        """Keep a note; or why not: this link or all together write too often, or nothing in it can be printed."""
         text = printable(text)
         if not text:
             return "malformed"
-        mine = self._peers.setdefault(peer, TokenBucket(PEER_RATE, BURST, now))
-        if not mine.has(now) or not self._all.take(now):
+        if not (self._all.has(now) and self._links.spend(link, now)):
             return "too_often"
-        mine.take(now)
+        self._all.take(now)
         return self._keep(peer, name, role, text, epoch, event, round(clock, 3))
 
     def _keep(self, peer: str, name: str, role: Role, text: str, epoch: str, event: int, clock: float) -> SharedNote:
@@ -53,7 +53,3 @@ class NoteBoard:
         self._next_id += 1
         self._kept.append(note)
         return note
-
-    def forget(self, peer: str) -> None:
-        """`peer` is gone; its notes stay."""
-        self._peers.pop(peer, None)

@@ -47,7 +47,6 @@ class People:
         self._audit.record("joined", peer.actor, ", ".join(sorted({stream.carrier for stream in peer.streams})))
 
     def left(self, peer: Peer) -> None:
-        self._board.forget(peer.id)
         if not peer.thumbnail:
             self._audit.record("left", peer.actor, peer.ended)
 
@@ -72,9 +71,8 @@ class People:
 
     def write(self, peer: Peer, text: str) -> None:
         """A note to everyone."""
-        note = self._board.write(
-            peer.id, peer.name, peer.role, text, self._clock.epoch, self._clock.event, time.monotonic(), time.time()
-        )
+        link, epoch, event = peer.identity.token_id, self._clock.epoch, self._clock.event
+        note = self._board.write(link, peer.id, peer.name, peer.role, text, epoch, event, time.monotonic(), time.time())
         if isinstance(note, SharedNote):
             self._audit.record("note", peer.actor, detail=note.text)
             self._peers.tell("session", note)

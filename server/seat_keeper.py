@@ -22,6 +22,7 @@ from server.seat import ControlSeat, SeatOutcome, SeatRefusal, SeatTimes, Standi
 __all__ = ["SeatHost", "SeatKeeper", "SeatMessage"]
 
 CHECKS = 12  # within one heartbeat timeout
+LINK_CLAIMS = 2  # of the connections of one link at once: all together have a few, and others want to ask too
 
 SeatMessage = SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease
 
@@ -61,6 +62,8 @@ class SeatKeeper:
         """What `peer` asks for."""
         now = time.monotonic()
         match message:
+            case SeatRequest(only_if_free=False) if self._asks_too_much(peer, now):
+                self._host.refuse(peer, SeatRefusal(peer.id, "seat_taken", "your link asks for the seat already"))
             case SeatRequest(only_if_free=only_if_free):
                 self._act(self.rules.request(peer.id, peer.role, now, only_if_free=only_if_free), peer)
             case SeatTake():
@@ -71,6 +74,14 @@ class SeatKeeper:
                 self._act(self.rules.answer(peer.id, claimant, now, grant=False), peer)
             case SeatRelease():
                 self._act(self.rules.release(peer.id, now), peer)
+
+    def _asks_too_much(self, peer: Peer, now: float) -> bool:
+        """Whether it would be one claim too many of its link."""
+        if self.rules.standing(peer.id) is not Standing.OTHER:
+            return False
+        asking = [self._peers.by_id(each) for each in self.rules.claims(now)]
+        link = peer.identity.token_id
+        return sum(each is not None and each.identity.token_id == link for each in asking) >= LINK_CLAIMS
 
     def heard(self, peer: Peer) -> None:
         self.rules.heard(peer.id, time.monotonic())

@@ -20,5 +20,12 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         writer = csv.writer(file)
         writer.writerow(columns_of(description, streams))
         for row in event_rows(reader):
-            writer.writerow(["" if value is None else value for value in values_of(row, description, streams)])
+            writer.writerow([_cell(value) for value in values_of(row, description, streams)])
     return [target]
+
+
+def _cell(value: object) -> object:
+    """A text that a spreadsheet would calculate stands behind an apostrophe: people choose their names."""
+    if isinstance(value, str) and value.startswith(("=", "+", "-", "@")):
+        return f"'{value}"
+    return "" if value is None else value

@@ -19,6 +19,7 @@ from robot_bridge.protocol.console import (
 )
 from robot_bridge.protocol.messages import Command, Feedback, Refusal, Reset
 from robot_bridge.protocol.serial import event_after
+from server.seat_keeper import LINK_CLAIMS
 from tests.server.rig import TestPeer, eventually, running_rig
 
 
@@ -197,3 +198,26 @@ async def test_those_who_may_drive_get_every_feedback(role: str) -> None:
         await other.feedback(lambda each: each.event == last)
         events = {each.event for each in other.heard if isinstance(each, Feedback)}
         assert len(events) >= 20
+
+
+async def test_one_link_does_not_take_all_places_of_those_who_ask_for_the_seat() -> None:
+    async with running_rig() as rig, rig.peer("operator") as holder, rig.peer("operator") as another:
+        holder.send("session", SeatRequest())
+        await _seat(holder, holder=await _id(holder))
+        greedy, headers = [TestPeer() for _ in range(LINK_CLAIMS + 1)], rig.token("operator")
+        try:
+            for peer in greedy:
+                await peer.join(rig, headers, ("control", "session", "stop"))
+                peer.send("session", SeatRequest())
+            refused = await _refused(greedy[-1], "seat_taken")
+            assert "your link" in refused.detail
+            another.send("session", SeatRequest())
+            wanted = await _id(another)
+            seat = await holder.until(
+                lambda each: isinstance(each, Seat) and wanted in [claim.peer for claim in each.claims]
+            )
+            assert isinstance(seat, Seat)
+            assert len(seat.claims) == LINK_CLAIMS + 1
+        finally:
+            for peer in greedy:
+                await peer.close()

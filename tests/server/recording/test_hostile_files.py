@@ -1,8 +1,10 @@
 """Recordings that somebody else has made: names lead nowhere, words are only printed, and chunks unpack small."""
 
+import csv
 import struct
 from pathlib import Path
 
+import msgspec
 import pytest
 import zstandard
 from mcap.records import Chunk
@@ -10,7 +12,7 @@ from typer.testing import CliRunner
 
 from robot_bridge.protocol.console import Report, StreamReport
 from server.cli import app
-from server.recording import export_mp4
+from server.recording import export_csv, export_mp4
 from server.recording.errors import RecordingDamaged
 from server.recording.event_index import EventIndex, decode_index
 from server.recording.info import RecordingInfo
@@ -18,8 +20,8 @@ from server.recording.raw_records import MAX_RECORD, chunk_records
 from server.recording.reader import RecordingReader
 from server.recording.records import ReportRecord
 from server.recording.topics import CAMERA
-from server.recording.writer import RecordingWriter
-from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story, own_entry
+from server.recording.writer import Entry, RecordingWriter
+from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story, own_entry, rewritten
 
 ESCAPE = "\x1b[2J\x1b[1;1H\nverified and true\n"
 
@@ -72,6 +74,20 @@ def test_what_a_recording_says_cannot_write_to_the_terminal(tmp_path: Path) -> N
         assert "verified and true" in output, "it is shown, as the name that it is"
         assert "\x1b" not in output
         assert not any(line.startswith("verified") for line in output.splitlines())
+
+
+@pytest.mark.parametrize("name", ['=HYPERLINK("http://x")', "+1", "-1", "@SUM(A1)"])
+def test_a_name_is_nothing_that_a_spreadsheet_calculates(name: str, tmp_path: Path) -> None:
+    def renamed(entry: Entry) -> list[Entry]:
+        told = msgspec.json.encode(name)
+        return [entry._replace(data=entry.data.replace(b'"Ada"', told)) if "/seat" in entry.topic else entry]
+
+    path = rewritten(tmp_path / "a.mcap", Story(events=10).entries(), renamed)
+    (written,) = export_csv.export(path, None, "")
+    with written.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["driver"] for row in rows} == {f"'{name}"}
+    assert float(rows[1]["axis.base.wz"]) == 0.0, "numbers stay numbers"
 
 
 @pytest.mark.parametrize("unpacked", [1 << 33, 1000])
