@@ -1,0 +1,58 @@
+"""As whom a new connection is counted, before it has said anything."""
+
+import asyncio
+import socket
+from collections.abc import Callable
+
+import pytest
+
+from server.acceptor import Acceptor, PlacedProtocol
+from server.connection_places import ConnectionPlaces, Place
+from server.request_turns import RequestTurns
+
+
+class _Places(ConnectionPlaces):
+    """Keeps who came."""
+
+    def __init__(self) -> None:
+        super().__init__(10, 10, lambda name: None)
+        self.came: asyncio.Queue[tuple[str, bool]] = asyncio.Queue()
+
+    def enter(self, address: str, close: Callable[[], None], *, proxy: bool = False) -> Place:
+        self.came.put_nowait((address, proxy))
+        return super().enter(address, close, proxy=proxy)
+
+
+def _has_ipv6() -> bool:
+    try:
+        with socket.create_server(("::1", 0), family=socket.AF_INET6):
+            return True
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize(
+    ("host", "comes_from", "counted"),
+    [
+        ("127.0.0.1", "127.0.0.1", ("127.0.0.1", True)),
+        ("127.0.0.1", "127.0.0.2", ("127.0.0.2", False)),
+        ("::1", "::1", ("::/64", True)),
+    ],
+)
+async def test_an_ipv6_client_is_counted_by_its_network_and_a_proxy_only_on_this_machine(
+    host: str, comes_from: str, counted: tuple[str, bool]
+) -> None:
+    if ":" in host and not _has_ipv6():
+        pytest.skip("this machine has no IPv6")
+    places = _Places()
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.create_server((host, 0), family=family) as listener:
+        listener.setblocking(False)
+        accepting = asyncio.create_task(Acceptor(listener, places, RequestTurns(), PlacedProtocol, None).run())
+        address = listener.getsockname()[:2]
+        _, writer = await asyncio.open_connection(*address, local_addr=(comes_from, 0))
+        async with asyncio.timeout(10):
+            assert await places.came.get() == counted
+        writer.transport.abort()
+        accepting.cancel()
+        await asyncio.wait([accepting])
