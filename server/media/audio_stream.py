@@ -32,6 +32,8 @@ __all__ = ["AudioStream"]
 
 QUEUE_SEGMENTS = 10
 MIN_RATE = 8_000  # Hz
+MAX_AHEAD = 2.0  # s of sound that may come at once
+FASTEST = 1.25  # s of it in a second, afterwards
 
 
 class SoundJob(NamedTuple):
@@ -54,13 +56,28 @@ class AudioStream(Stream[SoundJob]):
         self._encoders: dict[str, SoundEncoder] = {}
         self._bundles: dict[str, SoundBundle] = {}  # of the codecs that a crowd takes
         self._expected = ExpectedLoss(settings.opus_packet_loss_percent)
+        self._room = MAX_AHEAD  # s of sound that may come now
+        self._came_at = 0.0  # s, the last of it
 
     def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
+        if not self._has_room(media, now):
+            self._drop("too_often")
+            return
         if len(self._waiting) >= QUEUE_SEGMENTS:
             self._waiting.popleft()
             self._drop("encoder_busy")
         self._waiting.append((media, capture_time))
         self._begin_next()
+
+    def _has_room(self, media: Media, now: float) -> bool:
+        """Whether no more sound comes than time passes: each packet that is made of it costs the loop."""
+        self._room = min(MAX_AHEAD, self._room + (now - self._came_at) * FASTEST)
+        self._came_at = now
+        seconds = len(media.payload) / (2 * max(1, media.channels) * max(MIN_RATE, media.sample_rate))
+        if seconds > self._room:
+            return False
+        self._room -= seconds
+        return True
 
     def _next_job(self) -> SoundJob | None:
         if not self._waiting:

@@ -22,10 +22,14 @@ from server.media.peer_stream import PeerStream
 from server.media.quality.plan import PicturePlan, PictureTier
 from server.media.recorded_output import RecordedOutput
 from server.media.settings import MediaSettings
+from server.token_bucket import TokenBucket
 
 __all__ = ["Encoded", "Stream"]
 
 logger = logging.getLogger(__name__)
+
+MAX_RATE = 240.0  # Hz, of media of one stream; what is made of each costs the loop that all robots share
+MAX_AT_ONCE = 240.0  # of them, after a network that has held them back
 
 Job = TypeVar("Job")
 
@@ -67,6 +71,7 @@ class Stream(ABC, Generic[Job]):
         self._fan_out = fan_out
         self._metrics = metrics
         self._last_stamp: int | None = None
+        self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE, 0.0)
         self._reported = False  # that the worker failed
         self._works = False  # the worker
         self._turns: LoopTurns | None = None  # None: not running
@@ -161,6 +166,9 @@ class Stream(ABC, Generic[Job]):
     def feed(self, media: Media, now: float, capture_time: float) -> None:
         """Take a medium. `capture_time` is in s since 1970."""
         self._frames_in.inc()
+        if not self._rate.take(now):
+            self._drop("too_often")
+            return
         # Without one, none that builds on it could be decoded; an older stamp than the last is no lie.
         in_order = media.codec == "h264" or self._last_stamp is None
         if not in_order and event_gap(media.stamp, self._last_stamp or media.stamp) < 0:

@@ -12,6 +12,7 @@ from server.media.frame import EncodedFrame
 from server.media.packetise import packetise_sound
 from server.media.picture_encoder import H264Encoder
 from server.media.sound_encoder import OpusEncoder
+from server.media.stream import MAX_AT_ONCE
 from tests.server.media.feeding import refused, stream, value
 from tests.server.media.viewer import (
     TIMEOUT,
@@ -60,6 +61,26 @@ async def test_bad_sound_is_counted_and_the_next_good_one_passes(changes: dict[s
         await refused(plane, sound(1, 0.0, **changes))
         await stream(plane, viewer, "audio", sound, 4, first=2)
         assert value(plane, "frames_dropped_total", stream="microphone0", stage=stage) == 1
+
+
+async def test_no_more_sound_is_taken_than_time_passes_and_what_comes_in_time_goes_on() -> None:
+    async with running_plane() as plane, viewing(plane, ["audio"]) as viewer:
+        endless = sound(1, 0.0, payload=bytes(2 * 16_000 * 600))  # ten minutes, which would be thirty thousand packets
+        plane.feed(endless, 0.0)
+        await stream(plane, viewer, "audio", sound, 4, first=2)
+        for number in range(300):
+            plane.feed(sound(10, 1.0 + number / 1000), 1.0)
+        assert value(plane, "frames_dropped_total", stream="microphone0", stage="too_often") > 200
+
+
+async def test_of_pictures_no_more_are_taken_than_any_camera_makes() -> None:
+    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
+        for number in range(int(MAX_AT_ONCE) + 100):
+            plane.feed(picture(1, number / 10_000), 0.0)
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="too_often") == 100
+        plane.feed(picture(2, 10.0), 10.0)
+        await viewer.until(lambda: bool(viewer.of("video")))
+        assert value(plane, "frames_dropped_total", stream="camera0", stage="too_often") == 100
 
 
 @pytest.mark.parametrize("time", [float("nan"), float("inf"), -1.0, 1e300])
