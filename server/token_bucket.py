@@ -14,7 +14,7 @@ class TokenBucket:
 
     def has(self, now: float) -> bool:
         """Whether `take` would succeed."""
-        self._level = min(self._burst, self._level + (now - self._at) * self._rate)
+        self._level = min(self._burst, self._level + max(0.0, now - self._at) * self._rate)
         self._at = now
         return self._level >= 1
 

@@ -71,7 +71,7 @@ class AudioStream(Stream[SoundJob]):
 
     def _has_room(self, media: Media, now: float) -> bool:
         """Whether no more sound comes than time passes: each packet that is made of it costs the loop."""
-        self._room = min(MAX_AHEAD, self._room + (now - self._came_at) * FASTEST)
+        self._room = min(MAX_AHEAD, self._room + max(0.0, now - self._came_at) * FASTEST)
         self._came_at = now
         seconds = len(media.payload) / (2 * max(1, media.channels) * max(MIN_RATE, media.sample_rate))
         if seconds > self._room:
