@@ -48,7 +48,7 @@ MAX_LIMITS = 512
 
 EventReference = Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]
 IssueNumber = Annotated[int, msgspec.Meta(ge=1, le=2**53 - 1)]  # what a JavaScript number holds exactly
-PingId = Annotated[int, msgspec.Meta(ge=-(2**53 - 1), le=2**53 - 1)]
+PingId = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 AxisValues = Annotated[list[float], msgspec.Meta(max_length=MAX_AXES)]
 Text = Annotated[str, msgspec.Meta(max_length=500)]
 Texts = Annotated[list[Text], msgspec.Meta(max_length=MAX_LIMITS)]

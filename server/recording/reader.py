@@ -188,7 +188,7 @@ class RecordingReader:
 
     def _record_at(self, offset: int, opcode: int) -> bytes:
         """The content of one MCAP record, after its opcode and length."""
-        self._file.seek(offset)
+        self._seek(offset)
         head = self._file.read(HEAD)
         length = int.from_bytes(head[1:], "little")
         if len(head) < HEAD or head[0] != opcode or length > MAX_RECORD:
@@ -197,6 +197,12 @@ class RecordingReader:
         if len(content) < length:
             raise RecordingDamaged(f"the record at {offset} is cut off")
         return content
+
+    def _seek(self, offset: int) -> None:
+        """Where the file says that something stands; what it says may be any number."""
+        if not 0 <= offset <= self.size:
+            raise RecordingDamaged(f"nothing stands at byte {offset} of {self.size}")
+        self._file.seek(offset)
 
     def _read_info(self) -> RecordingInfo:
         self._file.seek(0)
@@ -226,7 +232,7 @@ class RecordingReader:
 
     def _attachment(self, footer: Footer, end: int) -> AttachmentIndex | None:
         """Where the index is: the summary's last groups are short, so they are read from their own beginning."""
-        self._file.seek(footer.summary_offset_start or footer.summary_start)
+        self._seek(footer.summary_offset_start or footer.summary_start)
         summary = self._file.read(end - self._file.tell() - FOOTER)
         at = 0
         while at + HEAD <= len(summary):

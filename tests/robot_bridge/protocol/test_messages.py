@@ -50,7 +50,7 @@ def test_whole_numbers_are_taken_for_floats() -> None:
         command(event=None),
         command(issue=0),
         command(issue=2**53),
-        {"type": "ping", "id": 2**60},
+        {"type": "ping", "id": 2**63},
         {"type": "refusal", "event": -1, "reason": "late", "current": 1},
         command(values=[0.0] * 257),
         command(values=["fast"]),

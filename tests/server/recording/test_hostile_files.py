@@ -16,7 +16,7 @@ from server.recording import export_csv, export_mp4
 from server.recording.errors import RecordingDamaged
 from server.recording.event_index import EventIndex, decode_index
 from server.recording.info import RecordingInfo
-from server.recording.raw_records import MAX_RECORD, chunk_records
+from server.recording.raw_records import MAGIC, MAX_RECORD, chunk_records
 from server.recording.reader import RecordingReader
 from server.recording.records import ReportRecord
 from server.recording.topics import CAMERA
@@ -118,3 +118,15 @@ def test_a_whole_recording_is_read_as_before(tmp_path: Path) -> None:
     Story(events=30).write(tmp_path / "a.mcap")
     with RecordingReader(tmp_path / "a.mcap") as reader:
         assert sum(1 for _ in reader.records()) > 100
+
+
+@pytest.mark.parametrize("offset", [2**59, 2**63, 2**64 - 1])
+def test_a_summary_that_is_said_to_be_nowhere_is_damage_and_no_other_error(offset: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=10).write(path)
+    whole = bytearray(path.read_bytes())
+    at = len(whole) - len(MAGIC) - 4 - 8  # the footer's summary_offset_start
+    whole[at : at + 8] = offset.to_bytes(8, "little")
+    path.write_bytes(whole)
+    with pytest.raises(RecordingDamaged):
+        RecordingReader(path)
