@@ -18,6 +18,7 @@ __all__ = ["DEFAULT_ROBOT", "Bridge", "Metrics", "Stack", "available_robots", "r
 
 DEFAULT_ROBOT = "mobile-manipulator"
 ROBOTS = (DEFAULT_ROBOT, "planar")
+HTTP_SECONDS = 30.0
 TRIES = 30  # for the counters, a Retry-After apart
 MAX_PEERS = 300  # more than any section needs
 
@@ -44,7 +45,7 @@ class Stack:
 
     async def metrics(self) -> "Metrics":
         """The console's counters now; asks again where others at this address have used up its requests."""
-        async with httpx.AsyncClient(trust_env=False) as http:
+        async with httpx.AsyncClient(trust_env=False, timeout=HTTP_SECONDS) as http:
             for _ in range(TRIES):
                 answer = await http.get(f"{self.url}/metrics")
                 if answer.status_code != httpx.codes.TOO_MANY_REQUESTS:

@@ -9,10 +9,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from robot_bridge.robots.mujoco_view.graphics import choose_graphics
 
 choose_graphics()  # before a test file imports mujoco
+
+settings.register_profile("any-machine", deadline=None)  # no test asserts a time
+settings.load_profile("any-machine")
 
 
 ROOT = Path(__file__).parents[1]

@@ -51,8 +51,8 @@ def schedule(minutes: float, seed: int) -> list[Action]:
         *(Action(at, "join" if turn % 2 else "leave") for turn, at in enumerate(_moves(chance, minutes, begin, end))),
     ]
     # The longest cut still leaves time before the next.
-    cuts = _spread(chance, counts.network_cuts, begin, end)
     longest = min(LONGEST_CUT, (end - begin) / counts.network_cuts / 3)
+    cuts = _spread(chance, counts.network_cuts, begin, end - longest)
     plan += [Action(at, "cut_network", chance.uniform(SHORTEST_CUT, longest)) for at in cuts]
     return sorted(plan)
 

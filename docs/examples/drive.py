@@ -4,7 +4,7 @@ import asyncio
 import math
 import sys
 
-from client import Console
+from client import Console, ConsoleError
 
 
 async def main(link: str) -> None:
@@ -19,4 +19,7 @@ async def main(link: str) -> None:
         await console.rest()
 
 
-asyncio.run(main(sys.argv[1]))
+try:
+    asyncio.run(main(sys.argv[1]))
+except ConsoleError as error:  # the robot was stopped or held up, somebody else drives, …: look, then start it again
+    sys.exit(str(error))

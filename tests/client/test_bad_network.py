@@ -69,7 +69,7 @@ async def test_a_freeze_brings_the_robot_to_rest_and_nothing_frozen_moves_it_lat
 
 
 async def until_moving(console: Console) -> None:
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(20):
         async for feedback in console.feedbacks():
             if not feedback.at_rest:
                 return
@@ -105,7 +105,7 @@ async def test_a_console_that_dies_is_noticed_in_bounded_time(tmp_path: Path) ->
 async def _until_gone(robot: str) -> None:
     """The bridge ends with its console, and leaves no process behind."""
     port = int(robot.rpartition(":")[2])
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(20):
         while True:
             try:
                 _, writer = await asyncio.open_connection("127.0.0.1", port)

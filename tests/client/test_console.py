@@ -82,7 +82,7 @@ async def test_an_observer_sees_but_cannot_drive(stack: Stack) -> None:
         with pytest.raises(CommandRefused, match="no_seat"):
             await observer.drive([0.1, 0.0, 0.0])
         await operator.take_seat()
-        async with collecting(observer, sound=False) as found, asyncio.timeout(10):
+        async with collecting(observer, sound=False) as found, asyncio.timeout(20):
             for _ in range(10):
                 driven = await operator.drive([0.0, 0.0, 0.2])
             async for feedback in observer.feedbacks():
@@ -103,7 +103,7 @@ async def test_the_seat_is_one_and_passes_on_when_it_is_given_back(stack: Stack)
         with pytest.raises(CommandRefused, match="no_seat"):
             await second.drive([0.1, 0.0, 0.0])
         first.release_seat()
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             async for _ in second.feedbacks():
                 if not second.seat.holder:
                     break
@@ -139,7 +139,7 @@ async def test_a_script_that_says_nothing_sends_neutral_and_then_rests(stack: St
         await console.take_seat()
         driven = await console.drive([0.2, 0.0, 0.0])
         assert console.stats().armed
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             async for feedback in console.feedbacks():
                 if feedback.event >= driven.event + 3:
                     break
@@ -166,7 +166,7 @@ async def test_leaving_brings_the_robot_to_rest_and_frees_the_seat(stack: Stack)
 
 async def test_counting_receives_every_frame_and_decodes_none(stack: Stack) -> None:
     async with Console(stack.observer, decode=False) as console:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             async for _ in console.feedbacks():
                 if all(stream.frames >= 10 for stream in console.stats().streams):
                     break

@@ -9,7 +9,7 @@ from client.pilot import Pilot
 from robot_bridge.protocol.messages import Command, Rest
 from tests.client.helpers import feedback, refusal
 
-SECONDS = 5
+SECONDS = 20
 
 
 class Wire:

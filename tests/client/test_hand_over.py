@@ -17,7 +17,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 FIRST = [0.2, 0.0, 0.0]  # what each driver sends tells the log who drove
 SECOND = [0.0, 0.1, 0.0]
 NEUTRAL = [0.0, 0.0, 0.0]
-PATIENCE = 10.0  # s
+PATIENCE = 20.0  # s
 
 
 def _console(link: str, name: str) -> Console:

@@ -15,7 +15,7 @@ async def test_a_full_queue_loses_its_oldest_item_and_counts_it() -> None:
 
 async def test_a_reader_wakes_when_an_item_comes() -> None:
     queue: NewestQueue[int] = NewestQueue(2)
-    async with asyncio.TaskGroup() as group, asyncio.timeout(5):
+    async with asyncio.TaskGroup() as group, asyncio.timeout(20):
         reader = group.create_task(queue.get())
         await asyncio.sleep(0)
         queue.put(7)
@@ -34,7 +34,7 @@ async def test_a_closed_queue_gives_out_what_it_has_and_ends() -> None:
 
 async def test_a_waiting_reader_ends_with_the_queue() -> None:
     queue: NewestQueue[int] = NewestQueue(2)
-    async with asyncio.TaskGroup() as group, asyncio.timeout(5):
+    async with asyncio.TaskGroup() as group, asyncio.timeout(20):
         reader = group.create_task(_closed(queue))
         await asyncio.sleep(0)
         queue.close()

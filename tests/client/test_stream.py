@@ -41,7 +41,7 @@ def packet(sequence: int, data: bytes, stamp: int | None) -> MediaPacket:
 async def running(stream: Stream, bound: int = 50) -> AsyncIterator[NewestQueue[Decoded]]:
     reader = stream.open_reader(bound)
     with ThreadPoolExecutor(1) as executor:
-        async with asyncio.TaskGroup() as group, asyncio.timeout(10):
+        async with asyncio.TaskGroup() as group, asyncio.timeout(20):
             task = group.create_task(stream.run(executor))
             yield reader
             task.cancel()

@@ -19,7 +19,7 @@ from tests.support.redis_server import free_port
 
 START_TURN = Path(__file__).resolve().parents[2] / "deploy" / "start-turn"
 SECRET, REALM = "only for tests, only on this machine", "lockstep.test"
-PATIENCE = 15.0
+PATIENCE = 30.0
 TCP, UDP = 0x06000000, 0x11000000  # REQUESTED-TRANSPORT
 FORBIDDEN = 403
 

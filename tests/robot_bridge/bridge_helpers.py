@@ -43,7 +43,7 @@ __all__ = [
 
 Kind = TypeVar("Kind", bound=LinkMessage)
 
-PATIENCE = 5.0  # s
+PATIENCE = 20.0  # s; a busy machine, never waited for in full
 RESET_AGAIN = 0.1  # s between two tries to reset a stop that is too new
 
 

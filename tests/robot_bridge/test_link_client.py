@@ -56,7 +56,7 @@ class FakeBridge:
 async def fake_bridge(answer: bytes, hang_up: bool = False) -> AsyncIterator[FakeBridge]:
     bridge = FakeBridge(answer, hang_up)
     server = await asyncio.start_server(bridge.serve, "127.0.0.1", 0)
-    async with server, asyncio.timeout(10):
+    async with server, asyncio.timeout(20):
         bridge.port = server.sockets[0].getsockname()[1]
         yield bridge
         await bridge.left.wait()
@@ -165,7 +165,7 @@ async def test_a_message_is_delivered_in_the_turn_that_it_comes_in() -> None:
 
         link._transport.data_received = data_received  # type: ignore[method-assign]
         delivering = asyncio.create_task(link.deliver(take))
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             await ended.wait()
         await link.close()
         await delivering
@@ -256,9 +256,11 @@ async def test_of_pictures_that_were_not_read_only_the_newest_is_kept() -> None:
 
 
 async def test_the_round_trip_includes_a_tick_and_little_else() -> None:
+    """The best of many: a busy machine may hold up the others, an algorithm of TCP's would hold up all."""
     async with running_bridge(RecordingRobot()) as bridge, operator(bridge) as driver:
-        loop = asyncio.get_running_loop()
-        started = loop.time()
+        loop, trips = asyncio.get_running_loop(), list[float]()
         for _ in range(50):
+            started = loop.time()
             await driver.drive()
-        assert (loop.time() - started) / 50 < 0.05
+            trips.append(loop.time() - started)
+        assert min(trips) < 0.03

@@ -142,7 +142,7 @@ async def test_the_python_example_runs() -> None:
         main = names["main"]
         assert callable(main)
         driving = asyncio.ensure_future(main())
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             while bridge.counters.executed < 5:
                 await asyncio.wait([driving], timeout=0.02)
                 assert not driving.done(), driving.exception()

@@ -27,7 +27,7 @@ from robot_bridge.watchdogs import Watchdogs
 from tests.robot_bridge.bridge_helpers import NEUTRAL, Operator, RecordingRobot, log_lines, operator, running_bridge
 
 LIMIT = 0.1  # s
-PATIENCE = 10.0  # s
+PATIENCE = 20.0  # s
 FAST = 0.2  # m/s
 
 

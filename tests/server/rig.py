@@ -40,7 +40,7 @@ __all__ = [
     "stop_words",
 ]
 
-PATIENCE = 10.0  # s; a busy machine, never waited for in full
+PATIENCE = 30.0  # s; a busy machine, never waited for in full
 
 
 @dataclass
@@ -219,7 +219,7 @@ async def _console(wanted: Settings, certificate: Certificate | None) -> AsyncIt
         verify = ssl.create_default_context(cafile=certificate.chain) if certificate else False
         async with (
             running(app, listener, http=guarded_by(wanted, app), tls=certificate),
-            httpx.AsyncClient(base_url=url, trust_env=False, verify=verify) as http,
+            httpx.AsyncClient(base_url=url, trust_env=False, verify=verify, timeout=PATIENCE) as http,
         ):
             yield Rig(url, app, state.access, http)
     finally:

@@ -51,7 +51,7 @@ async def test_an_ipv6_client_is_counted_by_its_network_and_a_proxy_only_on_this
         accepting = asyncio.create_task(Acceptor(listener, places, RequestTurns(), PlacedProtocol, None).run())
         address = listener.getsockname()[:2]
         _, writer = await asyncio.open_connection(*address, local_addr=(comes_from, 0))
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             assert await places.came.get() == counted
         writer.transport.abort()
         accepting.cancel()

@@ -2,6 +2,7 @@
 
 import json
 import time
+from collections import Counter
 from collections.abc import AsyncIterator
 from itertools import pairwise
 from pathlib import Path
@@ -114,7 +115,10 @@ async def test_a_link_reads_nothing_that_was_recorded_before_it_was_made_and_all
         audit = [each for each in rig.services.audit if each.kind in ("recording", "reading")]
         done = [(each.role, each.what, each.detail) for each in audit if each.kind == "recording"]
         assert done == [*[("operator", "downloaded", "one")] * 2, ("supervisor", "deleted", "one")]
-        read = {each.role: each.count for each in audit if each.kind == "reading" and each.what == "one"}
+        read = Counter[str]()  # a busy machine needs more than one record of them
+        for each in audit:
+            if each.kind == "reading" and each.what == "one":
+                read[each.role] += each.count
         assert read == {"operator": 3, "supervisor": 1}
 
 

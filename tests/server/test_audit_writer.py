@@ -6,7 +6,7 @@ import pytest
 from server.audit import AuditRecord
 from server.audit_writer import MAX_WAITING, AuditWriter
 
-PATIENCE = 10.0  # s
+PATIENCE = 20.0  # s
 
 
 class FakeFile:

@@ -53,7 +53,7 @@ async def test_an_answer_under_way_ends_with_its_link(monkeypatch: pytest.Monkey
         if len(sent) > 3:
             await asyncio.Event().wait()  # the remote does not read any more
 
-    async with asyncio.timeout(10), aclosing(body()) as chunks:
+    async with asyncio.timeout(20), aclosing(body()) as chunks:
         await EndingResponse(StreamingResponse(chunks), link.right)(SCOPE, _never, send)
         assert closed.is_set()
     assert sent[0]["type"] == "http.response.start"

@@ -65,11 +65,23 @@ async def test_a_second_head_on_the_same_connection_may_not_dawdle_either() -> N
 async def test_a_body_that_does_not_come_is_refused_by_name() -> None:
     async with guarded_console(request_timeout=0.2) as (rig, port):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        token = rig.token("observer")["Authorization"].encode()
-        head = HEAD.replace(b"GET /healthz", b"POST /api/stop") + b"Authorization: " + token
+        token = rig.token("operator")["Authorization"].encode()
+        head = HEAD.replace(b"GET /healthz", b"POST /api/reset") + b"Authorization: " + token
         writer.write(head + b"\r\nContent-Length: 9\r\n\r\n{")
         assert b'"too_slow"' in await _said(reader)
         writer.close()
+
+
+async def test_a_stop_whose_body_does_not_come_is_a_stop_all_the_same() -> None:
+    async with guarded_console(request_timeout=0.2) as (rig, port):
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        token = rig.token("observer")["Authorization"].encode()
+        head = HEAD.replace(b"GET /healthz", b"POST /api/stop") + b"Authorization: " + token
+        writer.write(head + b"\r\nContent-Length: 9\r\n\r\n{")
+        assert b'"delivered":true' in await _said(reader)
+        writer.close()
+        assert rig.services.console.clock.stop.stopped
+        assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") >= 1
 
 
 async def test_a_head_that_is_too_large_is_refused() -> None:
@@ -298,7 +310,7 @@ async def test_silent_tls_connections_hold_no_more_than_their_places_and_a_stop_
         assert len(rig.app.state.connection_places) <= 20
         answer = await rig.http.post("/api/stop", headers=rig.token("observer"))
         assert (answer.status_code, len(rig.app.state.connection_places)) == (200, 20)
-        assert len(os.listdir("/proc/self/fd")) <= before + len(silent) + 20 + 1
+        assert len(os.listdir("/proc/self/fd")) <= before + len(silent) + 20 + 10, "those turned away hold nothing"
         for _, writer in silent:
             writer.transport.abort()
 

@@ -47,7 +47,7 @@ async def test_a_restart_that_is_given_up_ends_with_its_session() -> None:
             local = await session.restart("other", "x" * 22, [])
             assert local.candidates
             assert session.tag != before
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             await rig.services.console.peers.all_gone()
         await session.close()
 

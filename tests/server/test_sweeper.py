@@ -44,7 +44,7 @@ async def test_a_sweep_unties_what_left(monkeypatch: pytest.MonkeyPatch) -> None
         watch = weakref.ref(knot, lambda _: loop.call_soon(gone.set))
         del knot
         task = asyncio.create_task(sweep_forever(lambda: ENOUGH, lambda: False))
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             await gone.wait()
         assert watch() is None
     finally:
@@ -60,7 +60,7 @@ async def test_memory_goes_back_although_nobody_left(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(sweeper, "give_back", lambda: loop.call_soon_threadsafe(given_back.set))
     task = asyncio.create_task(sweep_forever(lambda: 0, lambda: True))
     try:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             await given_back.wait()
     finally:
         task.cancel()

@@ -14,7 +14,7 @@ import redis.asyncio
 
 __all__ = ["RedisServer", "free_port"]
 
-PATIENCE = 10.0
+PATIENCE = 20.0  # s
 
 
 def free_port() -> int:

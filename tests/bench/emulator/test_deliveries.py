@@ -28,7 +28,7 @@ async def test_things_arrive_in_the_order_of_their_times_and_never_early() -> No
     for name, after in (("late", 0.03), ("early", 0.01), ("same", 0.02), ("as the same", 0.02), ("middle", 0.015)):
         waiting.at(began + after, arrive, name, began + after)
     assert len(waiting) == 5
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(20):
         await done.wait()
     waiting.close()
     assert arrived == ["early", "middle", "same", "as the same", "late"]
@@ -43,7 +43,7 @@ async def test_what_is_due_goes_at_once_unless_something_waits_before_it() -> No
     assert arrived == ["at once"]
     waiting.at(now + 0.01, arrived.append, "later")
     waiting.at(now + 0.02, done.set)
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(20):
         await done.wait()
     waiting.close()
     assert arrived == ["at once", "later"]
@@ -53,7 +53,7 @@ async def test_what_is_due_goes_at_once_unless_something_waits_before_it() -> No
 async def test_a_delivery_may_start_another() -> None:
     waiting, done = Deliveries(), asyncio.Event()
     waiting.at(time.monotonic() + 0.005, lambda: waiting.at(time.monotonic() + 0.005, done.set))
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(20):
         await done.wait()
     waiting.close()
 
@@ -66,7 +66,7 @@ async def test_nothing_arrives_after_the_end() -> None:
     other.at(time.monotonic() + 0.03, done.set)
     waiting.close()
     waiting.at(time.monotonic(), arrived.append, "never")
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(20):
         await done.wait()
     other.close()
     assert arrived == []

@@ -201,7 +201,7 @@ async def test_a_websocket_passes_both_ways_with_its_subprotocol_and_origin() ->
     async with proxied(even_profile("slow", Impairment(delay=Constant(0.005)))) as (_, network, _):
         url = network.console_url.replace("http", "ws") + "/echo?x=1"
         origin = network.console_url
-        async with asyncio.timeout(10), connect(url, subprotocols=["viser-v1"], origin=origin, proxy=None) as browser:  # type: ignore[list-item,arg-type]
+        async with asyncio.timeout(20), connect(url, subprotocols=["viser-v1"], origin=origin, proxy=None) as browser:  # type: ignore[list-item,arg-type]
             assert browser.subprotocol == "viser-v1"
             assert await browser.recv() == origin
             await browser.send(b"\x00\x01")

@@ -31,7 +31,7 @@ class Bridge:
         self._accepted.put_nowait((reader, writer))
 
     async def next(self) -> Streams:
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             return await self._accepted.get()
 
     def close(self) -> None:
@@ -79,13 +79,13 @@ def hello(role: LinkRole) -> bytes:
 
 
 async def heard(reader: asyncio.StreamReader, count: int) -> bytes:
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(20):
         return await reader.readexactly(count)
 
 
 async def closed(reader: asyncio.StreamReader) -> None:
     """Returns when nothing can come any more."""
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(20):
         with suppress(ConnectionResetError):
             assert await reader.read() == b""
 
@@ -130,7 +130,7 @@ async def test_the_end_of_one_side_reaches_the_other_behind_what_is_under_way() 
         last = frame(encode_message(Ping(id=1)))
         writer.write(last + b"\x00\x00")
         writer.close()
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             assert await reader.read() == last + b"\x00\x00", "half a frame is passed too"
 
 
@@ -159,7 +159,7 @@ async def test_a_sender_waits_while_too_much_is_under_way() -> None:
         for _ in range(12):
             writer.write(picture)
         flying = rig.relay.statistics["robot_media", "to_operator"]
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             assert await reader.readexactly(len(picture))
             assert flying.offered < 12, "the rest waits at the sender"
             assert await reader.readexactly(11 * len(picture))

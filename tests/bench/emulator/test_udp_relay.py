@@ -46,7 +46,7 @@ class End:
         self.transport.sendto(data, (LOOPBACK, port))
 
     async def hear(self) -> tuple[bytes, int]:
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             data, address = await self._ends.received.get()
         return data, address[1]
 

@@ -1,6 +1,6 @@
 from collections import Counter
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bench.soak.schedule import LAST_LIFE, LONGEST_CUT, counts_for, schedule
@@ -24,6 +24,7 @@ def test_the_same_seed_gives_the_same_plan_and_another_seed_another() -> None:
 
 
 @given(st.floats(1, 120), st.integers(0, 1000))
+@example(1.0, 369)  # a long cut late in its slot
 def test_actions_come_in_order_after_everybody_connected_and_before_the_end(minutes: float, seed: int) -> None:
     plan = schedule(minutes, seed)
     assert [action.at for action in plan] == sorted(action.at for action in plan)

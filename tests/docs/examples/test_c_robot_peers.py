@@ -31,8 +31,8 @@ from tests.robot_bridge.bridge_helpers import operator, raw_link
 
 async def test_a_ping_is_answered_with_its_number(robot: Robot) -> None:
     async with raw_link(robot, "media") as link:
-        link.send(Ping(id=-77), Ping(id=2**53))
-        while (await link.find(Pong)).id != 2**53:
+        link.send(Ping(id=-77), Ping(id=2**53 - 1))
+        while (await link.find(Pong)).id != 2**53 - 1:
             pass
 
 

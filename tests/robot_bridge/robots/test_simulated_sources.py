@@ -53,7 +53,7 @@ async def test_while_a_picture_is_drawn_the_loop_runs_and_no_other_is_begun() ->
         return b""
 
     events = Events()
-    async with asyncio.timeout(10), asyncio.TaskGroup() as group:
+    async with asyncio.timeout(20), asyncio.TaskGroup() as group:
         collecting = group.create_task(collect(CameraSource(CAMERA, draw, lambda: "state"), events, 3))
         await begun.wait()
         for _ in range(10):

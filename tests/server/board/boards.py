@@ -18,7 +18,7 @@ from server.stop_presses import Press
 __all__ = ["KEY", "FakeHost", "FakeLinks", "TestBoard", "eventually", "running_board", "tile"]
 
 KEY = "k" * 32
-PATIENCE = 10.0  # s; a busy machine, never waited for in full
+PATIENCE = 30.0  # s; a busy machine, never waited for in full
 
 
 def tile(name: str = "left", **more: object) -> Tile:

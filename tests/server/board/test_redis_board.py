@@ -95,7 +95,7 @@ async def test_audit_records_of_all_consoles_are_merged_by_time(server: RedisSer
         one.record("left", record(1, 10.0))
         two.record("far", record(1, 11.0))
         one.record("left", record(2, 12.0))
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             while len((found := await two.audit(10)).records) < 3:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
         assert [(each.robot, each.record.n, each.console) for each in found.records] == [

@@ -100,7 +100,7 @@ async def test_a_value_of_another_kind_at_a_key_of_ours_is_named(server: RedisSe
             assert (found.records, found.complete) == ([], False)
             assert found.detail.startswith("wrong_type")
             await client.delete("lockstep:audit")
-            async with asyncio.timeout(10):
+            async with asyncio.timeout(20):
                 while not (await one.audit(10)).records:  # noqa: ASYNC110
                     await asyncio.sleep(0.05)
 
@@ -214,7 +214,7 @@ async def test_a_user_who_may_do_no_more_than_the_guide_says_suffices(server: Re
         one.links.revoke("abc")
         await eventually(lambda: "abc" in two.links.elsewhere, "the revocation")
         assert (await two.stop(["left"], new_press(ANN, "http", "")))["left"].delivered
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             while not (await two.audit(10)).records:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
     for board in (one, two):

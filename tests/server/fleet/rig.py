@@ -57,7 +57,7 @@ class FleetRig:
     async def join(self, name: str, peer: TestPeer, headers: dict[str, str], query: str = "") -> None:
         """Connect it to that robot, with open data channels."""
         here = self.session(name)
-        async with httpx.AsyncClient(base_url=self.url, trust_env=False) as http:
+        async with httpx.AsyncClient(base_url=self.url, trust_env=False, timeout=PATIENCE) as http:
             rig = Rig(self.url, self.fleet.sessions[name].app, here.access, http)
             await peer.join(rig, headers, ("control", "session", "stop"), f"/robots/{name}/whep{query}")
 
@@ -100,7 +100,7 @@ async def running_fleet(ports: Mapping[str, int], **settings: Any) -> AsyncItera
         try:
             async with (
                 running(app, listener, http=guarded_by(wanted, app)),
-                httpx.AsyncClient(base_url=url, trust_env=False) as http,
+                httpx.AsyncClient(base_url=url, trust_env=False, timeout=PATIENCE) as http,
             ):
                 yield FleetRig(url, app.state.fleet, state, http)
         finally:

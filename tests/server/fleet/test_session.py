@@ -1,7 +1,10 @@
 """A robot's session that fails, and what is kept for the next one."""
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,9 +12,12 @@ from robot_bridge.protocol.console import Notice, SilenceStops
 from robot_bridge.protocol.messages import Command
 from robot_bridge.protocol.serial import event_after
 from server.audit import Actor
+from server.fleet import session
 from server.fleet.tiles import FAILED
 from server.media.plane import MediaPlane
 from server.recording.recorder import Recorder
+from server.robot_session import running_session
+from server.services import Services
 from server.stop_presses import MAX_PENDING, new_press
 from tests.server.fleet.rig import FleetRig, drive_once, running_fleet, running_fleet_rig
 from tests.server.rig import PATIENCE, eventually, reset_by_http, running_bridge, stop_words
@@ -22,6 +28,8 @@ class Faults:
 
     def __init__(self) -> None:
         self._told: dict[Recorder, asyncio.Event] = {}
+        self.may_begin = asyncio.Event()  # the next session
+        self.may_begin.set()
 
     async def until_told(self, recorder: Recorder) -> None:
         told = self._told[recorder] = asyncio.Event()
@@ -29,12 +37,14 @@ class Faults:
         raise RuntimeError("a fault of ours")
 
     async def end(self, rig: FleetRig, name: str) -> None:
-        """Returns while there is no session."""
+        """Returns while there is no session, and there is none until `back`."""
+        self.may_begin.clear()
         self._told[rig.session(name).recorder].set()
         await eventually(lambda: rig.fleet.sessions[name].services is None)
 
     async def back(self, rig: FleetRig, name: str) -> None:
         """Until the next session has reached its robot."""
+        self.may_begin.set()
         await eventually(lambda: rig.fleet.sessions[name].services is not None)
         await rig.all_reached()
 
@@ -46,7 +56,14 @@ def faults(monkeypatch: pytest.MonkeyPatch) -> Faults:
     async def run(recorder: Recorder) -> None:
         await made.until_told(recorder)
 
+    @asynccontextmanager
+    async def running(*arguments: Any) -> AsyncIterator[Services]:
+        await made.may_begin.wait()
+        async with running_session(*arguments) as services:
+            yield services
+
     monkeypatch.setattr(Recorder, "run", run)
+    monkeypatch.setattr(session, "running_session", running)
     return made
 
 
@@ -155,12 +172,12 @@ async def test_stops_without_end_at_a_robot_whose_session_has_failed_fill_no_dis
         port = gone.address[1]
     async with running_fleet({"left": port}, state_dir=tmp_path) as rig:
         await faults.end(rig, "left")
-        session = rig.fleet.sessions["left"]
+        left = rig.fleet.sessions["left"]
         presses = [new_press(Actor("Ann"), "http", "smoke") for _ in range(3 * MAX_PENDING)]
-        await asyncio.gather(*(session.stop(press) for press in presses))
+        await asyncio.gather(*(left.stop(press) for press in presses))
         await eventually(lambda: files() >= MAX_PENDING)
         last = new_press(Actor("Ann"), "http", "the last")
-        assert not (await session.stop(last)).outcome.delivered
+        assert not (await left.stop(last)).outcome.delivered
         await eventually(lambda: files() == MAX_PENDING)
 
 

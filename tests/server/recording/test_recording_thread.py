@@ -24,7 +24,7 @@ from server.recording.topics import SIGNATURE
 from server.recording.verify_file import verify_file
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, SECOND, START
 
-PATIENCE = 10.0
+PATIENCE = 20.0  # s
 
 
 class Made:

@@ -87,7 +87,7 @@ async def test_a_relay_that_hangs_up_fails_what_is_asked_and_all_that_follows() 
         handle = await session.attach(_ignore)
         with pytest.raises(RelayUnreachable):
             await session.message(handle, {"request": "join"})
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             await session.ended.wait()
         with pytest.raises(RelayUnreachable):
             await session.message(handle, {"request": "join"})

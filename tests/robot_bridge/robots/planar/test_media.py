@@ -35,7 +35,7 @@ async def capture(source: MediaSource, count: int) -> list[Media]:
 
     running = asyncio.ensure_future(source.run(Stamping(lambda: Stamp(next(counter), loop.time())), emit))
     try:
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             await enough.wait()
     finally:
         running.cancel()
