@@ -25,6 +25,7 @@ from robot_bridge.event_times import EventTimes
 from robot_bridge.last_known import LastKnown
 from robot_bridge.link_server import LinkPeer, LinkServer
 from robot_bridge.link_session import BadInput
+from robot_bridge.liveness import Liveness
 from robot_bridge.lockout_file import LockoutFile
 from robot_bridge.metronome import Metronome
 from robot_bridge.motion_limits import MotionLimits
@@ -50,8 +51,12 @@ _logger = logging.getLogger(__name__)
 class Bridge:
     """One run of a robot: one epoch. `start` returns when it listens; `close` leaves the robot at rest."""
 
-    def __init__(self, robot: Robot, settings: BridgeSettings, now: clock.Clock = clock.now) -> None:
+    def __init__(
+        self, robot: Robot, settings: BridgeSettings, now: clock.Clock = clock.now, *, liveness: Liveness | None = None
+    ) -> None:
         """`now`: what bounds motion is measured with; it counts suspended time.
+
+        `liveness`: ends the process when it hangs, which has to be the bridge's alone; None: nothing does.
 
         Raises:
             DescriptionError: the robot's description contradicts itself.
@@ -92,11 +97,13 @@ class Bridge:
             tls=None if settings.tls is None else settings.tls.bridge_context(),
         )
         self._watchdogs = Watchdogs(robot, watchdog_seconds(self.description, robot.tick_seconds), now)
-        self._held = ""  # what held up the ticks, until a command executes; "" while nothing has
+        self._liveness = liveness or Liveness()
+        self._rested_why = ""  # what brought the robot to rest by itself, until a command executes; "": nothing
         self._log: EventLog | None = None
         self._times = EventTimes()
         self._last_known = LastKnown(self.description)
         self._acting: frozenset[str] = frozenset()  # limits that slowed the robot in the last tick
+        self._blind: frozenset[str] = frozenset()  # those that did because the position was unknown
         self._acted: set[str] = set()  # and since the last feedback
         self._source_faults: list[str] = []  # "camera overview: ..."
         self._running: asyncio.Task[None] | None = None
@@ -149,6 +156,7 @@ class Bridge:
             self._stop_due = True
         self._issue()
         atexit.register(self._rest_at_exit)
+        self._liveness.start(self._keeper.note_end)
         self._running = asyncio.get_running_loop().create_task(self._run(), name="bridge")
 
     async def wait(self) -> None:
@@ -167,6 +175,7 @@ class Bridge:
         if self._closed:
             return
         self._closed = True
+        self._liveness.leaving()
         try:
             await self._links.close()
             if self._running is not None:
@@ -178,12 +187,15 @@ class Bridge:
                 if self._lockout is not None:
                     await asyncio.to_thread(self._lockout.close)
                 await asyncio.to_thread(self._watchdogs.close)
+                self._liveness.ticked()
                 self._robot.close()
+                self._liveness.ticked()
                 in_order = not self._failure
             finally:
                 await self._keeper.close(in_order=in_order)
                 if self._log is not None:
                     await asyncio.to_thread(self._log.close)
+                self._liveness.close()
 
     async def _end_run(self) -> None:
         """The ticks end with the rest values and the robot's own stop, however they end."""
@@ -252,7 +264,7 @@ class Bridge:
         now = self._now()
         outcome = self._core.command(command, now)
         if isinstance(outcome, Executed):
-            self._held = ""
+            self._rested_why = ""
             self._shaper.drive(outcome.values, now)
             self.counters.executed += 1
             self._record("executed", outcome.event, issue=command.issue, values=outcome.values)
@@ -363,7 +375,9 @@ class Bridge:
         try:
             while True:
                 self._tell_watchdogs()
-                if leaving.step(self._now()):
+                done = leaving.step(self._now())
+                self._liveness.ticked()
+                if done:
                     break
                 await asyncio.sleep(self._robot.tick_seconds)
         finally:  # also when this is cancelled once more
@@ -412,6 +426,7 @@ class Bridge:
             self.counters.skipped_ticks = metronome.skipped
             try:
                 self._tick(self._now())
+                self._liveness.ticked()
             except BaseException as error:  # an adapter may raise what would end the loop, or cancel the task
                 raise RobotFailed(named(error)) from error
 
@@ -429,6 +444,8 @@ class Bridge:
         self._robot.tick()
         if self._limits.acting != self._acting:
             self._note_limits(self._limits.acting)
+        if self._limits.blind != self._blind:
+            self._note_blind(self._limits.blind)
         if self._shaper.at_rest:
             self._at_rest.set()
             if self._stop_due:
@@ -460,8 +477,10 @@ class Bridge:
         self._core.need_neutral()
         self.counters.stalls += 1
         self.counters.watchdog += held.acted
-        self._held = f"came to rest: the bridge was held up for {held.seconds:.2f} s"
-        _logger.error("%s%s", self._held, "; a watchdog brought the robot to rest meanwhile" if held.acted else "")
+        self._rested_why = f"came to rest: the bridge was held up for {held.seconds:.2f} s"
+        _logger.error(
+            "%s%s", self._rested_why, "; a watchdog brought the robot to rest meanwhile" if held.acted else ""
+        )
         self._record("stall", self._core.current, seconds=held.seconds, watchdog=held.acted)
 
     def _issue(self) -> None:
@@ -471,10 +490,9 @@ class Bridge:
     def _issue_measured(self, measured: Measurement, taken: float) -> None:
         """`taken`: when, on the clock of capture times."""
         measured, unknown = self._last_known.settle(measured)
-        if self._source_faults or self._limits.blind or self._held:
-            blind = [f"no motion: the position is unknown ({name})" for name in sorted(self._limits.blind)]
-            held = [self._held] if self._held else []
-            measured = measured._replace(faults=[*measured.faults, *held, *self._source_faults, *blind])
+        if self._source_faults or self._rested_why:
+            rested = [self._rested_why] if self._rested_why else []
+            measured = measured._replace(faults=[*measured.faults, *rested, *self._source_faults])
         measured = measured._replace(
             at_rest=measured.at_rest and self._shaper.at_rest,
             faults=[fault[:MAX_FAULT] for fault in measured.faults[-MAX_FAULTS:]],
@@ -494,6 +512,13 @@ class Bridge:
         self._acted |= acting | self._acting
         self._acting = acting
         self._record("limit", self._core.current, acting=sorted(acting))
+
+    def _note_blind(self, blind: frozenset[str]) -> None:
+        """A deadman that is held until the position is known again must not make the robot start by itself."""
+        begun, self._blind = blind - self._blind, blind
+        if begun:
+            self._need_neutral()
+            self._rested_why = f"came to rest: the position is unknown ({', '.join(sorted(begun))})"
 
     # media
 

@@ -27,10 +27,12 @@ from robot_bridge.errors import (
     UnknownRobot,
 )
 from robot_bridge.link_tls import LinkTls
+from robot_bridge.liveness import LIMIT, Liveness
 from robot_bridge.protocol.errors import SecretError
 from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.robots.base import Robot
 from robot_bridge.robots.registry import create_robot, robot_names
+from robot_bridge.service_manager import ServiceManager
 from robot_bridge.settings import BridgeSettings
 
 __all__ = ["main", "robot_app", "run"]
@@ -169,7 +171,8 @@ async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings,
     # SIGHUP: its terminal was closed; SIGQUIT: Ctrl-\ there.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         loop.add_signal_handler(number, stopping.set)
-    async with Bridge(make(), settings) as bridge:
+    liveness = Liveness(LIMIT, ServiceManager(os.environ))
+    async with Bridge(make(), settings, liveness=liveness) as bridge:
         _announce(name, bridge, "tcp" if settings.tls is None else "tls", as_json)
         waits = {loop.create_task(stopping.wait()), loop.create_task(bridge.wait())}
         try:

@@ -31,10 +31,19 @@ from robot_bridge.protocol.messages import (
     Stop,
     encode_message,
 )
+from robot_bridge.read_budget import ReadBudget
 
 __all__ = ["LinkHandler", "LinkPeer", "LinkServer"]
 
 CLOSE_TIMEOUT = 1.0  # s for goodbyes to leave when the bridge closes
+READ_RATE = 500.0  # messages per second of a link that are read, on average; a watcher sends less than a tenth
+OPERATOR_READ_RATE = 5000.0  # of the operator link, on which a console passes on the stops of many people
+READ_BURST = 50.0  # at once: about a millisecond of the loop
+
+
+GOODBYES = frozenset(
+    ("handshake", "version", "role", "unauthorised", "taken", "full", "framing", "silent", "closing", "lost")
+)  # names that are counted; docs/robot-link.md, "Goodbyes"
 
 
 class LinkHandler(Protocol):
@@ -57,8 +66,10 @@ class LinkPeer(LinkTransport):
     """One admitted or applying link."""
 
     def __init__(self, server: "LinkServer", clock: Callable[[], float], secret: LinkSecret | None) -> None:
-        session = BridgeSession(clock(), self._admit, secret)
-        super().__init__(session, clock)
+        now = clock()
+        session = BridgeSession(now, self._admit, secret)
+        self._reads = ReadBudget(READ_RATE, READ_BURST, now)
+        super().__init__(session, clock, self._reads)
         self._bridge_session = session
         self._server = server
         self.name = ""  # what the client calls itself, "console"
@@ -66,7 +77,10 @@ class LinkPeer(LinkTransport):
 
     def _admit(self, hello: Hello) -> Hello | Goodbye:
         self.name = hello.name
-        return self._server.admit(self, hello)
+        answer = self._server.admit(self, hello)
+        if isinstance(answer, Hello) and hello.role == "operator":
+            self._reads.rate = OPERATOR_READ_RATE
+        return answer
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
@@ -268,7 +282,8 @@ class LinkServer:
 
     def ended(self, peer: LinkPeer) -> None:
         if peer.session.ended is not None:
-            self._counters.endings[peer.session.ended.error] += 1
+            error = peer.session.ended.error  # which the peer may have made up
+            self._counters.endings[error if error in GOODBYES else "other"] += 1
         self._forget_applicant(peer)
         self._known.discard(peer)
         self._events.discard(peer)

@@ -5,7 +5,8 @@ what `take_outgoing` returns and, once `ended` is set, close. An ended session s
 """
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import closing
 from enum import Enum
 from typing import Literal, NamedTuple
 
@@ -37,6 +38,7 @@ from robot_bridge.protocol.messages import (
     StopTaken,
     decode_message,
 )
+from robot_bridge.read_budget import ReadBudget
 
 __all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState", "kind_of"]
 
@@ -107,12 +109,30 @@ class LinkSession:
         """Bytes that a large message still needs; 0: none is on its way."""
         return self._reader.missing
 
-    def receive(self, data: bytes, now: float) -> list[LinkMessage | BadInput]:
-        """What these bytes bring, in order; heartbeats are answered here and not returned."""
+    @property
+    def waits(self) -> bool:
+        """Whether something that came was not read for want of budget: call `receive` again when there is some."""
+        return self.ended is None and self._reader.has_frame
+
+    def receive(self, data: bytes, now: float, budget: ReadBudget | None = None) -> list[LinkMessage | BadInput]:
+        """What these bytes bring, in order; heartbeats are answered here and not returned.
+
+        `budget`: what it does not allow to be read now waits; None: there is no bound.
+        """
         events: list[LinkMessage | BadInput] = []
         self._reader.feed(data)
-        frames = self._reader.frames()
-        while self.ended is None:
+        with closing(self._reader.frames()) as frames:
+            self._read(frames, events, now, budget)
+        return events
+
+    def _read(
+        self,
+        frames: Generator[bytes | bytearray],
+        events: list[LinkMessage | BadInput],
+        now: float,
+        budget: ReadBudget | None,
+    ) -> None:
+        while self.ended is None and (budget is None or budget.left):
             try:
                 payload = next(frames, None)
             except FramingError as error:
@@ -121,10 +141,11 @@ class LinkSession:
                 break
             if payload is None:
                 break
+            if budget is not None:
+                budget.spend(len(payload))
             event = self._receive_frame(payload, now)
             if event is not None:
                 events.append(event)
-        return events
 
     def _receive_frame(self, payload: bytes | bytearray, now: float) -> LinkMessage | BadInput | None:
         try:

@@ -12,6 +12,7 @@ from robot_bridge.link_session import BadInput, LinkSession, kind_of
 from robot_bridge.media_outbox import MediaOutbox, NewestOutbox
 from robot_bridge.protocol.framing import frame
 from robot_bridge.protocol.messages import LinkMessage, Media, encode_message
+from robot_bridge.read_budget import ReadBudget
 
 __all__ = ["TICK_INTERVAL", "LinkTransport"]
 
@@ -24,12 +25,18 @@ class LinkTransport(asyncio.Protocol):
     """Feeds the session, sends what it wants sent, and drops a peer that does not read.
 
     While the socket is full, messages wait in outboxes: one per kind, media per stream, newest wins. At most
-    `HIGH_WATER` bytes and one message are buffered besides.
+    `HIGH_WATER` bytes and one message are buffered besides. What comes faster than `budget` allows waits in the socket,
+    so that whoever sends it finds that full; nothing is lost.
     """
 
-    def __init__(self, session: LinkSession, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, session: LinkSession, clock: Callable[[], float] = time.monotonic, budget: ReadBudget | None = None
+    ) -> None:
+        """`budget`: None reads all that comes."""
         self.session = session
         self._clock = clock
+        self._budget = budget
+        self._reading_on: asyncio.TimerHandle | None = None  # None: reading is not paused
         self._transport: asyncio.Transport | None = None  # None before and after the connection
         self._control: NewestOutbox[str, bytes] = NewestOutbox()
         self._media: MediaOutbox[bytes] = MediaOutbox()
@@ -115,12 +122,27 @@ class LinkTransport(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         now = self._clock()
-        events = self.session.receive(data, now)
+        if self._budget is not None:
+            self._budget.refill(now)
+        events = self.session.receive(data, now, self._budget)
         if self.session.ended is None:
             self._send_outgoing()  # our hello goes before any answer to what came with theirs
         for event in events:
             self.received(event)
         self._flush_session(now)
+        if self._budget is not None and self.session.waits:
+            self._pause_reading(self._budget.wait())
+
+    def _pause_reading(self, seconds: float) -> None:
+        if self._transport is not None and self._reading_on is None:
+            self._transport.pause_reading()
+            self._reading_on = asyncio.get_running_loop().call_later(seconds, self._read_on)
+
+    def _read_on(self) -> None:
+        self._reading_on = None
+        self.data_received(b"")
+        if self._reading_on is None and self._transport is not None and not self._transport.is_closing():
+            self._transport.resume_reading()
 
     def pause_writing(self) -> None:
         self._full = True
@@ -137,6 +159,8 @@ class LinkTransport(asyncio.Protocol):
 
     def connection_lost(self, error: Exception | None) -> None:
         self._transport = None
+        if self._reading_on is not None:
+            self._reading_on.cancel()
         self.session.lose(str(error) if error is not None else "the connection was closed")
         self._report_lost()
 

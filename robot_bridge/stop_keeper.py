@@ -99,6 +99,15 @@ class StopKeeper:
         else:
             self._waiting.append(_Waiting(asker, answer, version))
 
+    def note_end(self, reason: str) -> None:
+        """Why this bridge does not end in order, for the next one. From any thread.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
+        if self._store is not None:
+            self._store.note_end(reason)
+
     async def close(self, *, in_order: bool) -> None:
         """Write what is not on the disk yet, and with it whether the bridge ended in order. Idempotent."""
         store, self._store = self._store, None

@@ -2,7 +2,8 @@
 
 `start_of` is the rule and does no I/O. `StopStore` does it, and blocks: call it from a thread.
 Two files: `stop.json` has the latch; `numbers.json` shows that the directory was used before, has a number that no stop
-is near yet, and is locked while a bridge runs. docs/robot-link.md, "On the robot's disk", says what follows from them.
+is near yet, and is locked while a bridge runs. A bridge that hung leaves a third, `ended.txt`, which says so.
+docs/robot-link.md, "On the robot's disk", says what follows from them.
 """
 
 import fcntl
@@ -21,6 +22,8 @@ __all__ = ["RESERVED", "Found", "Kept", "Start", "StopStore", "start_of", "wall_
 
 STOP_FILE = "stop.json"
 NUMBERS_FILE = "numbers.json"
+NOTE_FILE = "ended.txt"
+MAX_NOTE = 500  # characters
 MAX_BYTES = 1 << 20  # of a file that is read
 RESERVED = 1 << 30  # numbers that are reserved at each start
 LATEST_CLOCK = 2**52  # microseconds; a clock beyond it, in the year 2112, is wrong
@@ -51,6 +54,7 @@ class Found(NamedTuple):
     kept: Kept | None  # None: missing or unreadable
     trouble: str = ""  # why it is unreadable, in words; "" when it is missing
     reserved: int = 0  # 0: unknown
+    note: str = ""  # what the bridge before said of its end; "" when it said nothing
 
 
 class Start(NamedTuple):
@@ -83,7 +87,8 @@ def start_of(found: Found, wall_microseconds: int) -> Start:
         return Start(record, max(clock, record.number), "")
     # It may have given numbers that never reached the disk.
     numbers_after = max(clock, record.number, found.reserved)
-    return Start(record, numbers_after, "The robot bridge did not end in order: power cut, kill or crash")
+    reason = found.note or "The robot bridge did not end in order: power cut, kill, crash or hang"
+    return Start(record, numbers_after, reason)
 
 
 class StopStore:
@@ -112,7 +117,7 @@ class StopStore:
             self.close()
             raise StateDirUnusable(f"{self._directory}: {error.strerror or error}") from error
         kept, trouble = self._read()
-        return Found(used, kept, trouble, self._read_reserved())
+        return Found(used, kept, trouble, self._read_reserved(), self._read_note())
 
     def write(self, kept: Kept) -> None:
         """Replace the latch in one step; when this returns it has reached the disk.
@@ -130,7 +135,16 @@ class StopStore:
         finally:
             os.close(descriptor)
         os.replace(path.with_suffix(".new"), path)
+        (self._directory / NOTE_FILE).unlink(missing_ok=True)  # the latch says it now
         self._sync_directory()
+
+    def note_end(self, reason: str) -> None:
+        """Say to the next bridge why this one does not end in order. From any thread; `write` takes it back.
+
+        Raises:
+            OSError: it cannot be said.
+        """
+        (self._directory / NOTE_FILE).write_text(reason[:MAX_NOTE])
 
     def reserve(self, number: int) -> int:
         """The number that this was raised to: none above it may be given before the next call.
@@ -172,6 +186,13 @@ class StopStore:
             return max(0, min(_read_reserved.decode(data).up_to, MAX_NUMBER))
         except (OSError, msgspec.DecodeError, UnicodeDecodeError):
             return 0
+
+    def _read_note(self) -> str:
+        try:
+            with (self._directory / NOTE_FILE).open(errors="replace") as file:
+                return file.read(MAX_NOTE)
+        except OSError:
+            return ""
 
     def _sync_directory(self) -> None:
         """A new name is on the disk only when its directory is."""

@@ -1,10 +1,11 @@
 """Brings a robot to rest from a process of its own when the bridge is held up or dies.
 
-    python -m robot_bridge.watchdog_process package.module:function SECONDS
+    python -m robot_bridge.watchdog_process SECONDS package.module:function ARGUMENT...
 
-It hears of every tick through a pipe and calls the function when none comes for that long while the robot moves, again
-every so often, and when the pipe ends while the robot moves: then the bridge was killed. It needs nothing of the
-bridge's interpreter, so that it also works while native code keeps that from running anything.
+The function is called at once and returns what brings the robot to rest. The process hears of every tick through a pipe
+and calls that when none comes for so long while the robot moves, again every so often, and when the pipe ends while the
+robot moves: then the bridge was killed. It needs nothing of the bridge's interpreter, so that it also works while
+native code keeps that from running anything.
 """
 
 import logging
@@ -13,7 +14,7 @@ import select
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 
 from robot_bridge import clock
@@ -23,7 +24,7 @@ __all__ = ["WatchdogProcess", "watch"]
 
 MOVING, RESTING, LEAVING = b"m", b"r", b"q"
 READY, ACTED = b"+", b"!"
-START_SECONDS = 20.0  # for the function's module to be imported
+START_SECONDS = 20.0  # for the function's module to be imported and the function to be called
 CLOSE_SECONDS = 2.0
 SAYS_PER_LIMIT = 4  # ticks that are told, at least, in the time without any that counts
 TRIES = 3
@@ -34,10 +35,11 @@ _logger = logging.getLogger(__name__)
 class WatchdogProcess:
     """The bridge's side. `start` blocks until the process is ready."""
 
-    def __init__(self, limit: float, call: str) -> None:
-        """`call`: "package.module:function", called there without arguments."""
+    def __init__(self, limit: float, call: str, arguments: Sequence[str] = ()) -> None:
+        """`call`: "package.module:function", called there with these; returns what brings the robot to rest."""
         self._limit = limit
         self._call = call
+        self._arguments = arguments
         self._process: subprocess.Popen[bytes] | None = None
         self._moving = False
         self._said = float("-inf")
@@ -52,7 +54,7 @@ class WatchdogProcess:
         RobotUnavailable: the function cannot be had.
         """
         self._process = process = subprocess.Popen(
-            [sys.executable, "-m", __name__, self._call, str(self._limit)],
+            [sys.executable, "-m", __name__, str(self._limit), self._call, *self._arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # what ends the bridge from its terminal does not end the watchdog before it
@@ -149,11 +151,11 @@ def _act(act: Callable[[], None], said: int) -> None:
         _logger.error("the bridge is gone")
 
 
-def load(call: str) -> Callable[[], None]:
-    """The function that "package.module:function" names."""
+def load(call: str, arguments: Sequence[str]) -> Callable[[], None]:
+    """What the function that "package.module:function" names returns."""
     module, _, name = call.partition(":")
-    function: Callable[[], None] = getattr(import_module(module), name)
-    return function
+    function: Callable[..., Callable[[], None]] = getattr(import_module(module), name)
+    return function(*arguments)
 
 
 def main() -> None:
@@ -161,9 +163,12 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    act = load(sys.argv[1])
-    os.write(1, READY)
-    watch(0, 1, float(sys.argv[2]), act)
+    said = os.dup(1)
+    os.dup2(2, 1)  # what a robot's library prints goes where the log goes
+    limit, call, *arguments = sys.argv[1:]
+    act = load(call, arguments)
+    os.write(said, READY)
+    watch(0, said, float(limit), act)
 
 
 if __name__ == "__main__":

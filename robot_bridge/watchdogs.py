@@ -38,7 +38,7 @@ class Watchdogs:
         if robot.rests_from_thread:
             self._beside.append(WatchdogThread(limit, robot.rest_from_thread, now))
         if robot.rest_call:
-            self._beside.append(WatchdogProcess(limit, robot.rest_call))
+            self._beside.append(WatchdogProcess(limit, robot.rest_call, robot.rest_arguments))
 
     async def start(self) -> None:
         """Raises:

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import shutil
+import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -11,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 import robot_bridge
+from robot_bridge.liveness import EXIT_HUNG
 from server.backoff import Backoff
 
 __all__ = ["BridgeFailed", "BridgeProcess"]
@@ -161,4 +163,6 @@ def _address_in(line: bytes) -> str | None:
 
 
 def _meaning(code: int) -> str:
-    return f"signal {-code}" if code < 0 else f"exit code {code}"
+    if code == EXIT_HUNG:
+        return "it hung: no control tick"
+    return f"signal {-code}, {signal.strsignal(-code)}" if code < 0 else f"exit code {code}"

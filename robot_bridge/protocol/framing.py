@@ -1,6 +1,6 @@
 """Frames on the robot link: a 4-byte big-endian length, then that many bytes. No I/O."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 
 from robot_bridge.protocol.errors import FramingError
 
@@ -46,7 +46,7 @@ class FrameReader:
         self._filled += taken
         self._buffer += data[taken:]
 
-    def frames(self) -> Iterator[bytes | bytearray]:
+    def frames(self) -> Generator[bytes | bytearray]:
         """The complete frames so far.
 
         Raises:
@@ -81,6 +81,16 @@ class FrameReader:
         self._large, self._filled = bytearray(length), len(self._buffer) - start
         self._large[: self._filled] = memoryview(self._buffer)[start:]
         return len(self._buffer)
+
+    @property
+    def has_frame(self) -> bool:
+        """Whether `frames` would bring one, or an error."""
+        if self._large is not None:
+            return self._filled == len(self._large)
+        if len(self._buffer) < HEADER:
+            return False
+        length = int.from_bytes(self._buffer[:HEADER], "big")
+        return not 0 < length <= self.max_frame or len(self._buffer) - HEADER >= length
 
     def at_end(self) -> None:
         """Call at end of stream.

@@ -68,7 +68,8 @@ class Robot(ABC):
 
     tick_seconds: float = 0.004
     rests_from_thread: bool = False  # whether `rest_from_thread` may be called while another method hangs
-    rest_call: str = ""  # "package.module:function" that brings the robot to rest from another process; "": none
+    rest_call: str = ""  # "package.module:function" for a watchdog process, see `rest_from_thread`; "": none
+    rest_arguments: tuple[str, ...] = ()  # what that function is called with
 
     @abstractmethod
     def describe(self) -> RobotDescription:
@@ -106,9 +107,12 @@ class Robot(ABC):
         so often until one comes. It must not wait for anything that a hanging method may hold, and what such a method
         still writes when it goes on should not move the robot; the next tick applies rest values. Set
         `rests_from_thread` where it can do that. It needs the interpreter's lock: native code that blocks
-        without releasing that holds up this call too. For such code there is `rest_call`, a function without
-        arguments in a module that is imported by a process of its own; it is also called when the bridge is killed
-        while the robot moves, and has to reach the robot by a way of its own.
+        without releasing that holds up this call too.
+
+        For such code there is `rest_call`. A process of its own imports that module when the bridge starts, and calls
+        the function with `rest_arguments`. What it returns is the function, without arguments, that brings the robot to
+        rest by a way of its own; it is called as this method is, and also when the bridge is killed while the robot
+        moves.
         """
         raise NotImplementedError
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from robot_bridge.liveness import ALARM, LIMIT
+
 UNITS = sorted((Path(__file__).resolve().parents[2] / "deploy" / "systemd").glob("*.service"))
 
 
@@ -35,3 +37,10 @@ def test_the_unit_asks_for_the_robot_links_secret(unit: Path) -> None:
     lines = unit.read_text().splitlines()
     assert "LoadCredential=link_secret:/etc/lockstep/link_secret" in lines
     assert "Environment=LOCKSTEP_LINK_SECRET_FILE=%d/link_secret" in lines
+
+
+def test_the_bridge_is_started_again_when_it_hangs_and_ends_by_itself_before_systemd_ends_it() -> None:
+    lines = next(unit for unit in UNITS if unit.name == "lockstep-robot.service").read_text().splitlines()
+    assert {"Type=notify", "Restart=always"} <= set(lines)
+    watchdog = next(float(line.partition("=")[2]) for line in lines if line.startswith("WatchdogSec="))
+    assert LIMIT < watchdog < ALARM * LIMIT, "its own message comes first; systemd's SIGABRT says where it hung"

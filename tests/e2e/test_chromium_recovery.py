@@ -45,6 +45,51 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
         await _nothing_wrong(console)
 
 
+# Read by every Python that starts: the bridge's planar robot hangs once in a tick, where there is a file, for ever.
+HANGS_ONCE = """
+import sys
+if "robot_bridge" in sys.orig_argv:
+    import os, time
+    from robot_bridge import liveness
+    from robot_bridge.robots.planar.robot import PlanarRobot
+    liveness.LIMIT = 1.0
+    tick = PlanarRobot.tick
+    def hang(robot):
+        if os.path.exists(HANG):
+            os.unlink(HANG)
+            time.sleep(600)
+        tick(robot)
+    PlanarRobot.tick = hang
+"""
+
+
+async def test_a_bridge_that_hangs_is_started_again_stopped_and_the_page_says_that_it_hung(
+    tmp_path: Path, chromium: Browser
+) -> None:
+    hang = tmp_path / "hang"
+    (tmp_path / "sitecustomize.py").write_text(f"HANG = {str(hang)!r}\n{HANGS_ONCE}")
+    async with (
+        running_stack(tmp_path, settings={"PYTHONPATH": str(tmp_path)}) as stack,
+        open_console(chromium, stack.operator) as console,
+    ):
+        await console.until_live()
+        await console.arm()
+        await console.drive_forward()
+        epoch = (await console.stats())["epoch"]
+        hang.touch()
+        await console.until("!s.armed")
+        await console.press(RB, False)
+        await console.tilt(LEFT_Y, 0)
+        await console.until(f"s.connected && s.epoch !== {epoch!r}", 60)
+        await console.until("s.stop.stopped && s.stop.reason === 'The robot bridge hung: no control tick for 1 s'")
+        await console.page.get_by_text("The robot bridge hung").first.wait_for()
+        async with Console(stack.supervisor, video=False, audio=False) as supervisor:
+            await supervisor.reset()
+        await console.until("!s.stop.stopped && s.seat && s.seat.mine")
+        await console.arm()
+        await console.drive_forward()
+
+
 async def test_a_frozen_bridge_counts_as_a_dead_link_and_resumes_in_the_same_epoch(
     stack: Stack, chromium: Browser
 ) -> None:

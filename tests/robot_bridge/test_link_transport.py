@@ -17,6 +17,7 @@ from robot_bridge.protocol.messages import (
     decode_message,
     encode_message,
 )
+from robot_bridge.read_budget import ReadBudget
 
 HELLO = Hello(role="robot", epoch="e1")
 
@@ -30,6 +31,16 @@ class FakeTransport(asyncio.Transport):
         self.buffered = 0
         self.closed = False
         self.aborts = 0
+        self.reads = True
+
+    def is_closing(self) -> bool:
+        return self.closed
+
+    def pause_reading(self) -> None:
+        self.reads = False
+
+    def resume_reading(self) -> None:
+        self.reads = True
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
         self.reader.feed(bytes(data))
@@ -53,9 +64,9 @@ class FakeTransport(asyncio.Transport):
 class Endpoint(LinkTransport):
     """The bridge's side at a time the test sets."""
 
-    def __init__(self) -> None:
+    def __init__(self, budget: ReadBudget | None = None) -> None:
         self.now = 0.0
-        super().__init__(BridgeSession(0.0, lambda hello: HELLO), lambda: self.now)
+        super().__init__(BridgeSession(0.0, lambda hello: HELLO), lambda: self.now, budget)
         self.events: list[LinkMessage | BadInput] = []
         self.times_lost = 0
         self.tcp = FakeTransport()
@@ -168,3 +179,31 @@ def test_after_the_connection_is_gone_nothing_is_sent_and_nothing_raises() -> No
     end.resume_writing()
     assert end.tcp.written() == []
     assert end.session.ended == Goodbye(error="lost", detail="reset")
+
+
+async def test_what_comes_faster_than_the_budget_allows_is_read_later_in_order_and_nothing_is_lost() -> None:
+    end = Endpoint(ReadBudget(1000.0, 20.0, 0.0))
+    end.hear(Hello(role="operator"), *(Stop(by=str(number)) for number in range(100)))
+    read = [len(end.events)]
+    assert not end.tcp.reads, "the sender finds the socket full"
+    while not end.tcp.reads:
+        end.now += 0.002
+        await asyncio.sleep(0)  # until the loop reads on
+        if len(end.events) != read[-1]:
+            read.append(len(end.events))
+    assert read[0] == 20
+    assert max(after - before for before, after in zip(read, read[1:], strict=False)) <= 20
+    assert [event.by for event in end.events if isinstance(event, Stop)] == [str(number) for number in range(100)]
+    end.hear(Ping(id=1))
+    assert Pong(id=1) in end.tcp.written()
+
+
+async def test_a_connection_that_is_lost_while_it_waits_is_not_read_on() -> None:
+    end = Endpoint(ReadBudget(1000.0, 20.0, 0.0))
+    end.hear(Hello(role="operator"), *(Stop() for _ in range(100)))
+    count = len(end.events)
+    end.connection_lost(None)
+    end.now += 10.0
+    await asyncio.sleep(0.05)
+    assert len(end.events) == count
+    assert end.times_lost == 1

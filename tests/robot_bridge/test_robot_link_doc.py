@@ -9,7 +9,9 @@ import msgspec
 import pytest
 
 from robot_bridge.link_acceptor import RATE
+from robot_bridge.link_server import OPERATOR_READ_RATE, READ_BURST, READ_RATE
 from robot_bridge.link_session import FROM_CLIENT, FROM_ROBOT, HELLO_TIMEOUT, PING_INTERVAL, SILENCE, kind_of
+from robot_bridge.liveness import ALARM, EXIT_HUNG, LIMIT
 from robot_bridge.media_outbox import ORDERED_DEPTH
 from robot_bridge.protocol import description
 from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader, frame
@@ -127,6 +129,11 @@ def test_the_numbers_are_those_of_the_code() -> None:
     assert f"at most {BridgeSettings().max_strangers} connections (unless configured)" in TEXT
     assert f"({MAX_HELLO_FRAME} bytes)" in TEXT
     assert f"{RATE:g} connections a second" in TEXT
+    assert f"{READ_RATE:g} messages a second of a link ({OPERATOR_READ_RATE:g} of the operator link)" in TEXT
+    assert f"{READ_BURST:g} of them at once" in TEXT
+    assert f"no tick came for {LIMIT:g} s" in TEXT
+    assert f"after {ALARM * LIMIT:g} s" in TEXT
+    assert f"exit code {EXIT_HUNG}" in TEXT
     assert f"at least {MIN_SECRET_BYTES} bytes" in TEXT
     assert all(f"`{codec}`" in TEXT for codec in get_args(MediaCodec))
     assert first_column(section("goodbye, both ways")) == {"type", "error", "detail"}

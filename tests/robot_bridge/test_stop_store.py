@@ -7,7 +7,7 @@ import pytest
 
 from robot_bridge.errors import StateDirInUse, StateDirUnusable
 from robot_bridge.stop_latch import StopRecord
-from robot_bridge.stop_store import LATEST_CLOCK, Found, Kept, StopStore, start_of, wall_microseconds
+from robot_bridge.stop_store import LATEST_CLOCK, MAX_NOTE, Found, Kept, StopStore, start_of, wall_microseconds
 
 STOPPED = StopRecord(stopped=True, by="Ada", reason="smoke", number=41, press="ab", presses=[("ab", 41)])
 WALL = 1_000  # a clock that was set back: numbers on the disk are above it
@@ -143,3 +143,25 @@ def test_files_are_their_owners_alone_and_reach_the_disk_with_their_directory(
     kept_in(tmp_path / "robot", STOPPED)
     assert synced[-2:] == [str(tmp_path / "robot" / "stop.new"), str(tmp_path / "robot")]
     assert {path.stat().st_mode & 0o777 for path in (tmp_path / "robot").iterdir()} == {0o600}
+
+
+def test_what_a_bridge_said_of_its_end_is_the_reason_of_the_next_stop_and_of_no_later_one(tmp_path: Path) -> None:
+    store = StopStore(tmp_path)
+    store.open()
+    store.write(Kept(latch=STOPPED, ended=False))
+    store.note_end("The robot bridge hung" + "!" * 1000)
+    store.close()
+    start = start_of(found(tmp_path), WALL)
+    assert start.stop_reason.startswith("The robot bridge hung!")
+    assert len(start.stop_reason) == MAX_NOTE
+    kept_in(tmp_path, STOPPED, ended=False)
+    assert "did not end in order" in start_of(found(tmp_path), WALL).stop_reason
+
+
+def test_what_a_bridge_said_of_its_end_counts_for_nothing_when_it_ended_in_order_after_all(tmp_path: Path) -> None:
+    store = StopStore(tmp_path)
+    store.open()
+    store.note_end("it hung")
+    store.write(Kept(latch=STOPPED, ended=True))
+    store.close()
+    assert start_of(found(tmp_path), WALL).stop_reason == ""

@@ -245,7 +245,8 @@ from robot_bridge.settings import BridgeSettings
 
 class Robot(PlanarRobot):
     rests_from_thread = sys.argv[1] != "process"
-    rest_call = "" if sys.argv[1] == "thread" else "rest_the_robot:rest"
+    rest_call = "" if sys.argv[1] == "thread" else "rest_the_robot:prepare"
+    rest_arguments = ("at_rest",)
 
     def describe(self):
         return msgspec.structs.replace(super().describe(), watchdog=0.1)
@@ -263,7 +264,13 @@ async def main():
 asyncio.run(main())
 """
 
-REST = "import os\ndef rest():\n    open('rested', 'a').write('x')\n"
+REST = """
+def prepare(name="rested"):
+    def rest():
+        open(name, "a").write("x")
+    print("a library's banner")
+    return rest
+"""
 
 
 class _Address:
@@ -294,7 +301,7 @@ async def test_a_bridge_whose_interpreter_is_stuck_or_killed_is_outlived_by_its_
                         bridge.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
                     await driver.drive()
             while True:
-                if (tmp_path / "rested").exists():
+                if (tmp_path / "at_rest").exists():
                     break
                 await asyncio.sleep(0.01)
     finally:
@@ -319,7 +326,7 @@ async def test_a_watchdog_process_that_is_killed_takes_the_robot_to_rest(
     monkeypatch.setattr(WatchdogProcess, "start", noted)
 
     class Watched(RecordingRobot):
-        rest_call = "rest_the_robot:rest"
+        rest_call = "rest_the_robot:prepare"
 
     robot = Watched()
     async with Bridge(robot, BridgeSettings(port=0)) as bridge:

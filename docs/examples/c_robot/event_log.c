@@ -61,6 +61,12 @@ void log_plain(double time, uint32_t event, const char *kind) {
     if (begin(time, event, kind)) end();
 }
 
+void log_stall(double time, uint32_t event, double seconds) {
+    if (!begin(time, event, "stall")) return;
+    fprintf(file, ",\"seconds\":%.3f,\"watchdog\":true", seconds);
+    end();
+}
+
 void log_close(void) {
     if (file != NULL) fclose(file);
     file = NULL;

@@ -125,6 +125,11 @@ void events_need_neutral(events *of) {
 
 void events_come_to_rest(events *of) { of->driven = false; }
 
+void events_held_up(events *of) {
+    for (size_t i = 0; i < AXES; i++) of->values[i] = 0;
+    events_need_neutral(of);
+}
+
 static double towards(double from, double to, double step) {
     return fabs(to - from) <= step ? to : from + copysign(step, to - from);
 }

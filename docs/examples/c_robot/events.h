@@ -67,6 +67,8 @@ const char *events_reset(events *of, uint64_t number, double now, bool *released
 /* Whatever moves comes to rest and moves on only after a neutral command. */
 void events_need_neutral(events *of);
 void events_come_to_rest(events *of);
+/* No tick came for too long: the values are at rest now, without a ramp, and a neutral command is needed. */
+void events_held_up(events *of);
 /* One control tick: the values for the `dt` seconds that begin now. */
 void events_step(events *of, double now, double dt);
 bool events_at_rest(const events *of);

@@ -4,8 +4,8 @@
  *     ./c_robot --port 5600          then: lockstep serve --robot tcp://127.0.0.1:5600
  *
  * Written from docs/robot-link.md alone. main.c runs the control loop and answers; events.c decides what executes;
- * links.c has the connections, message.c and pack.c the bytes; robot.c is the robot. It knows no secret, so it listens
- * on loopback only. */
+ * links.c has the connections, message.c and pack.c the bytes; robot.c is the robot, and watchdog.c brings it to rest
+ * when this file hangs. It knows no secret, so it listens on loopback only. */
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -17,9 +17,11 @@
 #include "events.h"
 #include "links.h"
 #include "robot.h"
+#include "watchdog.h"
 
 static const double TICK = 0.005; /* s */
 static const int CATCH_UP = 3;    /* ticks made good after the process was held up */
+static const double LONG = 1.0;   /* s; a gap this long counts also while nothing moved */
 
 static events event_core;
 static robot carriage;
@@ -32,9 +34,14 @@ static void end_soon(int signal) {
     ending = 1;
 }
 
+/* It goes on while the machine is suspended, where there is such a clock: what was left of `hold` must not move it. */
 static double now(void) {
     struct timespec time;
+#ifdef CLOCK_BOOTTIME
+    clock_gettime(CLOCK_BOOTTIME, &time);
+#else
     clock_gettime(CLOCK_MONOTONIC, &time);
+#endif
     return (double)time.tv_sec + (double)time.tv_nsec / 1e9;
 }
 
@@ -155,8 +162,21 @@ static void publish_picture(void) {
     log_media(now(), event_core.current, "above", captured);
 }
 
+static void rest_at_once(void) { robot_rest(&carriage); }
+
+/* Nobody knows what the robot did while the loop was held up: it rests without a ramp, and whoever drives begins anew. */
+static void look_for_gap(double time) {
+    static double last = -1;
+    double gap = last < 0 ? 0 : time - last;
+    last = time;
+    if (gap <= (events_at_rest(&event_core) ? LONG : WATCHDOG)) return;
+    events_held_up(&event_core);
+    log_stall(time, event_core.current, gap);
+}
+
 static void tick(void) {
     static bool rested = true;
+    look_for_gap(now());
     events_step(&event_core, now(), TICK);
     robot_tick(&carriage, event_core.values, TICK);
     if (events_at_rest(&event_core) != rested) {
@@ -224,6 +244,7 @@ static void run(void) {
         double time = now();
         if (time - next_tick > CATCH_UP * TICK) next_tick = time - CATCH_UP * TICK;
         for (; next_tick <= time; next_tick += TICK) tick();
+        watchdog_ticked();
         if (next_picture <= time) {
             next_picture = fmax(next_picture + 1 / FRAME_RATE, time);
             publish_picture();
@@ -255,8 +276,10 @@ int main(int count, char **words) {
     issue();
     printf("{\"robot\": \"tcp://127.0.0.1:%d\"}\n", port);
     fflush(stdout);
+    watchdog_start(rest_at_once);
     run();
     links_close(now);
+    watchdog_end();
     log_close();
     release(&feedback);
     return 0;

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "watchdog.h"
+
 const double HOLD = 0.3, MAX_EVENT_AGE = 2.0, FRAME_RATE = 20.0;
 const double FASTEST[AXES] = {0.4, 0.3}, SLEW[AXES] = {1.6, 1.2}, BRAKE[AXES] = {4.0, 3.0};
 
@@ -13,14 +15,17 @@ static const char *const AXIS_NAMES[AXES] = {"carriage.vx", "carriage.vy"};
 static const char *const AXIS_LABELS[AXES] = {"Forward", "Left"};
 static const char *const JOINT_NAMES[AXES] = {"carriage.x", "carriage.y"};
 
+void robot_rest(robot *of) { of->resting = 1; }
+
 void robot_tick(robot *of, const double *values, double dt) {
     for (int i = 0; i < AXES; i++) {
-        double before = of->position[i], edge = HALF_TABLE[i];
-        of->position[i] = fmin(fmax(before + values[i] * dt, -edge), edge);
+        double before = of->position[i], edge = HALF_TABLE[i], value = of->resting ? 0 : values[i];
+        of->position[i] = fmin(fmax(before + value * dt, -edge), edge);
         of->velocity[i] = (of->position[i] - before) / dt;
         double pressed = fmax(fabs(of->position[i]) - (edge - SOFT), 0);
         of->force[i] = -copysign(SPRING * pressed, of->position[i]);
     }
+    of->resting = 0;
 }
 
 bool robot_at_rest(const robot *of) { return fabs(of->velocity[0]) < 1e-3 && fabs(of->velocity[1]) < 1e-3; }
@@ -132,7 +137,7 @@ static void pack_bodies(buffer *to) {
 }
 
 void pack_description(buffer *to) {
-    pack_map(to, 11);
+    pack_map(to, 12);
     text_field(to, "name", "table-in-c");
     text_field(to, "label", "Carriage on a table (in C)");
     pack_axes(to);
@@ -157,6 +162,7 @@ void pack_description(buffer *to) {
     number_field(to, "full_scale_force", 12);
     number_field(to, "full_scale_torque", 1);
     number_field(to, "hold", HOLD);
+    number_field(to, "watchdog", WATCHDOG);
     number_field(to, "max_event_age", MAX_EVENT_AGE);
     number_field(to, "max_event_rate", 25);
 }

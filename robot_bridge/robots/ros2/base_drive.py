@@ -9,6 +9,7 @@ from robot_bridge.robots.ros2.drive import Drive, Sensed
 from robot_bridge.robots.ros2.newest import Newest
 from robot_bridge.robots.ros2.ros_side import RosSide, header_ns
 from robot_bridge.robots.ros2.settings import Base
+from robot_bridge.robots.ros2.twists import TwistMaker
 
 __all__ = ["BaseDrive", "BaseState", "base_state"]
 
@@ -44,10 +45,8 @@ class BaseDrive(Drive):
     def __init__(self, ros: RosSide, settings: Base, tick_seconds: float) -> None:
         command = settings.command
         self._has = (True, settings.left is not None, settings.turn is not None)
-        kind = ros.message("geometry_msgs", command.message)
-        super().__init__(ros, kind, command.topic, command.rate, sum(self._has), tick_seconds)
-        self._stamped = command.message == "TwistStamped"
-        self._frame = command.frame
+        self._twists = TwistMaker(ros, command)
+        super().__init__(ros, self._twists.kind, command.topic, command.rate, sum(self._has), tick_seconds)
         self._still = settings.odometry.still
         self._odometry: Newest[BaseState] = Newest(settings.odometry.topic, settings.odometry.timeout)
         ros.subscribe(ros.message("nav_msgs", "Odometry"), settings.odometry.topic, self._take)
@@ -59,15 +58,7 @@ class BaseDrive(Drive):
         if said is Said.NOTHING:
             return None
         given = iter(values)
-        vx, vy, wz = (next(given) if has else 0.0 for has in self._has)
-        message = self._kind()
-        twist = message
-        if self._stamped:
-            message.header.stamp = self._ros.now_message()
-            message.header.frame_id = self._frame
-            twist = message.twist
-        twist.linear.x, twist.linear.y, twist.angular.z = vx, vy, wz
-        return message
+        return self._twists.make(*(next(given) if has else 0.0 for has in self._has))
 
     def sense(self, now: float) -> Sensed:
         arrived = self._odometry.fresh(now)

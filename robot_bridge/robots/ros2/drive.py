@@ -37,6 +37,11 @@ class Drive(ABC):
         self._heard = False  # whether somebody listens
         self._looked = float("-inf")  # s, when that was looked up
 
+    @property
+    def full_topic(self) -> str:
+        """That commands go to, with namespace and node resolved."""
+        return str(self._publisher.topic_name)
+
     def step(self, values: Sequence[float], dt: float) -> None:
         """One tick with these values."""
         now = clock.now()

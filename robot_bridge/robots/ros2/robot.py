@@ -12,6 +12,7 @@ from robot_bridge.robots.ros2.drive import Drive
 from robot_bridge.robots.ros2.ros_side import RosSide
 from robot_bridge.robots.ros2.sensors import LockoutTopic, RangeSensor, WrenchTopic
 from robot_bridge.robots.ros2.settings import Ros2Settings
+from robot_bridge.robots.ros2.watchdog_rest import REST_CALL, rest_arguments
 
 __all__ = ["Ros2Robot"]
 
@@ -31,7 +32,10 @@ class Ros2Robot(Robot):
         try:
             self._drives: list[Drive] = []
             if settings.base is not None:
-                self._drives.append(BaseDrive(self._ros, settings.base, self.tick_seconds))
+                base = BaseDrive(self._ros, settings.base, self.tick_seconds)
+                self._drives.append(base)
+                self.rest_call = REST_CALL
+                self.rest_arguments = rest_arguments(settings, settings.base, base.full_topic)
             if settings.arm is not None:
                 self._drives.append(ArmDrive(self._ros, settings.arm, self.tick_seconds))
             self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges)

@@ -99,14 +99,18 @@ class RosSide:
         """builtin_interfaces/Duration."""
         return self._duration.Duration(seconds=seconds).to_msg()
 
+    def flush(self) -> None:
+        """Wait shortly until those who listen have what was published."""
+        for publisher in self._publishers:
+            with suppress(Exception):
+                publisher.wait_for_all_acked(self._duration.Duration(seconds=FLUSH_SECONDS))
+
     def close(self) -> None:
         """Blocks shortly. May be called again."""
         if self._closed:
             return
         self._closed = True
-        for publisher in self._publishers:
-            with suppress(Exception):
-                publisher.wait_for_all_acked(self._duration.Duration(seconds=FLUSH_SECONDS))
+        self.flush()
         self._executor.shutdown(timeout_sec=JOIN_SECONDS)
         if self._thread.is_alive():
             self._thread.join(JOIN_SECONDS)

@@ -86,3 +86,32 @@ def test_any_bytes_give_frames_or_a_framing_error(data: bytes) -> None:
     reader.feed(data)
     with contextlib.suppress(FramingError):
         assert all(0 < len(payload) <= 20 for payload in reader.frames())
+
+
+@given(st.lists(st.binary(min_size=1, max_size=50), max_size=4), st.integers(1, 64))
+def test_it_says_whether_a_frame_is_there(payloads: list[bytes], size: int) -> None:
+    data = b"".join(map(frame, payloads))
+    reader = FrameReader(50)
+    for start in range(0, len(data), size):
+        reader.feed(data[start : start + size])
+        while reader.has_frame:
+            with contextlib.closing(reader.frames()) as frames:
+                assert next(frames) == payloads.pop(0)
+        assert list(reader.frames()) == []
+    assert payloads == []
+
+
+def test_a_large_frame_is_there_when_it_is_whole_and_a_bad_length_at_once() -> None:
+    reader = FrameReader(LARGE_FRAME)
+    data = frame(bytes(LARGE_FRAME))
+    for part in (data[:10], data[10:-1]):
+        reader.feed(part)
+        assert list(reader.frames()) == []
+        assert not reader.has_frame
+    reader.feed(data[-1:])
+    assert reader.has_frame
+    assert list(reader.frames()) == [bytes(LARGE_FRAME)]
+    reader.feed(b"\xff\xff\xff\xff")
+    assert reader.has_frame
+    with pytest.raises(FramingError):
+        next(reader.frames())

@@ -1,0 +1,37 @@
+"""How much of what a peer sends is read before others have their turn. No I/O, no clock: the caller hands in `now`."""
+
+__all__ = ["ReadBudget"]
+
+MESSAGE_BYTES = 1024  # a message of so many bytes counts as two, and so on: reading it costs as much
+
+
+class ReadBudget:
+    """A token bucket of messages: `left` before each, `spend` after it, and `wait` when none is left.
+
+    Attributes:
+        rate: messages per second; may be changed
+    """
+
+    def __init__(self, rate: float, burst: float, now: float) -> None:
+        """`rate`: messages per second; `burst`: that may come at once."""
+        self.rate = rate
+        self._burst = burst
+        self._tokens = burst
+        self._filled = now
+
+    def refill(self, now: float) -> None:
+        self._tokens = min(self._burst, self._tokens + max(0.0, now - self._filled) * self.rate)
+        self._filled = now
+
+    @property
+    def left(self) -> bool:
+        """Whether another message may be read."""
+        return self._tokens > 0
+
+    def spend(self, size: int) -> None:
+        """A message of so many bytes was read."""
+        self._tokens -= 1 + size / MESSAGE_BYTES
+
+    def wait(self) -> float:
+        """s until some messages may be read at once again: a tenth of the burst."""
+        return max(0.0, (self._burst / 10 - self._tokens) / self.rate)

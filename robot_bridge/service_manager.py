@@ -1,0 +1,73 @@
+"""Tells the service manager that started this process how it goes: sd_notify(3), a datagram for each state."""
+
+import logging
+import os
+import socket
+from collections.abc import Mapping
+from contextlib import suppress
+
+__all__ = ["ServiceManager"]
+
+_logger = logging.getLogger(__name__)
+
+
+class ServiceManager:
+    """Says nothing where nobody listens.
+
+    Attributes:
+        watchdog_seconds: it restarts a process that is not `alive` for that long; None: it does not look
+    """
+
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        """`environment`: NOTIFY_SOCKET, and of sd_watchdog_enabled(3) WATCHDOG_USEC and WATCHDOG_PID."""
+        self._address = _address(environment.get("NOTIFY_SOCKET", ""))
+        self._socket: socket.socket | None = None
+        self._failed = False
+        self.watchdog_seconds = _watchdog_seconds(environment) if self._address else None
+
+    def ready(self) -> None:
+        self._say(b"READY=1")
+
+    def alive(self) -> None:
+        """More often than every `watchdog_seconds`."""
+        if self.watchdog_seconds is not None:
+            self._say(b"WATCHDOG=1")
+
+    def stopping(self) -> None:
+        self._say(b"STOPPING=1")
+
+    def close(self) -> None:
+        """May be called again."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _say(self, state: bytes) -> None:
+        """Never blocks: what the manager does not take now is lost, as it is with everybody who does not listen."""
+        if not self._address:
+            return
+        try:
+            if self._socket is None:
+                self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
+                self._socket.setblocking(False)
+            self._socket.sendto(state, self._address)
+        except OSError as error:
+            if not self._failed:
+                self._failed = True
+                _logger.error("the service manager at %s cannot be told: %s", os.fsdecode(self._address), error)
+
+
+def _address(name: str) -> bytes:
+    """A path, or after "@" an abstract name; b"" for anything else."""
+    if name.startswith("@"):
+        return b"\0" + os.fsencode(name[1:])
+    return os.fsencode(name) if name.startswith("/") else b""
+
+
+def _watchdog_seconds(environment: Mapping[str, str]) -> float | None:
+    if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
+        return None  # meant for whoever started this process
+    with suppress(ValueError):
+        microseconds = int(environment.get("WATCHDOG_USEC", ""))
+        return microseconds / 1e6 if microseconds > 0 else None
+    return None
