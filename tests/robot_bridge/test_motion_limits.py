@@ -93,6 +93,26 @@ def test_an_unknown_position_means_no_motion() -> None:
     assert lift.limits.blind == {"height.range"}
 
 
+@settings(max_examples=60, deadline=None)
+@given(spells=st.lists(st.tuples(st.booleans(), share, st.integers(1, 40)), min_size=1, max_size=12))
+def test_while_a_position_is_unknown_nothing_speeds_up_and_who_wants_to_move_finds_the_limit_blind(
+    spells: list[tuple[bool, float, int]],
+) -> None:
+    lift = ExactLift(0.5)
+    for known, coarse, ticks in spells:
+        lift.known = known
+        for _ in range(ticks):
+            before = abs(lift.values[0])
+            lift.drive([coarse, 0.0], 1)
+            if known:
+                assert not lift.limits.blind
+            else:
+                assert abs(lift.values[0]) <= before
+                assert lift.limits.blind or lift.values[0] == 0.0
+                if before == 0.0:
+                    assert bool(lift.limits.blind) == (coarse != 0.0)
+
+
 def test_a_position_that_gets_lost_while_moving_brings_the_axes_to_rest_at_their_brake() -> None:
     lift = ExactLift(0.5)
     lift.drive([1.0, 0.0], 100)
