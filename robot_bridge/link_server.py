@@ -15,6 +15,7 @@ from robot_bridge.errors import ListenError
 from robot_bridge.link_acceptor import LinkAcceptor, listening_socket
 from robot_bridge.link_session import BadInput, BridgeSession
 from robot_bridge.link_transport import TICK_INTERVAL, LinkTransport
+from robot_bridge.message_rate import MessageRate
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.framing import frame
 from robot_bridge.protocol.link_secret import LinkSecret
@@ -31,7 +32,6 @@ from robot_bridge.protocol.messages import (
     Stop,
     encode_message,
 )
-from robot_bridge.read_budget import ReadBudget
 
 __all__ = ["LinkHandler", "LinkPeer", "LinkServer"]
 
@@ -68,7 +68,7 @@ class LinkPeer(LinkTransport):
     def __init__(self, server: "LinkServer", clock: Callable[[], float], secret: LinkSecret | None) -> None:
         now = clock()
         session = BridgeSession(now, self._admit, secret)
-        self._reads = ReadBudget(READ_RATE, READ_BURST, now)
+        self._reads = MessageRate(READ_RATE, READ_BURST, now)
         super().__init__(session, clock, self._reads)
         self._bridge_session = session
         self._server = server

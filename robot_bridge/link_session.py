@@ -15,6 +15,7 @@ import msgspec
 from robot_bridge.check_description import check_description
 from robot_bridge.errors import DescriptionError
 from robot_bridge.feedback_fit import misfit
+from robot_bridge.message_rate import MessageRate
 from robot_bridge.protocol.errors import FramingError, MessageError
 from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader
 from robot_bridge.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
@@ -38,7 +39,6 @@ from robot_bridge.protocol.messages import (
     StopTaken,
     decode_message,
 )
-from robot_bridge.read_budget import ReadBudget
 
 __all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState", "kind_of"]
 
@@ -111,18 +111,18 @@ class LinkSession:
 
     @property
     def waits(self) -> bool:
-        """Whether something that came was not read for want of budget: call `receive` again when there is some."""
+        """Whether something that came was not read for want of `rate`: call `receive` again when there is some."""
         return self.ended is None and self._reader.has_frame
 
-    def receive(self, data: bytes, now: float, budget: ReadBudget | None = None) -> list[LinkMessage | BadInput]:
+    def receive(self, data: bytes, now: float, rate: MessageRate | None = None) -> list[LinkMessage | BadInput]:
         """What these bytes bring, in order; heartbeats are answered here and not returned.
 
-        `budget`: what it does not allow to be read now waits; None: there is no bound.
+        `rate`: what it does not allow to be read now waits; None: there is no bound.
         """
         events: list[LinkMessage | BadInput] = []
         self._reader.feed(data)
         with closing(self._reader.frames()) as frames:
-            self._read(frames, events, now, budget)
+            self._read(frames, events, now, rate)
         return events
 
     def _read(
@@ -130,9 +130,9 @@ class LinkSession:
         frames: Generator[bytes | bytearray],
         events: list[LinkMessage | BadInput],
         now: float,
-        budget: ReadBudget | None,
+        rate: MessageRate | None,
     ) -> None:
-        while self.ended is None and (budget is None or budget.left):
+        while self.ended is None and (rate is None or rate.left):
             try:
                 payload = next(frames, None)
             except FramingError as error:
@@ -141,8 +141,8 @@ class LinkSession:
                 break
             if payload is None:
                 break
-            if budget is not None:
-                budget.spend(len(payload))
+            if rate is not None:
+                rate.spend(len(payload))
             event = self._receive_frame(payload, now)
             if event is not None:
                 events.append(event)

@@ -10,9 +10,9 @@ from typing import cast
 
 from robot_bridge.link_session import BadInput, LinkSession, kind_of
 from robot_bridge.media_outbox import MediaOutbox, NewestOutbox
+from robot_bridge.message_rate import MessageRate
 from robot_bridge.protocol.framing import frame
 from robot_bridge.protocol.messages import LinkMessage, Media, encode_message
-from robot_bridge.read_budget import ReadBudget
 
 __all__ = ["TICK_INTERVAL", "LinkTransport"]
 
@@ -25,17 +25,17 @@ class LinkTransport(asyncio.Protocol):
     """Feeds the session, sends what it wants sent, and drops a peer that does not read.
 
     While the socket is full, messages wait in outboxes: one per kind, media per stream, newest wins. At most
-    `HIGH_WATER` bytes and one message are buffered besides. What comes faster than `budget` allows waits in the socket,
+    `HIGH_WATER` bytes and one message are buffered besides. What comes faster than `rate` allows waits in the socket,
     so that whoever sends it finds that full; nothing is lost.
     """
 
     def __init__(
-        self, session: LinkSession, clock: Callable[[], float] = time.monotonic, budget: ReadBudget | None = None
+        self, session: LinkSession, clock: Callable[[], float] = time.monotonic, rate: MessageRate | None = None
     ) -> None:
-        """`budget`: None reads all that comes."""
+        """`rate`: None reads all that comes."""
         self.session = session
         self._clock = clock
-        self._budget = budget
+        self._message_rate = rate
         self._reading_on: asyncio.TimerHandle | None = None  # None: reading is not paused
         self._transport: asyncio.Transport | None = None  # None before and after the connection
         self._control: NewestOutbox[str, bytes] = NewestOutbox()
@@ -122,16 +122,16 @@ class LinkTransport(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         now = self._clock()
-        if self._budget is not None:
-            self._budget.refill(now)
-        events = self.session.receive(data, now, self._budget)
+        if self._message_rate is not None:
+            self._message_rate.refill(now)
+        events = self.session.receive(data, now, self._message_rate)
         if self.session.ended is None:
             self._send_outgoing()  # our hello goes before any answer to what came with theirs
         for event in events:
             self.received(event)
         self._flush_session(now)
-        if self._budget is not None and self.session.waits:
-            self._pause_reading(self._budget.wait())
+        if self._message_rate is not None and self.session.waits:
+            self._pause_reading(self._message_rate.wait())
 
     def _pause_reading(self, seconds: float) -> None:
         if self._transport is not None and self._reading_on is None:

@@ -4,6 +4,7 @@ import asyncio
 
 from robot_bridge.link_session import BadInput, BridgeSession
 from robot_bridge.link_transport import LinkTransport
+from robot_bridge.message_rate import MessageRate
 from robot_bridge.protocol.framing import FrameReader, frame
 from robot_bridge.protocol.messages import (
     Feedback,
@@ -17,7 +18,6 @@ from robot_bridge.protocol.messages import (
     decode_message,
     encode_message,
 )
-from robot_bridge.read_budget import ReadBudget
 
 HELLO = Hello(role="robot", epoch="e1")
 
@@ -64,7 +64,7 @@ class FakeTransport(asyncio.Transport):
 class Endpoint(LinkTransport):
     """The bridge's side at a time the test sets."""
 
-    def __init__(self, budget: ReadBudget | None = None) -> None:
+    def __init__(self, budget: MessageRate | None = None) -> None:
         self.now = 0.0
         super().__init__(BridgeSession(0.0, lambda hello: HELLO), lambda: self.now, budget)
         self.events: list[LinkMessage | BadInput] = []
@@ -182,7 +182,7 @@ def test_after_the_connection_is_gone_nothing_is_sent_and_nothing_raises() -> No
 
 
 async def test_what_comes_faster_than_the_budget_allows_is_read_later_in_order_and_nothing_is_lost() -> None:
-    end = Endpoint(ReadBudget(1000.0, 20.0, 0.0))
+    end = Endpoint(MessageRate(1000.0, 20.0, 0.0))
     end.hear(Hello(role="operator"), *(Stop(by=str(number)) for number in range(100)))
     read = [len(end.events)]
     paused = end.tcp.reads is False
@@ -200,7 +200,7 @@ async def test_what_comes_faster_than_the_budget_allows_is_read_later_in_order_a
 
 
 async def test_a_connection_that_is_lost_while_it_waits_is_not_read_on() -> None:
-    end = Endpoint(ReadBudget(1000.0, 20.0, 0.0))
+    end = Endpoint(MessageRate(1000.0, 20.0, 0.0))
     end.hear(Hello(role="operator"), *(Stop() for _ in range(100)))
     count = len(end.events)
     end.connection_lost(None)

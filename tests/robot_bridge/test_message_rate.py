@@ -1,10 +1,10 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_bridge.read_budget import MESSAGE_BYTES, ReadBudget
+from robot_bridge.message_rate import MESSAGE_BYTES, MessageRate
 
 
-def read(budget: ReadBudget, size: int = 0) -> int:
+def read(budget: MessageRate, size: int = 0) -> int:
     """How many messages of so many bytes may be read now."""
     count = 0
     while budget.left:
@@ -14,7 +14,7 @@ def read(budget: ReadBudget, size: int = 0) -> int:
 
 
 def test_a_burst_is_read_at_once_and_then_so_many_a_second() -> None:
-    budget = ReadBudget(100.0, 10.0, 0.0)
+    budget = MessageRate(100.0, 10.0, 0.0)
     assert read(budget) == 10
     assert read(budget) == 0
     budget.refill(0.05)
@@ -24,9 +24,9 @@ def test_a_burst_is_read_at_once_and_then_so_many_a_second() -> None:
 
 
 def test_large_messages_count_as_many() -> None:
-    budget = ReadBudget(100.0, 10.0, 0.0)
+    budget = MessageRate(100.0, 10.0, 0.0)
     assert read(budget, 4 * MESSAGE_BYTES) == 2
-    budget = ReadBudget(100.0, 10.0, 0.0)
+    budget = MessageRate(100.0, 10.0, 0.0)
     assert read(budget, 1 << 20) == 1
     budget.refill(10.0)
     assert not budget.left, "it takes as long as a thousand small ones"
@@ -35,7 +35,7 @@ def test_large_messages_count_as_many() -> None:
 
 
 def test_what_it_says_to_wait_is_enough_for_some_messages_at_once() -> None:
-    budget = ReadBudget(100.0, 50.0, 0.0)
+    budget = MessageRate(100.0, 50.0, 0.0)
     assert budget.wait() == 0.0
     read(budget)
     budget.refill(budget.wait())
@@ -43,7 +43,7 @@ def test_what_it_says_to_wait_is_enough_for_some_messages_at_once() -> None:
 
 
 def test_a_clock_that_goes_back_takes_nothing_away() -> None:
-    budget = ReadBudget(100.0, 10.0, 5.0)
+    budget = MessageRate(100.0, 10.0, 5.0)
     budget.refill(0.0)
     assert read(budget) == 10
 
@@ -51,7 +51,7 @@ def test_a_clock_that_goes_back_takes_nothing_away() -> None:
 @given(st.lists(st.tuples(st.floats(0, 0.1), st.integers(0, 5000)), max_size=50))
 def test_over_any_time_no_more_is_read_than_rate_and_burst_allow(steps: list[tuple[float, int]]) -> None:
     now, spent, largest = 0.0, 0.0, 0.0
-    budget = ReadBudget(100.0, 10.0, 0.0)
+    budget = MessageRate(100.0, 10.0, 0.0)
     for passed, size in steps:
         now += passed
         budget.refill(now)

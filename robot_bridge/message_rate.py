@@ -1,11 +1,11 @@
 """How much of what a peer sends is read before others have their turn. No I/O, no clock: the caller hands in `now`."""
 
-__all__ = ["ReadBudget"]
+__all__ = ["MessageRate"]
 
 MESSAGE_BYTES = 1024  # a message of so many bytes counts as two, and so on: reading it costs as much
 
 
-class ReadBudget:
+class MessageRate:
     """A token bucket of messages: `left` before each, `spend` after it, and `wait` when none is left.
 
     Attributes:
