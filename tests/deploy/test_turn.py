@@ -4,7 +4,9 @@ import asyncio
 import base64
 import hashlib
 import hmac
+import ipaddress
 import os
+import subprocess
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -147,6 +149,41 @@ async def test_for_a_console_that_uses_the_relay_itself_public_addresses_are_rea
             "100.64.0.1",
         ):
             assert await _permission(transport, address) == FORBIDDEN, address
+
+
+def _denied(folder: Path, **environment: str) -> list[tuple[int, int, int]]:
+    """Version, first and last of the ranges that coturn is told to deny: this machine need not have IPv6 for that."""
+    said = folder / "turnserver"
+    said.write_text('#!/bin/sh\nprintf "%s\\n" "$@"\n')
+    said.chmod(0o755)
+    (folder / "turn_secret").write_text(SECRET)
+    given = {"REALM": REALM, "TURN_SECRET_FILE": str(folder / "turn_secret"), "PATH": f"{folder}:{os.environ['PATH']}"}
+    flags = subprocess.run(
+        ["/bin/sh", str(START_TURN)], env=os.environ | given | environment, check=True, capture_output=True, text=True
+    ).stdout.splitlines()
+    ranges = [flag.partition("=")[2].split("-") for flag in flags if flag.startswith("--denied-peer-ip=")]
+    ends = [(ipaddress.ip_address(first), ipaddress.ip_address(last)) for first, last in ranges]
+    return [(first.version, int(first), int(last)) for first, last in ends]
+
+
+def _is_denied(ranges: list[tuple[int, int, int]], address: str) -> bool:
+    wanted = ipaddress.ip_address(address)
+    return any(version == wanted.version and first <= int(wanted) <= last for version, first, last in ranges)
+
+
+NOT_PUBLIC = (
+    *("127.0.0.1", "10.1.2.3", "172.16.0.1", "192.168.1.1", "169.254.169.254", "100.64.0.1", "192.0.0.8", "198.18.0.1"),
+    *("192.0.2.1", "224.0.0.1", "255.255.255.255", "::1", "fe80::1", "fd00::1", "ff02::1", "::ffff:10.0.0.1"),
+    *("64:ff9b::7f00:1", "64:ff9b:1::1", "2002:7f00:1::", "2001::1", "2001:db8::1", "100::1"),
+)
+
+
+def test_no_private_address_is_reached_by_way_of_ipv6_either(tmp_path: Path) -> None:
+    public = _denied(tmp_path, CONSOLE_IPS="192.0.2.7", RELAY_TO_PUBLIC="1")
+    assert [each for each in NOT_PUBLIC if not _is_denied(public, each)] == []
+    assert not any(_is_denied(public, each) for each in ("8.8.8.8", "2a00:1450::1", "2606:4700::1"))
+    alone = _denied(tmp_path, CONSOLE_IPS="192.0.2.7")
+    assert all(_is_denied(alone, each) for each in (*NOT_PUBLIC, "8.8.8.8", "2a00:1450::1"))
 
 
 @pytest.mark.timeout(60)

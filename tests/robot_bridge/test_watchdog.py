@@ -106,6 +106,44 @@ def first_motion(wire: list[list[float]]) -> int:
     return next(index for index, values in enumerate(wire) if values != NEUTRAL)
 
 
+class Fails(RecordingRobot):
+    """Works but for its measurement, which raises when it is told to; ramps for longer than its watchdog waits."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fails = False
+        self.rests_beside = 0
+
+    def describe(self) -> RobotDescription:
+        description = super().describe()
+        slow = tuple(msgspec.structs.replace(axis, brake=axis.maximum / 2) for axis in description.axes)
+        return msgspec.structs.replace(description, axes=slow, hold=5.0, watchdog=LIMIT)
+
+    def measure(self) -> Measurement:
+        if self.fails:
+            raise OSError("no answer")
+        return super().measure()
+
+    def rest_from_thread(self) -> None:
+        self.rests_beside += 1
+        super().rest_from_thread()
+
+
+async def test_a_robot_that_is_brought_to_rest_by_its_ramp_is_not_cut_short_by_the_watchdog() -> None:
+    robot = Fails()
+    async with running_bridge(robot) as bridge:
+        with contextlib.suppress(LinkError):
+            async with operator(bridge) as driver:
+                await drive_fast(robot, driver)
+                robot.fails = True
+                while True:
+                    await driver.drive()
+        with pytest.raises(RobotFailed):
+            await bridge.wait()
+        assert robot.applied[-1][1] == NEUTRAL
+        assert robot.rests_beside == 0
+
+
 class Clock:
     """The machine's, and what it was suspended for besides."""
 

@@ -1,6 +1,7 @@
 """WHEP over real HTTP."""
 
 import asyncio
+from typing import Any
 
 import httpx
 import pytest
@@ -8,7 +9,9 @@ from aiortc import RTCConfiguration, RTCPeerConnection
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from robot_bridge.protocol.console import Role
 from robot_bridge.protocol.messages import Ping, Pong
+from server.data_transport_private import tune_data_transport
 from server.offer import parse_fragment
 from tests.server.offers import offer, section
 from tests.server.rig import PATIENCE, Rig, TestPeer, running_console, running_rig
@@ -260,6 +263,32 @@ def test_no_offer_gets_anything_but_an_answer_or_a_named_error() -> None:
         runner.run(asyncio.sleep(0.2))
         assert len(asyncio.all_tasks(runner.get_loop())) <= tasks + 3
         runner.run(context.__aexit__(None, None, None))
+
+
+@pytest.mark.parametrize(("role", "waits"), [("observer", True), ("operator", False), ("supervisor", False)])
+async def test_only_what_an_observer_sends_waits_for_its_turn(
+    role: Role, waits: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A supervisor may drive, and says STOP on a channel as an operator does."""
+    tuned: list[bool] = []
+
+    def tune(pc: RTCPeerConnection, *, observes: bool = False) -> None:
+        tuned.append(observes)
+        tune_data_transport(pc, observes=observes)
+
+    monkeypatch.setattr("server.whep.tune_data_transport", tune)
+    async with running_rig() as rig:
+        attached: list[bool] = []
+        attach = rig.services.media.attach
+
+        def noted(*arguments: Any, **named: Any) -> Any:
+            attached.append(named["waits"])
+            return attach(*arguments, **named)
+
+        monkeypatch.setattr(rig.services.media, "attach", noted)
+        headers = {**rig.token(role), **SDP}
+        assert (await rig.http.post("/whep", content=await _real_offer(), headers=headers)).status_code == 201
+    assert (tuned, attached) == ([waits], [waits])
 
 
 async def test_what_may_be_posted_is_said_and_there_is_nothing_to_get() -> None:
