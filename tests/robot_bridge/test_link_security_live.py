@@ -1,6 +1,7 @@
 """The robot link's secret and TLS over real TCP: who is let in, who is not, and that nobody else is disturbed."""
 
 import asyncio
+import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 import uvloop
 
+from robot_bridge import link_acceptor
 from robot_bridge.bridge import Bridge
 from robot_bridge.check_link import check_link, is_loopback
 from robot_bridge.errors import InsecureLink
@@ -84,16 +86,37 @@ async def test_however_often_somebody_fails_from_an_address_the_right_secret_get
         assert bridge.counters.bad_input["unauthorised"] == 60
 
 
-async def test_strangers_that_say_nothing_keep_nobody_out() -> None:
+@pytest.mark.parametrize("beginning", [b"", frame(encode_message(Hello(role="operator", nonce=b"n" * 32)))])
+async def test_strangers_that_say_nothing_or_owe_the_proof_keep_nobody_out(beginning: bytes) -> None:
     async with bridge_with(SECRET, max_strangers=3) as bridge:
-        silent = [await asyncio.open_connection(*bridge.address) for _ in range(20)]
+        strangers = []
         try:
+            for _ in range(20):
+                reader, writer = await asyncio.open_connection(*bridge.address)
+                strangers.append(writer)
+                writer.write(beginning)
+                if beginning:
+                    await reader.read(1)  # of the challenge
             async with link_to(bridge) as link:
                 await drives(link)
             assert bridge.counters.endings["full"] >= 17
         finally:
-            for _, writer in silent:
+            for writer in strangers:
                 writer.close()
+
+
+async def test_connections_are_accepted_at_a_bounded_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_acceptor, "BURST", 2)
+    monkeypatch.setattr(link_acceptor, "RATE", 0.001)
+    async with bridge_with(SECRET) as bridge:
+        connections = [await asyncio.open_connection(*bridge.address) for _ in range(5)]
+        reader, writer = connections[0]
+        writer.write(frame(encode_message(Hello(role="operator"))))
+        async with asyncio.timeout(PATIENCE):
+            await reader.read()
+        assert bridge.links <= 2
+        for _, each in connections:
+            each.transport.abort()
 
 
 async def test_strangers_do_not_count_as_links_and_links_are_bounded() -> None:
@@ -204,6 +227,36 @@ async def test_what_is_not_tls_is_counted_and_keeps_nobody_out(authority: Author
                 writer.close()
 
 
+@pytest.mark.parametrize("beginning", [b"", b"\x16"], ids=["silent", "in the handshake"])
+async def test_tls_clients_that_dawdle_are_no_more_than_strangers_may_be(
+    authority: Authority, beginning: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("SILENCE", "HANDSHAKE_TIMEOUT"):
+        monkeypatch.setattr(link_acceptor, name, 60.0)  # it is not the time that ends them
+    begun: list[socket.socket] = []
+    first_byte = link_acceptor._first_byte
+
+    async def noted(connection: socket.socket) -> None:
+        await first_byte(connection)
+        begun.append(connection)
+
+    monkeypatch.setattr(link_acceptor, "_first_byte", noted)
+    async with bridge_with(SECRET, LinkTls(certificate=authority.issue("bridge")), max_strangers=3) as bridge:
+        strangers = []
+        for number in range(20):
+            _, writer = await asyncio.open_connection(*bridge.address)
+            strangers.append(writer)
+            writer.write(beginning)
+            if beginning:
+                await happens(lambda number=number: len(begun) > number)  # type: ignore[misc]
+        await happens(lambda: bridge.counters.bad_input["tls"] == 17)
+        async with link_to(bridge, tls=LinkTls(authority=authority.certificate)) as link:
+            await drives(link)
+        assert bridge.counters.bad_input["tls"] <= 18, "one more has made room for it at most"
+        for writer in strangers:
+            writer.transport.abort()
+
+
 def test_it_all_holds_on_the_event_loop_that_the_bridge_runs_on(authority: Authority) -> None:
     """uvloop has its own TLS."""
 
@@ -212,7 +265,7 @@ def test_it_all_holds_on_the_event_loop_that_the_bridge_runs_on(authority: Autho
         await test_what_is_not_tls_is_counted_and_keeps_nobody_out(authority)
         await test_pictures_arrive_whole_over_tls(authority)
         await test_a_media_link_over_tls_that_does_not_read_is_dropped_and_disturbs_nobody(authority)
-        await test_strangers_that_say_nothing_keep_nobody_out()
+        await test_strangers_that_say_nothing_or_owe_the_proof_keep_nobody_out(b"")
 
     uvloop.run(scenario())
 
