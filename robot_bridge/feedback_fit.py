@@ -1,6 +1,5 @@
 """Whether a feedback is one of the robot that a description tells of. No I/O."""
 
-import math
 from collections.abc import Sequence
 
 from robot_bridge.protocol.description import RobotDescription
@@ -9,10 +8,12 @@ from robot_bridge.protocol.messages import Feedback
 __all__ = ["misfit"]
 
 WRENCH = 6  # values
+MOST = 1e12  # of any measured value, in its unit: further from zero nothing can be added, rounded or drawn
+LONGEST = 1e9  # s, of a monotonic clock
 
 
 def misfit(feedback: Feedback, description: RobotDescription) -> str:
-    """What does not fit: a value too many or too few, or one that is no number; "" when all does."""
+    """What does not fit: a value too many or too few, or one that none can be; "" when all does."""
     rays = 0 if description.ranges is None else description.ranges.count
     values: tuple[tuple[str, Sequence[float], tuple[int, ...]], ...] = (
         ("axes", feedback.axes, (len(description.axes),)),
@@ -23,8 +24,8 @@ def misfit(feedback: Feedback, description: RobotDescription) -> str:
     for name, found, lengths in values:
         if len(found) not in lengths:
             return f"a feedback with {len(found)} {name}"
-        if not all(map(math.isfinite, found)):
+        if not all(-MOST <= value <= MOST for value in found):
             return f"a feedback whose {name} are no numbers"
-    if not (math.isfinite(feedback.time) and math.isfinite(feedback.warning)):
+    if not (0 <= feedback.time <= LONGEST and 0 <= feedback.warning <= LONGEST):
         return "a feedback without a time"
     return ""

@@ -36,7 +36,10 @@ def changed(**changes: object) -> Feedback:
         (changed(joints=[0.0] * 99), "a feedback with 99 joints"),
         (changed(wrench=[1.0]), "a feedback with 1 wrench"),
         (changed(ranges=[1.0]), "a feedback with 1 ranges"),
+        (changed(axes=[1e308] * len(FEEDBACK.axes)), "a feedback whose axes are no numbers"),
         (changed(time=math.nan), "a feedback without a time"),
+        (changed(time=1e300), "a feedback without a time"),
+        (changed(time=-1.0), "a feedback without a time"),
         (changed(warning=math.inf), "a feedback without a time"),
     ],
 )
