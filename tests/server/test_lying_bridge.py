@@ -59,7 +59,7 @@ def _said_to_an_operator(choose: random.Random) -> Iterator[LinkMessage]:
 
 
 def _shown(choose: random.Random) -> Iterator[LinkMessage]:
-    streams = [each.name for each in (*DESCRIPTION.cameras, *DESCRIPTION.microphones)]
+    streams = [each.name for each in DESCRIPTION.cameras] + [each.name for each in DESCRIPTION.microphones]
     for _ in range(COUNT):
         codec: MediaCodec = choose.choice(get_args(MediaCodec))
         yield Media(
