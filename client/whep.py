@@ -41,6 +41,7 @@ class _WatchTicket(msgspec.Struct):
 
 class _StopAnswer(msgspec.Struct):
     number: int
+    kept: bool
 
 
 class _RelayAnswer(msgspec.Struct):
@@ -146,7 +147,8 @@ class Whep:
         """Latch the stop by HTTP; raises as `offer`, also when the robot has not confirmed it."""
         answer = await self._request("POST", self._base + "/api/stop", json={"reason": reason, "press": press})
         try:
-            return StopTaken(press=press, number=_stop_answer.decode(answer.content).number)
+            said = _stop_answer.decode(answer.content)
+            return StopTaken(press=press, number=said.number, kept=said.kept)
         except msgspec.DecodeError as error:
             raise SignallingRefused(answer.status_code, "", "not an answer to a stop") from error
 

@@ -280,10 +280,10 @@ class Bridge:
 
     def _stop(self, peer: LinkPeer, stop: Stop) -> None:
         given = self._core.stop(stop.press, stop.by, stop.reason, self._now())
-        self._note_stop(given, stop.by, stop.reason)
+        self._note_stop(given, stop.by, stop.reason, stop.press)
         self._keeper.answer(peer, stop.press, given.number)
 
-    def _note_stop(self, given: StopGiven, by: str, reason: str) -> None:
+    def _note_stop(self, given: StopGiven, by: str, reason: str, press: str = "") -> None:
         """The robot rests first, whatever else a stop brings with it."""
         if not given.is_new:
             return
@@ -293,7 +293,7 @@ class Bridge:
         if given.overtaken and self._resetting is not None:
             self._refuse_reset(self._resetting[0], ResetRefused(given.overtaken, "stale_reset", OVERTAKEN))
             self._resetting = None
-        self._record("stop", self._core.current, by=by, reason=reason, number=given.number)
+        self._record("stop", self._core.current, by=by, reason=reason, number=given.number, press=press)
 
     def _reset(self, peer: LinkPeer, reset: Reset) -> None:
         outcome = self._core.reset(reset.number, self._now())

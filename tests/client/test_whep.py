@@ -7,6 +7,7 @@ import pytest
 from client.errors import ConnectFailed, SignallingRefused
 from client.link import parse_link
 from client.whep import Whep
+from robot_bridge.protocol.messages import StopTaken
 
 
 @asynccontextmanager
@@ -66,6 +67,12 @@ async def test_an_error_that_is_not_ours_is_reported_as_it_is() -> None:
     async with http_server(answer("502 Bad Gateway", "<html>")) as (link, _), Whep(parse_link(link)) as whep:
         with pytest.raises(SignallingRefused, match="502: <html>"):
             await whep.stop("", "p")
+
+
+async def test_the_answer_to_a_stop_says_whether_it_is_on_the_robots_disk() -> None:
+    taken = answer("200 OK", '{"delivered": true, "event": 1, "number": 7, "press": "p", "kept": false}')
+    async with http_server(taken) as (link, _), Whep(parse_link(link)) as whep:
+        assert await whep.stop("", "p") == StopTaken(press="p", number=7, kept=False)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,16 @@
 """The HTTP API of a console that runs, with a real bridge."""
 
 import re
+from pathlib import Path
 
 import pytest
 
+from robot_bridge.bridge import Bridge
 from robot_bridge.protocol.console import StopStateNotice
 from robot_bridge.protocol.messages import StopState
-from tests.server.rig import Rig, reset_by_http, running_console, running_rig, stop_words
+from robot_bridge.robots.registry import create_robot
+from robot_bridge.settings import BridgeSettings
+from tests.server.rig import Rig, eventually, reset_by_http, running_console, running_rig, stop_words
 
 
 async def _stop_state(rig: Rig, *, stopped: bool) -> StopState:
@@ -71,6 +75,17 @@ async def test_an_observer_can_stop_and_only_the_holder_of_the_seat_or_a_supervi
         await reset_by_http(rig.http, "/api/reset", rig.token("supervisor"), lambda: rig.services.console.clock.stop)
         await _stop_state(rig, stopped=False)
         assert rig.count("lockstep_stops_total", where="http") == 1
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+async def test_whoever_stops_over_http_is_told_whether_the_stop_is_on_the_robots_disk(
+    tmp_path: Path, keeps: bool
+) -> None:
+    settings = BridgeSettings(port=0, state_dir=tmp_path if keeps else None)
+    async with Bridge(create_robot("planar"), settings) as bridge, running_console(bridge.address[1]) as rig:
+        await eventually(lambda: rig.services.console.robot.up)
+        answer = await rig.http.post("/api/stop", headers=rig.token("observer"))
+        assert (answer.json()["delivered"], answer.json()["kept"]) == (True, keeps)
 
 
 async def test_a_press_whose_stop_was_reset_stops_nothing_and_says_so() -> None:

@@ -188,7 +188,7 @@ export async function stopAnswerOf(answer: Promise<unknown>, press: string): Pro
     const found = await answer;
     if (!isRecord(found) || found["press"] !== press || typeof found["number"] !== "number")
       return { kind: "unknown" };
-    return { kind: "taken", number: found["number"], kept: found["kept"] !== false };
+    return { kind: "taken", number: found["number"], kept: found["kept"] === true };
   } catch (error) {
     return { kind: error instanceof ConsoleError ? refusedStop(error.error) : "unknown" };
   }
