@@ -22,6 +22,20 @@ ODD: dict[str, Any] = {
 DEADMAN, ARM, STOP = 4, 6, 2
 
 
+# A pad that reports at every look, as some wireless ones do, also while nothing changes.
+REPORTS = """() => {
+  const pads = navigator.getGamepads.bind(navigator);
+  window.looks = 0;
+  window.reports = true;
+  navigator.getGamepads = () => {
+    window.looks += 1;
+    const [pad] = pads();
+    if (window.reports) pad.timestamp += 4;
+    return pads();
+  };
+}"""
+
+
 class Hand:
     """A hand on one of the pads."""
 
@@ -149,6 +163,23 @@ async def test_another_pad_cannot_take_over_but_can_stop(stack: Stack, chromium:
         await console.drive_forward()
         await other.press(1)
         await console.until("s.stop.stopped && !s.armed && s.at_rest === true")
+
+
+async def test_a_pad_that_reported_all_the_time_and_falls_silent_while_it_is_held_disarms(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.page.evaluate(REPORTS)
+        await console.arm()
+        await console.drive_forward()
+        await console.until("window.looks > 300", 60)
+        assert (await console.stats())["driving"], "a pad that reports the same again is there"
+        await console.page.evaluate(
+            "void (window.reports = false)"
+        )  # out of range: stick and deadman stay as they were
+        await console.until("!s.armed && s.at_rest === true")
+        await console.page.get_by_text("the gamepad fell silent").first.wait_for()
 
 
 async def test_a_pulled_pad_disarms_and_the_next_one_has_to_arm_anew(stack: Stack, chromium: Browser) -> None:
