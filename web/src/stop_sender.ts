@@ -23,6 +23,7 @@ import type { ServerMessage, StopState } from "./wire";
 export class StopSender {
   readonly offer = createResetOffer();
   private press: StopPress | null = null; // null: none, or it is done with
+  private isSilenced = false; // the STOP of this page's link
 
   constructor(
     private readonly api: ConsoleApi,
@@ -67,6 +68,12 @@ export class StopSender {
       tookStopAnswer(press, { kind: "silenced" });
     tookStopState(press, stop);
     if (isPast(press, stop)) this.press = null;
+  }
+
+  /** Whether the STOP of this page's link is silenced. When it works again, "had no effect" would be taken for now. */
+  noteSilence(isSilenced: boolean): void {
+    if (this.isSilenced && !isSilenced && this.press?.heard === "silenced") this.press = null;
+    this.isSilenced = isSilenced;
   }
 
   /** To be called many times a second. */

@@ -73,9 +73,13 @@ export function stopFate(press: StopPress, now: number): StopFate {
   return press.heard === "doubtful" || now - press.sinceMs > DOUBT_AFTER_MS ? "unconfirmed" : "sending";
 }
 
-/** Whether it is still said. */
+/**
+ * Whether it is still said. One that the console keeps is said until the robot has it, however long that takes: nobody
+ * else would tell a page that has a new connection by then what became of it.
+ */
 export function isBeingSaid(press: StopPress, now: number): boolean {
-  return press.number === null && press.heard !== "silenced" && now - press.sinceMs <= GIVE_UP_MS;
+  if (press.number !== null || press.heard === "silenced") return false;
+  return press.heard === "waiting" || now - press.sinceMs <= GIVE_UP_MS;
 }
 
 /** Whether the robot may have to be taken for stopped although it does not say so yet. */

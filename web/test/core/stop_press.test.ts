@@ -74,6 +74,17 @@ describe("a press of STOP", () => {
     expect(stopFate(other, 1100)).toBe("unconfirmed");
   });
 
+  it("that the console keeps is said until the robot has it, however long the robot is away", () => {
+    const mine = press();
+    tookStopAnswer(mine, { kind: "waiting" });
+    const hour = 3_600_000;
+    expect([stopFate(mine, hour), isBeingSaid(mine, hour)]).toEqual(["waiting", true]);
+    expect(stopDue(mine, hour)).toEqual({ channels: true, http: true });
+    expect(stopDue(mine, hour + 999)).toEqual({ channels: false, http: false });
+    tookStopTaken(mine, { press: mine.id, number: 3, kept: true });
+    expect([stopFate(mine, hour), isBeingSaid(mine, hour)]).toEqual(["confirmed", false]);
+  });
+
   it("of a silenced link has had no effect and is said no more", () => {
     const mine = press();
     tookStopAnswer(mine, { kind: "silenced" });
