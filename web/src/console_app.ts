@@ -147,7 +147,8 @@ export class ConsoleApp {
       robotUp: robotIsUp(state),
       holdsSeat: holdsSeat(state),
       lockedOut: state.stop.locked_out !== "",
-      stopped: state.stop.stopped || this.stopping.outranks(state.stop, now),
+      stopped: state.stop.stopped,
+      stopPressed: this.stopping.outranks(state.stop, now),
       visible: !document.hidden,
       occupied: this.page.isOccupied(),
     };
@@ -175,7 +176,7 @@ export class ConsoleApp {
 
   stop(reason: string): void {
     this.stopping.stop(reason, performance.now());
-    this.bar("stopped");
+    this.bar("stop_pressed");
   }
 
   /** Nothing moves before the person arms again, not even by the neutral command that would let it. */

@@ -125,7 +125,7 @@ export function statisticsOf(app: ConsoleApp, mainStream: string | null): Statis
 }
 
 function gateOf(app: ConsoleApp, now: number): Statistics["gate"] {
-  const block = gateBlock(app.state, app.hears(now));
+  const block = gateBlock(app.state, app.hears(now), app.stopping.outranks(app.state.stop, now));
   if (block !== null) return { state: block, reason: GATE_BLOCK_WORDS[block] };
   const state = app.driver === null ? "no_feedback" : gateState(app.driver.gate, now);
   return { state, reason: GATE_WORDS[state] };

@@ -3,12 +3,14 @@ import {
   createPress,
   isBeingSaid,
   isPast,
+  isUnkept,
   outranks,
   stopDue,
   stopFate,
   tookStopAnswer,
   tookStopState,
   tookStopTaken,
+  unkeptSince,
   type StopFate,
   type StopPress,
 } from "./core/stop_press";
@@ -24,6 +26,7 @@ export class StopSender {
   readonly offer = createResetOffer();
   private press: StopPress | null = null; // null: none, or it is done with
   private isSilenced = false; // the STOP of this page's link
+  private unkeptMs: number | null = null; // since when what the robot says of its stop is not on its disk
 
   constructor(
     private readonly api: ConsoleApi,
@@ -45,6 +48,11 @@ export class StopSender {
     return this.press !== null && outranks(this.press, stop, now);
   }
 
+  /** Whether the robot could not save the stop that holds, whoever's it is. */
+  isUnkept(now: number): boolean {
+    return isUnkept(this.unkeptMs, now);
+  }
+
   stop(reason: string, now: number): void {
     this.press = createPress(crypto.getRandomValues(new Uint8Array(16)), reason, now);
     this.step(now);
@@ -61,12 +69,13 @@ export class StopSender {
   /** `stop`: what holds with this message taken. */
   took(message: ServerMessage, stop: StopState, now: number): void {
     if (message.type === "refusal" && message.stop > 0) tookResetRefusal(this.offer, message, now);
+    this.unkeptMs = unkeptSince(this.unkeptMs, stop, now);
     const { press } = this;
     if (press === null) return;
     if (message.type === "stop_taken") tookStopTaken(press, message);
     else if (message.type === "refusal" && message.reason === "silenced")
       tookStopAnswer(press, { kind: "silenced" });
-    tookStopState(press, stop);
+    tookStopState(press, stop, now);
     if (isPast(press, stop)) this.press = null;
   }
 

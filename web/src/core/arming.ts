@@ -8,6 +8,7 @@ export type ArmRefusal =
   | "no_seat"
   | "locked_out"
   | "stopped"
+  | "stop_pressed"
   | "hidden"
   | "occupied"
   | "deadman_held";
@@ -24,6 +25,7 @@ export type DisarmReason =
   | "seat_lost"
   | "occupied"
   | "stopped"
+  | "stop_pressed"
   | "locked_out"
   | "neutral_needed"
   | "taped_down";
@@ -34,7 +36,8 @@ export interface ArmConditions {
   readonly robotUp: boolean;
   readonly holdsSeat: boolean;
   readonly lockedOut: boolean; // by somebody at the robot
-  readonly stopped: boolean;
+  readonly stopped: boolean; // the robot says so
+  readonly stopPressed: boolean; // here, and the robot does not show it yet
   readonly visible: boolean;
   readonly occupied: boolean; // the keyboard or the picture belongs to something else: a text field, a dialogue
 }
@@ -62,6 +65,7 @@ export function armRefusal(arming: Arming, conditions: ArmConditions): ArmRefusa
   if (!conditions.holdsSeat) return "no_seat";
   if (conditions.lockedOut) return "locked_out";
   if (conditions.stopped) return "stopped";
+  if (conditions.stopPressed) return "stop_pressed";
   if (!conditions.visible) return "hidden";
   if (conditions.occupied) return "occupied";
   return arming.deadman ? "deadman_held" : null;
@@ -89,8 +93,9 @@ export function startAfresh(arming: Arming): void {
 }
 
 /** Whether the robot would execute a command of this page at all. */
-export function mayCommand({ operator, robotUp, holdsSeat, lockedOut, stopped }: ArmConditions): boolean {
-  return operator && robotUp && holdsSeat && !lockedOut && !stopped;
+export function mayCommand(conditions: ArmConditions): boolean {
+  const { operator, robotUp, holdsSeat, lockedOut, stopped, stopPressed } = conditions;
+  return operator && robotUp && holdsSeat && !lockedOut && !stopped && !stopPressed;
 }
 
 /** What the first condition that no longer holds means for one who is armed; null when all hold. */
@@ -98,6 +103,7 @@ export function lostCondition(conditions: ArmConditions): DisarmReason | null {
   if (!conditions.connected) return "connection_lost";
   if (conditions.lockedOut) return "locked_out";
   if (conditions.stopped) return "stopped";
+  if (conditions.stopPressed) return "stop_pressed";
   if (!conditions.robotUp) return "robot_down";
   if (!conditions.operator || !conditions.holdsSeat) return "seat_lost";
   if (!conditions.visible) return "hidden";

@@ -2,14 +2,18 @@ import { holdsSeat, robotIsUp, type ConsoleState } from "./console_state";
 
 /** What shuts the gate before its own rule is asked. */
 export type GateBlock =
-  "not_connected" | "console_silent" | "robot_down" | "locked_out" | "stopped" | "no_seat";
+  "not_connected" | "console_silent" | "robot_down" | "locked_out" | "stopped" | "stop_pressed" | "no_seat";
 
-/** The first that holds; null when nothing does. `hears`: the console has spoken lately. */
-export function gateBlock(state: ConsoleState, hears: boolean): GateBlock | null {
+/**
+ * The first that holds; null when nothing does. `hears`: the console has spoken lately. `stopPressed`: here, and the
+ * robot does not show it yet.
+ */
+export function gateBlock(state: ConsoleState, hears: boolean, stopPressed: boolean): GateBlock | null {
   if (state.welcome === null) return "not_connected";
   if (!hears) return "console_silent";
   if (!robotIsUp(state)) return "robot_down";
   if (state.stop.locked_out !== "") return "locked_out";
   if (state.stop.stopped) return "stopped";
+  if (stopPressed) return "stop_pressed";
   return holdsSeat(state) ? null : "no_seat";
 }

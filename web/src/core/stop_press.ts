@@ -6,6 +6,7 @@ const SLOW_REPEAT_MS = 1000;
 const HTTP_REPEAT_MS = 1000;
 const DOUBT_AFTER_MS = 2000;
 const GIVE_UP_MS = 60_000;
+const SAVE_MS = 1000; // that the robot's disk may take until a stop counts as not kept
 
 /**
  * What became of a press. `confirmed`: the robot has it on its disk. `not_kept`: the robot has it, its disk has not.
@@ -26,7 +27,7 @@ export interface StopPress {
   nextMs: number; // when it is said again
   nextHttpMs: number;
   number: number | null; // of the stop that it became; null while nobody has confirmed it
-  kept: boolean; // of a confirmed one: on the robot's disk
+  unkeptMs: number | null; // since when a confirmed one is known not to be on the robot's disk; null: it is
   heard: "nothing" | "waiting" | "doubtful" | "silenced"; // from the console, of one that is not confirmed
 }
 
@@ -44,7 +45,7 @@ export function createPress(random: Uint8Array, reason: string, now: number): St
     nextMs: now,
     nextHttpMs: now,
     number: null,
-    kept: true,
+    unkeptMs: null,
     heard: "nothing",
   };
 }
@@ -53,13 +54,24 @@ export function createPress(random: Uint8Array, reason: string, now: number): St
 export function tookStopTaken(press: StopPress, taken: Pick<StopTaken, "press" | "number" | "kept">): void {
   if (taken.press !== press.id) return;
   press.number = taken.number;
-  press.kept = taken.kept;
+  press.unkeptMs = taken.kept ? null : -Infinity; // the robot has tried
 }
 
 /** A stop that held before, or somebody else's, confirms nothing. */
-export function tookStopState(press: StopPress, stop: StopState): void {
+export function tookStopState(press: StopPress, stop: StopState, now: number): void {
   if (stop.press === press.id) press.number = stop.number;
-  if (press.number !== null && stop.number >= press.number) press.kept = stop.kept;
+  if (press.number !== null && stop.number >= press.number)
+    press.unkeptMs = unkeptSince(press.unkeptMs, stop, now);
+}
+
+/** Since when a stop is not on the robot's disk, with this state: a robot says so too while it still writes. */
+export function unkeptSince(before: number | null, stop: StopState, now: number): number | null {
+  return stop.kept ? null : (before ?? now);
+}
+
+/** Whether that is for so long that the disk takes nothing. */
+export function isUnkept(unkeptMs: number | null, now: number): boolean {
+  return unkeptMs !== null && now - unkeptMs >= SAVE_MS;
 }
 
 export function tookStopAnswer(press: StopPress, answer: StopAnswer): void {
@@ -68,7 +80,7 @@ export function tookStopAnswer(press: StopPress, answer: StopAnswer): void {
 }
 
 export function stopFate(press: StopPress, now: number): StopFate {
-  if (press.number !== null) return press.kept ? "confirmed" : "not_kept";
+  if (press.number !== null) return isUnkept(press.unkeptMs, now) ? "not_kept" : "confirmed";
   if (press.heard === "silenced" || press.heard === "waiting") return press.heard;
   return press.heard === "doubtful" || now - press.sinceMs > DOUBT_AFTER_MS ? "unconfirmed" : "sending";
 }

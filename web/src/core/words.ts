@@ -44,6 +44,7 @@ export const GATE_BLOCK_WORDS: Readonly<Record<GateBlock, string>> = {
   robot_down: "The robot cannot be reached",
   locked_out: "Somebody at the robot has locked it",
   stopped: "The robot is stopped",
+  stop_pressed: "You pressed STOP",
   no_seat: "The control seat is not yours",
 };
 
@@ -54,6 +55,7 @@ export const ARM_REFUSAL_WORDS: Readonly<Record<ArmRefusal, string>> = {
   no_seat: "Get the control seat first",
   locked_out: "Somebody at the robot has locked it",
   stopped: "The robot is stopped: reset it first",
+  stop_pressed: "You pressed STOP, and the robot does not show it yet",
   hidden: "The page is hidden",
   occupied: "Close what is open over the picture, or leave the text field, first",
   deadman_held: "Let go of the hold-to-run control first",
@@ -71,6 +73,7 @@ export const DISARM_WORDS: Readonly<Record<DisarmReason, string>> = {
   seat_lost: "Disarmed: the control seat was lost",
   occupied: "Disarmed: you turned to a text field or a dialogue",
   stopped: "Disarmed: the robot was stopped",
+  stop_pressed: "Disarmed: you pressed STOP",
   locked_out: "Disarmed: somebody at the robot locked it",
   neutral_needed: "Disarmed: the robot interrupted the motion. Arm to go on",
   taped_down: "Disarmed: hold-to-run was held a minute without change",

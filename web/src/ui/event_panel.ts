@@ -30,7 +30,7 @@ export function createEventPanel(app: ConsoleApp): Panel {
     update(now) {
       const found = app.driver === null ? "no_feedback" : gateState(app.driver.gate, now);
       if (found === "open" || found === "rate") openMs = now;
-      const blocked = gateBlock(app.state, app.hears(now));
+      const blocked = gateBlock(app.state, app.hears(now), app.stopping.outranks(app.state.stop, now));
       const flows = blocked === null && now - openMs < STEADY_MS;
       setText(number, app.state.feedback === null ? "–" : grouped(app.state.feedback.event));
       setText(rate, `${rateOf(app.events, now).toFixed(1)} /s`);

@@ -64,7 +64,7 @@ export function overlayWords(app: ConsoleApp, now: number): OverlayWords | null 
       text: `${detail === "" ? "" : `${sentence(detail)} `}The console keeps trying. Look after the robot and its bridge.`,
     };
   }
-  return app.state.stop.stopped || app.state.stop.locked_out !== "" ? stopWords(app) : null;
+  return app.state.stop.stopped || app.state.stop.locked_out !== "" ? stopWords(app, now) : null;
 }
 
 function linkWords(link: LinkState, now: number): OverlayWords {
@@ -97,8 +97,8 @@ function silentWords(app: ConsoleApp, now: number): OverlayWords {
   return { tone: "bad", title: "Console silent", text };
 }
 
-function stopWords(app: ConsoleApp): OverlayWords {
-  const { by, reason, kept, locked_out: lock } = app.state.stop;
+function stopWords(app: ConsoleApp, now: number): OverlayWords {
+  const { by, reason, locked_out: lock } = app.state.stop;
   if (lock !== "") {
     const next = "Nobody can drive or reset it from a page until that person unlocks it.";
     return {
@@ -111,7 +111,7 @@ function stopWords(app: ConsoleApp): OverlayWords {
   const why = reason === "" ? "" : `: ${reason}`;
   const next = mayReset(app.state) ? "Reset moves nothing; arm again afterwards." : whoResets(app.state);
   const words = { tone: "stopped", title: "Stopped", text: `${who}${why}. ${next}` } as const;
-  return kept ? words : { ...words, warning: NOT_KEPT };
+  return app.stopping.isUnkept(now) ? { ...words, warning: NOT_KEPT } : words;
 }
 
 function troubleWords(link: { why: LinkTrouble; detail: string }, next: string): OverlayWords {

@@ -16,6 +16,7 @@ const READY: ArmConditions = {
   holdsSeat: true,
   lockedOut: false,
   stopped: false,
+  stopPressed: false,
   visible: true,
   occupied: false,
 };
@@ -44,6 +45,8 @@ describe("arming", () => {
     ["robot_down", { robotUp: false }],
     ["no_seat", { holdsSeat: false }],
     ["stopped", { stopped: true }],
+    ["stop_pressed", { stopPressed: true }],
+    ["stopped", { stopped: true, stopPressed: true }],
     ["hidden", { visible: false }],
     ["occupied", { occupied: true }],
   ] as const)("is refused: %s", (refusal, change) => {
@@ -122,6 +125,7 @@ describe("disarming", () => {
   it.each([
     ["connection_lost", { connected: false }],
     ["stopped", { stopped: true }],
+    ["stop_pressed", { stopPressed: true }],
     ["robot_down", { robotUp: false }],
     ["seat_lost", { holdsSeat: false }],
     ["seat_lost", { operator: false }],

@@ -13,40 +13,44 @@ function driving(): ReturnType<typeof createConsoleState> {
 
 describe("the gate", () => {
   it("is left to its own rule for who holds the seat of a robot that can be reached", () => {
-    expect(gateBlock(driving(), true)).toBeNull();
+    expect(gateBlock(driving(), true, false)).toBeNull();
   });
 
   it("is shut before that without a connection", () => {
     const state = driving();
     forgetConnection(state);
-    expect(gateBlock(state, true)).toBe("not_connected");
+    expect(gateBlock(state, true, false)).toBe("not_connected");
   });
 
   it("is shut while the console is silent, whatever was true when it last spoke", () => {
-    expect(gateBlock(driving(), false)).toBe("console_silent");
+    expect(gateBlock(driving(), false, false)).toBe("console_silent");
     const state = driving();
     applyMessage(state, robotOf("down", "silent"), 0);
-    expect(gateBlock(state, false)).toBe("console_silent");
+    expect(gateBlock(state, false, false)).toBe("console_silent");
     forgetConnection(state);
-    expect(gateBlock(state, false)).toBe("not_connected");
+    expect(gateBlock(state, false, false)).toBe("not_connected");
   });
 
   it("is shut while the robot cannot be reached, whatever else holds", () => {
     const state = driving();
     applyMessage(state, feedbackOf(5, { stop: stopOf({ stopped: true, by: "Ada", reason: "test" }) }), 0);
     applyMessage(state, robotOf("down", "silent"), 0);
-    expect(gateBlock(state, true)).toBe("robot_down");
+    expect(gateBlock(state, true, false)).toBe("robot_down");
   });
 
   it("is shut while the robot is stopped", () => {
     const state = driving();
     applyMessage(state, feedbackOf(5, { stop: stopOf({ stopped: true, by: "Ada", reason: "test" }) }), 0);
-    expect(gateBlock(state, true)).toBe("stopped");
+    expect(gateBlock(state, true, false)).toBe("stopped");
+  });
+
+  it("is shut from a press of STOP on, and does not say that the robot is stopped", () => {
+    expect(gateBlock(driving(), true, true)).toBe("stop_pressed");
   });
 
   it("is shut for who does not hold the seat", () => {
     const state = driving();
     applyMessage(state, seatOf("other", "Ada"), 0);
-    expect(gateBlock(state, true)).toBe("no_seat");
+    expect(gateBlock(state, true, false)).toBe("no_seat");
   });
 });

@@ -13,6 +13,7 @@ const READY: ArmConditions = {
   holdsSeat: true,
   lockedOut: false,
   stopped: false,
+  stopPressed: false,
   visible: true,
   occupied: false,
 };

@@ -30,8 +30,8 @@ describe("a press of STOP", () => {
 
   it("is not confirmed by a stop that held already, nor by somebody else's", () => {
     const mine = press();
-    tookStopState(mine, stopOf({ stopped: true, number: 7, press: "other" }));
-    tookStopState(mine, stopOf({ stopped: true, number: 8, press: "another" }));
+    tookStopState(mine, stopOf({ stopped: true, number: 7, press: "other" }), 1050);
+    tookStopState(mine, stopOf({ stopped: true, number: 8, press: "another" }), 1060);
     expect(stopFate(mine, 1100)).toBe("sending");
   });
 
@@ -45,12 +45,25 @@ describe("a press of STOP", () => {
 
   it("is confirmed by a state that names it, and says whether that is on the robot's disk", () => {
     const mine = press();
-    tookStopState(mine, stopOf({ stopped: true, number: 7, press: mine.id, kept: false }));
-    expect(stopFate(mine, 1100)).toBe("not_kept");
-    tookStopState(mine, stopOf({ stopped: true, number: 8, press: "other", kept: true }));
+    tookStopState(mine, stopOf({ stopped: true, number: 7, press: mine.id, kept: false }), 1100);
+    expect(stopFate(mine, 2100)).toBe("not_kept");
+    tookStopState(mine, stopOf({ stopped: true, number: 8, press: "other", kept: true }), 2100);
+    expect(stopFate(mine, 2100)).toBe("confirmed");
+    tookStopState(mine, stopOf({ stopped: true, number: 6, press: "old", kept: false }), 2200);
+    expect(stopFate(mine, 9000)).toBe("confirmed");
+  });
+
+  it("is not said to be lost to the robot's disk while that still writes", () => {
+    const mine = press();
+    const writes = stopOf({ stopped: true, number: 7, press: mine.id, kept: false });
+    tookStopState(mine, writes, 1100);
     expect(stopFate(mine, 1100)).toBe("confirmed");
-    tookStopState(mine, stopOf({ stopped: true, number: 6, press: "old", kept: false }));
-    expect(stopFate(mine, 1100)).toBe("confirmed");
+    tookStopTaken(mine, { press: mine.id, number: 7, kept: true });
+    tookStopState(mine, writes, 1150); // on the other channel, and later than it was said
+    tookStopState(mine, { ...writes, kept: true }, 1600);
+    expect([stopFate(mine, 1200), stopFate(mine, 9000)]).toEqual(["confirmed", "confirmed"]);
+    tookStopTaken(mine, { press: mine.id, number: 7, kept: false }); // it has tried
+    expect(stopFate(mine, 1200)).toBe("not_kept");
   });
 
   it("that the console keeps is waiting until the robot has it", () => {
