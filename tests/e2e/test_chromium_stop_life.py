@@ -42,6 +42,12 @@ SAY_AGAIN = """(press) => fetch("/api/stop", {
   },
   body: JSON.stringify({ reason: "late", press }),
 }).then((answer) => answer.json())"""
+# All that the page says in words from here on, looked at more often than it draws.
+LISTEN = """() => {
+  window.said = new Set();
+  setInterval(() => document.body.innerText.split("\\n").forEach((line) => window.said.add(line)), 10);
+}"""
+SAID = "[...window.said].join(' | ')"
 COMMANDS = "window.sent.filter((m) => m.type === 'command').length"
 
 
@@ -148,6 +154,40 @@ async def test_a_stop_while_the_bridge_is_away_is_kept_and_confirmed_when_it_is_
         await observer.until("s.stop.stopped && s.stop_press === 'confirmed'", 60)
         await observer.page.locator(".alarm").wait_for(state="hidden")
     assert _stops(stack)
+
+
+async def test_before_the_robot_shows_a_stop_the_page_says_that_it_was_pressed_and_not_that_the_robot_is_stopped(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until("s.seat && s.seat.mine && s.event !== null")
+        await console.page.evaluate(LISTEN)
+        with stack.frozen_bridge():
+            await console.page.keyboard.press("Escape")
+            await console.until("s.stop_press === 'waiting'")
+            said = await console.page.evaluate(SAID)
+            assert "You pressed STOP" in said
+            assert "is stopped" not in said
+        await console.until("s.stop.stopped && s.stop_press === 'confirmed'", 60)
+
+
+async def test_a_stop_that_the_robot_writes_to_its_disk_is_not_said_to_be_lost(stack: Stack, chromium: Browser) -> None:
+    async with (
+        open_console(chromium, stack.operator, pad=False) as operator,
+        open_console(chromium, stack.observer, pad=False) as observer,
+    ):
+        for page in (operator, observer):
+            await page.until("s.connected && s.event !== null")
+            await page.page.evaluate(LISTEN)
+        for _ in range(10):
+            await observer.page.keyboard.press("Escape")
+            await observer.until("s.stop.stopped && s.stop_press === 'confirmed'")
+        await operator.until("s.stop.stopped && s.stop.kept")
+        for page in (operator, observer):
+            said = await page.page.evaluate(SAID)
+            assert "STOPPED" in said
+            assert "save" not in said
+            assert "not kept" not in said
 
 
 async def test_a_stop_while_all_of_lockstep_restarts_holds_when_it_is_back(tmp_path: Path, chromium: Browser) -> None:
