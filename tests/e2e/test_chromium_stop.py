@@ -12,6 +12,15 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
 # Takes the focus as viser does.
 SCENE = f'<html>{HOOK.decode()}</head><input style="margin: 30vh 30vw"></html>'
 
+# Whether nothing of the button is off the screen or below something else.
+WHOLE = """() => {
+  const stop = document.querySelector("button.stop");
+  const { left, right, top, bottom } = stop.getBoundingClientRect();
+  const points = [left + 12, (left + right) / 2, right - 12].flatMap((x) => [[x, top + 12], [x, bottom - 12]]);
+  const onScreen = left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight;
+  return onScreen && points.every(([x, y]) => stop.contains(document.elementFromPoint(x, y)));
+}"""
+
 
 async def _stopped(console: ConsolePage) -> None:
     await console.until("s.stop.stopped && !s.armed && s.at_rest === true")
@@ -181,6 +190,22 @@ async def test_a_stop_key_works_inside_the_3d_scene(stack: Stack, chromium: Brow
         assert await observer.page.evaluate("document.activeElement.tagName") == "IFRAME"
         await observer.page.keyboard.press("Escape")
         await observer.until("s.stop.stopped")
+
+
+@pytest.mark.parametrize(
+    ("width", "height"), [(390, 844), (667, 375), (640, 400), (320, 256)], ids=["phone", "turned", "200 %", "400 %"]
+)
+async def test_stop_is_whole_and_above_everything_on_small_screens_and_zoomed_pages(
+    stack: Stack, chromium: Browser, width: int, height: int
+) -> None:
+    async with open_console(chromium, stack.observer, pad=False, width=width, height=height) as observer:
+        await observer.until("s.connected && s.event !== null")
+        for stopped in (False, True):  # the second time there is a plate that says so
+            assert (await observer.stats())["stop"]["stopped"] is stopped
+            assert await observer.page.evaluate(WHOLE)
+            await observer.page.get_by_role("button", name="Stop the robot").click()
+            await observer.until("s.stop.stopped && s.stop_press === 'confirmed'")
+            await observer.page.locator(".plate").get_by_text("Stopped", exact=True).wait_for()
 
 
 async def test_reset_moves_nothing_and_driving_needs_arming_again(stack: Stack, chromium: Browser) -> None:
