@@ -181,8 +181,7 @@ async def test_a_stop_that_the_robot_writes_to_its_disk_is_not_said_to_be_lost(s
             await page.page.evaluate(LISTEN)
         for _ in range(10):
             await observer.page.keyboard.press("Escape")
-            await observer.until("s.stop.stopped && s.stop_press === 'confirmed'")
-        await operator.until("s.stop.stopped && s.stop.kept")
+            await observer.until("s.stop.stopped && s.stop_press === 'confirmed' && s.stop.kept")
         for page in (operator, observer):
             said = await page.page.evaluate(SAID)
             assert "STOPPED" in said
