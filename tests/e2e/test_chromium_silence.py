@@ -47,4 +47,3 @@ async def test_a_silenced_page_is_told_and_its_stop_has_no_effect_until_the_supe
         await dee.page.keyboard.press("Escape")
         await dee.until("s.stop.stopped && s.stop_press === 'confirmed'")
         await sue.until("s.stop.stopped")
-        assert (await sue.stats())["stop"]["by"] == "Dee"
