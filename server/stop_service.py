@@ -380,8 +380,9 @@ class StopService:
             return "link_down", self._robot.detail
         if self._presses.pending:
             return "stale_reset", "a stop is on its way to the robot"
-        if number < self._clock.stop.number:
-            return "stale_reset", f"the newest stop is number {self._clock.stop.number}"
+        newest = max(self._clock.stop.number, 0 if self._newest is None else self._newest.taken.number)
+        if number < newest:  # also when no feedback has shown it yet
+            return "stale_reset", f"the newest stop is number {newest}"
         return None
 
     def _holds_seat(self, by: Actor) -> bool:

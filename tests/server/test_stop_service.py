@@ -447,6 +447,16 @@ async def test_a_reset_never_passes_a_stop_that_has_no_answer_yet(bench: Bench) 
     assert [type(each) for each in bench.robot.sent] == [Stop]
 
 
+async def test_a_reset_of_the_stop_before_the_newest_is_stale_also_before_feedback_shows_the_newest(
+    bench: Bench,
+) -> None:
+    bench.show(StopState(stopped=False, number=4))  # it was reset
+    bench.press("olga", "p")
+    bench.take("p", 5)
+    assert await _raised(bench.reset("ann", 4)) is StaleReset
+    assert [type(each) for each in bench.robot.sent] == [Stop]
+
+
 async def test_a_stop_that_comes_while_a_reset_is_on_its_way_makes_that_stale(bench: Bench) -> None:
     bench.stopped(4)
     resetting = bench.reset("ann", 4)

@@ -16,7 +16,6 @@ import { STALE_MS } from "./core/freshness";
 import { notePicture } from "./core/latency";
 import { noteShown } from "./core/command_gate";
 import { interlock, standingOf } from "./core/interlock";
-import { isSilenced } from "./core/people";
 import { createRateMeter, noteHappening } from "./core/samples";
 import { parseServerMessage } from "./core/wire_parser";
 import { ARM_REFUSAL_WORDS } from "./core/words";
@@ -261,9 +260,7 @@ export class ConsoleApp {
     const { feedback, handOver } = this.state;
     const standing = standingOf(this.state);
     applyMessage(this.state, parsed.message, Date.now());
-    this.stopping.took(parsed.message, this.state.stop, this.heardMs);
-    if (parsed.message.type === "participants")
-      this.stopping.noteSilence(isSilenced(this.state.participants, this.state.welcome?.peer ?? null));
+    this.stopping.took(parsed.message, this.state, this.heardMs);
     const awaits = this.driver !== null && driver.driverAwaitsNeutral(this.driver, parsed.message);
     const forbidden = interlock(standing, this.state, parsed.message, awaits);
     if (forbidden !== null) this.bar(forbidden);

@@ -1,3 +1,5 @@
+import type { ConsoleState } from "./core/console_state";
+import { isSilenced } from "./core/people";
 import { createResetOffer, resetNotSent, resetNumber, tookResetRefusal } from "./core/reset_offer";
 import {
   createPress,
@@ -66,8 +68,11 @@ export class StopSender {
     if (!this.connection.send("stop", text)) resetNotSent(this.offer, now);
   }
 
-  /** `stop`: what holds with this message taken. */
-  took(message: ServerMessage, stop: StopState, now: number): void {
+  /** `state`: with this message taken. */
+  took(message: ServerMessage, state: ConsoleState, now: number): void {
+    const { stop } = state;
+    if (message.type === "participants")
+      this.noteSilence(isSilenced(state.participants, state.welcome?.peer ?? null));
     if (message.type === "refusal" && message.stop > 0) tookResetRefusal(this.offer, message, now);
     this.unkeptMs = unkeptSince(this.unkeptMs, stop, now);
     const { press } = this;
@@ -77,12 +82,6 @@ export class StopSender {
       tookStopAnswer(press, { kind: "silenced" });
     tookStopState(press, stop, now);
     if (isPast(press, stop)) this.press = null;
-  }
-
-  /** Whether the STOP of this page's link is silenced. When it works again, "had no effect" would be taken for now. */
-  noteSilence(isSilenced: boolean): void {
-    if (this.isSilenced && !isSilenced && this.press?.heard === "silenced") this.press = null;
-    this.isSilenced = isSilenced;
   }
 
   /** To be called many times a second. */
@@ -96,6 +95,12 @@ export class StopSender {
       this.connection.send("control", text);
     }
     if (due.http) void this.sayOverHttp(press);
+  }
+
+  /** When the STOP of this page's link works again, "had no effect" would be taken for now. */
+  private noteSilence(isSilenced: boolean): void {
+    if (this.isSilenced && !isSilenced && this.press?.heard === "silenced") this.press = null;
+    this.isSilenced = isSilenced;
   }
 
   private async sayOverHttp(press: StopPress): Promise<void> {
