@@ -17,9 +17,8 @@ __all__ = ["PIECE", "READ_BURST", "READ_SHARE", "READ_TURN", "PacedTransport", "
 READ_SHARE = 0.25  # of the thread's time
 READ_BURST = 0.1  # s of it at once
 READ_TURN = 0.001  # s of it in one turn of the loop
-PIECE = (
-    4 << 10
-)  # bytes between two looks at the time, where messages are short; some thousand of them take a millisecond
+LONG_TURN = 0.01  # s of a turn that are made up for; more was somebody else's processor time
+PIECE = 4 << 10  # bytes between two looks at the time; a thousand of the shortest messages
 
 
 class ReadBudget:
@@ -73,7 +72,7 @@ class PacedTransport(LinkTransport):
         if self._transport is None:
             return
         if self._unread:  # a flood, so others come first, also where the thread itself gets little of its processor
-            wait = max(wait, (ended - since) * (1 / READ_SHARE - 1))
+            wait = max(wait, min(ended - since, LONG_TURN) * (1 / READ_SHARE - 1))
         if self._unread or wait > 0:
             self._transport.pause_reading()
             self._later = asyncio.get_running_loop().call_later(wait, self._read)
