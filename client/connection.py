@@ -49,7 +49,7 @@ RELAYED_HEARTBEAT = 5.0  # s, of an observer that nobody waits for
 LINE_HEARTBEAT = 15.0  # s, of one with a line, which loses nothing
 EARLY_PINGS = 5  # to know the path before the first command
 EARLY_PING = 0.05  # s between them
-STOP_SECONDS = 0.3  # for the stop to be confirmed before HTTP is tried as well
+STOP_SECONDS = 0.3  # for a channel to confirm a stop, before HTTP is tried as well or after HTTP has failed
 RETRY_SECONDS = 1.0  # while the robot is not reached yet; what the console's Retry-After says
 
 
@@ -254,8 +254,11 @@ class Connection:
     def _beat(self) -> float:
         if self._relay is not None:
             return LINE_HEARTBEAT if isinstance(self._peer, WatchLine) else RELAYED_HEARTBEAT
+        return OBSERVER_HEARTBEAT if self._is_observer() else HEARTBEAT
+
+    def _is_observer(self) -> bool:
         welcome = self.session.welcome
-        return OBSERVER_HEARTBEAT if welcome is not None and welcome.role == "observer" else HEARTBEAT
+        return welcome is not None and welcome.role == "observer"
 
     # What the console says
 
@@ -406,10 +409,8 @@ class Connection:
         """Raises StopUnconfirmed when neither the data channel nor HTTP brought the robot's answer."""
         press = secrets.token_hex(16)
         self._peer.send("stop", Stop(by=self.options.name, reason=reason, press=press))
-        try:
-            async with asyncio.timeout(STOP_SECONDS):
-                await self._until(lambda: self.session.confirmed(press) is not None)
-        except (TimeoutError, ConsoleLost):
+        # What an observer says on a channel may have to wait behind a crowd of others; a stop by HTTP waits for nobody.
+        if self._is_observer() or not await self._is_confirmed_soon(press):
             await self._stop_by_http(reason, press)
         if self._driver is not None:
             self._driver.hold_back("stopped")
@@ -418,9 +419,17 @@ class Connection:
             raise StopUnconfirmed(press, "the stop was not confirmed")
         return replace_struct(confirmed, by=confirmed.by or self.options.name, reason=confirmed.reason or reason)
 
+    async def _is_confirmed_soon(self, press: str) -> bool:
+        try:
+            async with asyncio.timeout(STOP_SECONDS):
+                await self._until(lambda: self.session.confirmed(press) is not None)
+        except (TimeoutError, ConsoleLost):
+            return False
+        return True
+
     async def _stop_by_http(self, reason: str, press: str) -> None:
         try:
             self.session.stop_taken(await self._peer.stop_by_http(reason, press))
         except ConsoleError as error:
-            if self.session.confirmed(press) is None:  # the channel may have said so meanwhile
+            if not await self._is_confirmed_soon(press):  # by the channel
                 raise StopUnconfirmed(press, f"the stop was not confirmed: {error}") from error

@@ -28,6 +28,7 @@ from robot_bridge.errors import (
 )
 from robot_bridge.link_tls import LinkTls
 from robot_bridge.liveness import LIMIT, Liveness
+from robot_bridge.mounts import is_in_memory
 from robot_bridge.protocol.errors import SecretError
 from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.robots.base import Robot
@@ -42,6 +43,8 @@ EXIT_FAILED = 1
 EXIT_USAGE = 2
 # Wrong however often it is tried; the rest may go away by itself, as a robot that is not switched on.
 CANNOT_BE_MEANT = (UnknownRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
+
+_logger = logging.getLogger(__name__)
 
 robot_app = typer.Typer(pretty_exceptions_enable=False)
 
@@ -108,6 +111,7 @@ def run(
             operator_grace=operator_grace,
             event_strip=event_strip,
         )
+        _warn_of_state(settings.state_dir)
         check_link(settings)  # before the robot is made, which can take long
         label, make = _choice(name, ros2, mjcf)
         uvloop.run(_serve(label, make, settings, as_json))
@@ -127,6 +131,17 @@ def _default_state_dir(ros2: Path | None, mjcf: Path | None, name: str, port: in
     file = ros2 or mjcf
     own = f"{name if file is None else file.stem}-{port}"
     return (Path(base) if os.path.isabs(base) else Path("~/.local/state").expanduser()) / "lockstep" / "bridges" / own
+
+
+def _warn_of_state(directory: Path | None) -> None:
+    """Where a latched stop does not last."""
+    if directory is None:
+        _logger.warning(
+            "a latched STOP is kept in memory only, and lost when this bridge ends: with --port 0 this may be any of "
+            "several bridges, so it has no state directory by default; give it one with --state-dir"
+        )
+    elif is_in_memory(directory if directory.exists() else directory.parent):
+        _logger.warning("a latched STOP is lost when this machine is switched off: %s is in memory", directory)
 
 
 def _secret(path: Path | None) -> LinkSecret | None:

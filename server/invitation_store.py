@@ -1,8 +1,10 @@
 """The invitations on disk. Several processes change them: consoles, and `lockstep invite` and `revoke` beside them."""
 
+import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TypeVar
 
 import msgspec
@@ -22,6 +24,7 @@ FILE = "invitations.json"
 ELSEWHERE = "revoked-elsewhere.json"
 SEEN = "newest-time.json"
 BEHIND_SECONDS = 60.0  # that a clock may be behind the newest time without a word
+HANGS_AFTER = 10.0  # s that a change may take; then nobody knows what other processes have revoked meanwhile
 MAX_ELSEWHERE = 5000  # links that other consoles revoked; those that would end first are forgotten first
 Result = TypeVar("Result")
 
@@ -59,6 +62,7 @@ class InvitationStore:
     def __init__(self, directory: StateDir) -> None:
         self._directory = directory
         self._busy = threading.Lock()
+        self._busy_since = math.inf  # s, when whoever holds it took it
         self.on_revoked: Callable[[], None] = _ignore
         self.trouble = ""
         seen = self._read_seen()
@@ -86,7 +90,7 @@ class InvitationStore:
 
     def keep_time(self) -> None:
         """Blocks: write down what time it is, for the next run."""
-        with self._busy, self._directory.locked():
+        with self._alone():
             self._write_seen()
 
     @property
@@ -131,7 +135,7 @@ class InvitationStore:
 
     def keep_revoked_elsewhere(self) -> list[Invitation]:
         """Blocks: write down what `revoked_elsewhere` was told, and end what was invited with those links."""
-        with self._busy, self._directory.locked():
+        with self._alone():
             known = {**self._read_elsewhere(), **self._elsewhere}
             now = self._write_seen()
             kept = _newest({link: expires for link, expires in known.items() if expires > now})
@@ -142,7 +146,7 @@ class InvitationStore:
 
     def update(self, change: Callable[[Invitations], Result]) -> Result:
         """Applies `change` to what is on disk now and writes it back; nothing is written when it raises."""
-        with self._busy, self._directory.locked():
+        with self._alone():
             known = self._read_known()
             result = change(known)
             known.prune(self._write_seen())
@@ -153,14 +157,14 @@ class InvitationStore:
 
     def refresh(self) -> list[Invitation]:
         """What another process has added or revoked since. While the list cannot be read, `trouble` says why."""
-        if not self._busy.acquire(blocking=False):
-            return []  # our own change is under way in a thread
+        if not self._busy.acquire(blocking=False):  # our own change is under way in a thread
+            if _steady() - self._busy_since > HANGS_AFTER:
+                self._tell_trouble("the disk does not answer", "a change of the list does not end")
+            return []
         try:
             found = self._refresh()
         except StateDirUnusable as error:
-            if error.reason != self.trouble:
-                log.error("it cannot be read which links are revoked; nobody is let in", detail=str(error))
-            self.trouble = error.reason
+            self._tell_trouble(error.reason, str(error))
             return []
         finally:
             self._busy.release()
@@ -168,6 +172,22 @@ class InvitationStore:
             log.warning("it can be read again which links are revoked")
             self.trouble = ""
         return found
+
+    def _tell_trouble(self, reason: str, detail: str) -> None:
+        if reason != self.trouble:
+            log.error("it cannot be read which links are revoked; nobody is let in", detail=detail)
+        self.trouble = reason
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Only one thread of one process is inside."""
+        with self._busy:
+            self._busy_since = _steady()
+            try:
+                with self._directory.locked():
+                    yield
+            finally:
+                self._busy_since = math.inf
 
     def _refresh(self) -> list[Invitation]:
         version = self._directory.version(FILE)

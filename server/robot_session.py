@@ -50,7 +50,7 @@ async def running_session(
     """
     with open_audit_log(directory, settings, robot, house.state.signer) as audit:
         async with (
-            _running_stops(settings, directory, stops) as keeper,
+            _running_stops(settings, house, directory, stops) as keeper,
             _session(settings, house, metrics, directory, robot, audit, keeper) as made,
         ):
             house.wardens.append(made.warden)
@@ -62,12 +62,12 @@ async def running_session(
 
 @asynccontextmanager
 async def _running_stops(
-    settings: Settings, directory: StateDir, stops: StopKeeper | None
+    settings: Settings, house: House, directory: StateDir, stops: StopKeeper | None
 ) -> AsyncIterator[StopKeeper]:
     if stops is not None:
         yield stops
         return
-    keeper = StopKeeper(directory.path, settings.robot)
+    keeper = StopKeeper(directory.path, settings.robot, lasts=house.state.lasts)
     await keeper.load()
     async with asyncio.TaskGroup() as tasks:
         running = tasks.create_task(keeper.run(), name="kept stops")

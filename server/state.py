@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import structlog
 
+from robot_bridge.mounts import is_in_memory
 from server.access import Access
 from server.evidence.signer import Signer, evidence_signer
 from server.invitation_store import FILE as INVITATIONS
@@ -23,6 +24,7 @@ class ConsoleState(NamedTuple):
     invitations: InvitationStore
     access: Access
     signer: Signer  # of the audit's heads and of recordings
+    lasts: bool = True  # False: what is kept here is gone when the console or its machine ends
 
     def signing_key(self, settings: Settings) -> str:
         """What everything is derived from that only this console may know."""
@@ -63,7 +65,7 @@ def open_state(settings: Settings, *, fall_back: bool = False) -> ConsoleState:
         if not fall_back or _is_used(path):
             raise
         log.error("nothing is remembered: links and the audit log end with this console", detail=str(error))
-    return _open(settings, Path(tempfile.mkdtemp(prefix="lockstep-")))
+    return _open(settings, Path(tempfile.mkdtemp(prefix="lockstep-")))._replace(lasts=False)
 
 
 def _is_used(path: Path) -> bool:
@@ -86,4 +88,4 @@ def _open(settings: Settings, path: Path) -> ConsoleState:
         trouble=lambda: invitations.trouble,
         now=invitations.now,
     )
-    return ConsoleState(directory, invitations, access, evidence_signer(directory))
+    return ConsoleState(directory, invitations, access, evidence_signer(directory), not is_in_memory(path))

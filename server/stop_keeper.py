@@ -9,11 +9,13 @@ import structlog
 from server.kept_stops import KeptStops, kept_stops_place
 from server.stop_presses import Press, StopPresses
 
-__all__ = ["StopKeeper"]
+__all__ = ["KEPT", "KEPT_IN_MEMORY", "StopKeeper"]
 
 log = structlog.get_logger(__name__)
 
 RETRY_SECONDS = 2.0  # after a write that failed
+KEPT = "the stop is kept and sent first when the link is back"
+KEPT_IN_MEMORY = "the stop is kept until this console ends and sent first when the link is back"
 WRITE_PATIENCE = 0.5  # s that whoever pressed waits for the disk
 
 
@@ -21,13 +23,18 @@ class StopKeeper:
     """Call `load`, then run `run` as a task. All else is called on the loop and returns at once, but for `written`.
 
     Attributes:
+        lasts: whether stops that are written outlive this console
         trouble: why stops cannot be written at present; "" when they can
         on_trouble: called with `trouble` whenever it changes
     """
 
-    def __init__(self, directory: Path, robot: str) -> None:
-        """`directory`: of the robot, within the state directory. `robot`: the bridge's address."""
+    def __init__(self, directory: Path, robot: str, *, lasts: bool = True) -> None:
+        """`directory`: of the robot, within the state directory. `robot`: the bridge's address.
+
+        `lasts`: whether what is in the directory outlives this console.
+        """
         self.presses = StopPresses()
+        self.lasts = lasts
         self.trouble = ""
         self.on_trouble: Callable[[str], None] = _ignore
         self._files = KeptStops(kept_stops_place(directory, robot))
@@ -59,6 +66,13 @@ class StopKeeper:
         """The robot has answered it, or another press has taken its place."""
         if self._wanted.pop(press, None) is not None or press in self._written:
             self._wake.set()
+
+    async def kept_words(self, press: str) -> str:
+        """Returns when a press that is kept is on the disk, or soon: how it is kept, for whoever pressed."""
+        unwritten = await self.written(press)
+        if unwritten:
+            return f"{KEPT_IN_MEMORY}; it is not on the console's disk ({unwritten})"
+        return KEPT if self.lasts else f"{KEPT_IN_MEMORY}; its state directory is a temporary one"
 
     async def written(self, press: str) -> str:
         """Returns when a press that is kept is on the disk, or soon: why it is not; "" when it is."""

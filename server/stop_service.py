@@ -39,7 +39,7 @@ from server.silenced_links import SilencedLinks
 from server.stop_keeper import StopKeeper
 from server.stop_presses import AlreadyTaken, NewPress, Press, Settled, told_id
 
-__all__ = ["KEPT", "SILENCED", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
+__all__ = ["SILENCED", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
 
 log = structlog.get_logger(__name__)
 
@@ -54,7 +54,6 @@ ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
 UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
 UNWRITTEN = "Stops cannot be kept on this console's disk ({}). They are kept in memory, until this console ends."
 WRITTEN = "Stops can be kept on this console's disk again."
-KEPT = "the stop is kept and sent first when the link is back"
 SILENCED = (
     "A supervisor has silenced the STOP of your link, and of all links that you invited with it, for ten minutes. "
     "What you stopped stays stopped."
@@ -231,10 +230,9 @@ class StopService:
             held = self._clock.stop
             return StopOutcome(press, taken, released=not held.stopped and held.number >= taken.number)
         self._keeper.keep(*(each for each in self._presses.pending if each.id == press))
-        unwritten = await self._keeper.written(press)
+        kept = await self._keeper.kept_words(press)
         why = "the robot has not confirmed it" if self._robot.up else "the robot cannot be told now"
-        where = f"; it is not on the console's disk ({unwritten})" if unwritten else ""
-        return StopOutcome(press, self._presses.outcome(press), f"{why}; {KEPT}{where}")
+        return StopOutcome(press, self._presses.outcome(press), f"{why}; {kept}")
 
     def _robot_may_answer(self, press: str) -> bool:
         return self._robot.up or press not in self._late

@@ -39,6 +39,7 @@ class StopAnswer(NamedTuple):
     event: int
     detail: str
     number: int = 0  # of the stop; 0 when it was not delivered
+    kept: bool = False  # on the robot's disk
 
 
 class SharedRecord(msgspec.Struct, frozen=True, kw_only=True):

@@ -120,6 +120,7 @@ class Outcome:
     event: Annotated[int, Field(ge=0, lt=2**31)]
     number: Annotated[int, Field(ge=0, lt=2**53)] = 0  # of the stop; 0 when it was not delivered
     detail: Words = ""  # why it was not delivered
+    kept: bool = False  # on the robot's disk; false also of a console that does not say
 
 
 @dataclass(frozen=True, kw_only=True)

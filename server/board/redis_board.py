@@ -295,7 +295,14 @@ class RedisBoard:
         press = new_press(Actor(request.by, request.role, "", request.link), "board", request.reason, request.press)
         answers = await asyncio.gather(*(self._host.stop_robot(robot, press) for robot in own))
         outcomes = tuple(
-            Outcome(robot=robot, delivered=each.delivered, event=each.event, number=each.number, detail=each.detail)
+            Outcome(
+                robot=robot,
+                delivered=each.delivered,
+                event=each.event,
+                number=each.number,
+                detail=each.detail,
+                kept=each.kept,
+            )
             for robot, each in zip(own, answers, strict=True)
         )
         self._desk.obeyed(request, outcomes)

@@ -26,7 +26,7 @@ class Asked:
             known = self.answers.get(each.robot)
             if each.robot in self.request.robots and (known is None or known.delivered):
                 detail = "" if each.delivered else each.detail or NOT_SAID
-                self.answers[each.robot] = StopAnswer(True, each.delivered, each.event, detail, each.number)
+                self.answers[each.robot] = StopAnswer(True, each.delivered, each.event, detail, each.number, each.kept)
         if len(self.answers) == len(self.request.robots):
             self.complete.set()
 

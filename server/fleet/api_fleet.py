@@ -61,6 +61,7 @@ class StoppedRobot(msgspec.Struct, frozen=True, kw_only=True):
     detail: str  # why it was not delivered
     number: int  # of the stop at that robot; 0 when it was not delivered
     console: str  # that has the robot; "" is this one
+    kept: bool  # on that robot's disk; false when it was not delivered
 
 
 class FleetStop(msgspec.Struct, frozen=True, kw_only=True):

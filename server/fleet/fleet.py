@@ -46,6 +46,7 @@ class Stopped(NamedTuple):
     detail: str  # why it was not delivered; "" when it was
     number: int = 0  # of the stop at that robot; 0 when it was not delivered
     console: str = ""  # that has the robot; "" is this one
+    kept: bool = False  # on that robot's disk
 
 
 class Fleet:
@@ -145,7 +146,7 @@ class Fleet:
             return [Stopped(name, False, 0, SILENCED, 0, console) for name, console in robots.items()]
         answers = await self.board.stop(robots.keys(), press)
         return [
-            Stopped(name, answer.delivered, answer.event, answer.detail, answer.number, robots[name])
+            Stopped(name, answer.delivered, answer.event, answer.detail, answer.number, robots[name], answer.kept)
             for name, answer in answers.items()
         ]
 
@@ -159,7 +160,7 @@ class Fleet:
             self.metrics.faults.caught("stop", error, robot=session.name)
             return Stopped(session.name, False, 0, UNREADABLE)
         outcome = answer.outcome
-        return Stopped(session.name, outcome.delivered, answer.event, outcome.detail, outcome.number)
+        return Stopped(session.name, outcome.delivered, answer.event, outcome.detail, outcome.number, kept=outcome.kept)
 
     # BoardHost
 
@@ -169,7 +170,7 @@ class Fleet:
         if session is None:
             return StopAnswer(True, False, 0, "that console does not have this robot")
         stopped = await self._stop(session, press)
-        return StopAnswer(True, stopped.delivered, stopped.event, stopped.detail, stopped.number)
+        return StopAnswer(True, stopped.delivered, stopped.event, stopped.detail, stopped.number, stopped.kept)
 
     def silences(self) -> dict[str, float]:
         return {} if self._house is None else self._house.silences()

@@ -23,7 +23,7 @@ from server.settings import Settings
 from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
 from server.stop_presses import AlreadyTaken, NewPress, Press
-from server.stop_service import KEPT, SILENCED, StopAnswer, StopOutcome
+from server.stop_service import SILENCED, StopAnswer, StopOutcome
 
 __all__ = ["FleetSession"]
 
@@ -96,10 +96,7 @@ class FleetSession:
         if isinstance(pressed, NewPress) and pressed.replaced is not None:
             stops.settled(pressed.replaced.id)
         stops.keep(press)
-        unwritten = await stops.written(press.id)
-        detail = f"the session of this robot has failed; {KEPT}"
-        if unwritten:
-            detail += f"; it is not on the console's disk ({unwritten})"
+        detail = f"the session of this robot has failed; {await stops.kept_words(press.id)}"
         return StopAnswer(StopOutcome(press.id, None, detail), 0, up=False)
 
     async def run(
@@ -108,7 +105,7 @@ class FleetSession:
         """Until cancelled. `told` hears every record of its audit."""
         self.app.state.house = self._house = house
         self._access = house.state.access.at(self.name)
-        stops = self._stops = StopKeeper(directory, self.settings.robot)
+        stops = self._stops = StopKeeper(directory, self.settings.robot, lasts=house.state.lasts)
         self.app.state.stop_keeper = self
         name_robot(self.name)
         await stops.load()

@@ -1,6 +1,7 @@
 """The overview of a fleet in Chromium: three simulated robots of one console."""
 
 import asyncio
+import os
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -94,6 +95,22 @@ async def test_every_robot_has_a_live_tile_behind_its_gate_that_leads_to_its_pag
         await page.get_by_role("link", name="All robots").click()
         await until(page, f"s.robots.length === {len(NAMES)}")
         assert page.url == fleet.operator
+
+
+async def test_stop_all_says_which_robot_is_stopped_and_has_not_saved_that(
+    fleet: Stack, chromium: Browser, tmp_path: Path
+) -> None:
+    (place,) = tmp_path.glob("**/bridges/left-*")  # noqa: ASYNC240
+    (place / "stop.new").mkdir()  # where the bridge writes its stop
+    async with open_page(chromium, fleet.observer) as page:
+        await until(page, "s.robots.length === 3 && s.robots.every((x) => x.state === 'free')")
+        await page.get_by_role("button", name="STOP ALL").click()
+        answer = page.get_by_role("alert")
+        await expect(answer).to_contain_text("All 3 robots are stopped, 1 NOT SAVED")
+        await expect(answer.get_by_role("listitem")).to_have_text(["left: stopped, but NOT SAVED on its disk"])
+        await expect(answer).to_contain_text("may move again when it restarts")
+        if os.environ.get("SHOT"):
+            await page.screenshot(path=os.environ["SHOT"])
 
 
 async def test_a_robot_that_is_away_says_so_first_and_stop_reaches_the_others(fleet: Stack, chromium: Browser) -> None:

@@ -43,6 +43,8 @@ async def test_it_prints_its_address_once_ready_and_leaves_cleanly(how: signal.S
     assert process.returncode == 0, err.decode()
     assert out == b""
     assert b"Traceback" not in err
+    assert b"a latched STOP is kept in memory only" in err, "said plainly, and why"
+    assert b"--state-dir" in err
     assert json.loads(log.read_text().splitlines()[0])["kind"] == "start"
 
 
@@ -61,6 +63,17 @@ async def test_what_is_printed_after_the_address_holds_up_nothing_when_nobody_re
     finally:
         process.terminate()
         await process.wait()
+
+
+@pytest.mark.parametrize("state", [[], ["--state-dir", "DIR"]])
+def test_a_state_directory_that_is_gone_with_the_machine_is_said_to_be(
+    state: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(cli, "is_in_memory", lambda directory: True)
+    given = [str(tmp_path) if each == "DIR" else each for each in state]
+    CliRunner().invoke(cli.robot_app, ["tractor", "--port", "5611", *given])
+    assert "lost when this machine is switched off" in caplog.text
 
 
 def test_an_unknown_robot_is_answered_with_those_there_are() -> None:

@@ -1,10 +1,13 @@
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
 import pytest
 import structlog
 
+from server import invitation_store
 from server.access import Identity
 from server.errors import LinkExpired, LinkRevoked
 from server.invitation_store import ELSEWHERE, FILE, InvitationStore
@@ -260,3 +263,31 @@ def test_of_two_processes_the_later_time_is_kept(directory: StateDir, monkeypatc
     other.keep_time()
     assert other.now() > time.time() + YEAR - HOUR
     assert InvitationStore(directory).now() > time.time() + YEAR - HOUR
+
+
+def test_a_change_that_does_not_end_is_trouble_after_a_while_since_nobody_knows_what_others_revoked_meanwhile(
+    directory: StateDir, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, hangs, ends = InvitationStore(directory), threading.Event(), threading.Event()
+
+    def hang(known: Invitations) -> Invitation:
+        hangs.set()
+        ends.wait()
+        return _invite(known)
+
+    with ThreadPoolExecutor(1) as thread:
+        made = thread.submit(store.update, hang)
+        try:
+            assert hangs.wait(10)
+            assert store.refresh() == []
+            assert not store.trouble, "a disk may be slow"
+            monkeypatch.setattr(invitation_store, "HANGS_AFTER", 0.0)
+            with structlog.testing.capture_logs() as logs:
+                assert store.refresh() == store.refresh() == []
+            assert store.trouble == "the disk does not answer"
+            assert [each["log_level"] for each in logs] == ["error"], "shouted once"
+        finally:
+            ends.set()
+        made.result()
+    store.refresh()
+    assert not store.trouble

@@ -8,7 +8,7 @@ import pytest
 from robot_bridge.protocol.messages import StopTaken
 from server import stop_keeper
 from server.kept_stops import KeptStops
-from server.stop_keeper import StopKeeper
+from server.stop_keeper import KEPT, KEPT_IN_MEMORY, StopKeeper
 from server.stop_presses import Press
 from tests.server.rig import PATIENCE
 
@@ -110,3 +110,13 @@ async def test_a_disk_that_hangs_holds_up_nobody_who_pressed_for_long(
     keeper = StopKeeper(tmp_path, ROBOT)  # nobody runs it
     keeper.keep(_pressed(keeper, "a"))
     assert await keeper.written("a") == "the disk has not answered"
+
+
+async def test_whoever_pressed_is_told_how_long_a_stop_is_kept(tmp_path: Path) -> None:
+    async with _running(tmp_path) as keeper:
+        for lasts, words in ((True, KEPT), (False, f"{KEPT_IN_MEMORY}; its state directory is a temporary one")):
+            keeper.lasts = lasts
+            press = _pressed(keeper, f"press {lasts}")
+            keeper.keep(press)
+            assert await keeper.kept_words(press.id) == words
+            assert "until this console ends" in words or lasts

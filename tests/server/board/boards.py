@@ -47,7 +47,7 @@ class FakeHost:
         self.presses.append(press.id)
         if name in self.away:
             return StopAnswer(True, False, 7, "the robot cannot be told now; it is sent first when the link is back")
-        return StopAnswer(True, True, 7, "", 3)
+        return StopAnswer(True, True, 7, "", 3, kept=True)
 
     def links_revoked(self, ended: list[Invitation]) -> None:
         self.ended += ended

@@ -52,7 +52,7 @@ async def test_a_stop_reaches_the_robot_of_another_console_once_and_is_answered(
         one.host.away.add("right")
         answers = await two.stop(["left", "right"], new_press(ANN, "http", "smoke", PRESS))
         assert one.host.stops == [("left", "Ann", "smoke"), ("right", "Ann", "smoke")]
-        assert answers["left"] == (True, True, 7, "", 3)
+        assert answers["left"] == (True, True, 7, "", 3, True)
         assert one.host.presses == [PRESS, PRESS], "the press of whoever asked"
         assert (answers["right"].confirmed, answers["right"].delivered) == (True, False)
         assert "sent first when the link is back" in answers["right"].detail

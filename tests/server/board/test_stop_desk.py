@@ -51,7 +51,7 @@ def test_a_request_that_nobody_waits_for_any_more_is_forgotten() -> None:
 
 def test_a_repeat_is_answered_and_not_obeyed_again_as_long_as_it_is_remembered() -> None:
     desk, first = StopDesk(), request(1, "left")
-    outcomes = (Outcome(robot="left", delivered=True, event=1, number=4),)
+    outcomes = (Outcome(robot="left", delivered=True, event=1, number=4, kept=True),)
     assert desk.is_new(first)
     assert not desk.is_new(first)
     assert desk.outcomes(first) == (), "it is being carried out"
@@ -67,11 +67,11 @@ def test_the_number_of_a_stop_and_why_it_was_not_delivered_come_from_its_console
     desk = StopDesk()
     asked = desk.ask(request(1, "left", "right"))
     outcomes = (
-        Outcome(robot="left", delivered=True, event=1, number=4),
+        Outcome(robot="left", delivered=True, event=1, number=4, kept=True),
         Outcome(robot="right", delivered=False, event=0, detail="silenced"),
     )
     desk.replied(StopReply(console=ID, request=asked.request.request, robots=outcomes))
     assert asked.answers == {
-        "left": StopAnswer(True, True, 1, "", 4),
+        "left": StopAnswer(True, True, 1, "", 4, kept=True),
         "right": StopAnswer(True, False, 0, "silenced"),
     }

@@ -1,9 +1,14 @@
 """STOP for all robots of a console."""
 
+from pathlib import Path
+
 import pytest
 
+from robot_bridge.bridge import Bridge
 from robot_bridge.protocol.console import Notice, SilenceStops
 from robot_bridge.protocol.messages import Refusal, Stop
+from robot_bridge.robots.registry import create_robot
+from robot_bridge.settings import BridgeSettings
 from server.app import attach_session
 from server.fleet.tiles import UNREADABLE
 from tests.server.fleet.rig import running_fleet, running_fleet_rig
@@ -108,3 +113,16 @@ async def test_who_is_silenced_at_one_robot_is_silenced_at_all_with_every_link_t
         finally:
             await peer.close()
             await guest.close()
+
+
+async def test_a_stop_for_all_says_which_robot_has_saved_it(tmp_path: Path) -> None:
+    robot = create_robot("planar")
+    async with (
+        Bridge(robot, BridgeSettings(port=0, state_dir=tmp_path)) as saves,
+        running_bridge() as forgets,
+        running_fleet({"saves": saves.address[1], "forgets": forgets.address[1]}) as rig,
+    ):
+        await rig.all_reached()
+        answer = await rig.http.post("/api/fleet/stop", headers=rig.token("observer"))
+        found = {each["name"]: (each["delivered"], each["kept"]) for each in answer.json()["robots"]}
+        assert found == {"saves": (True, True), "forgets": (True, False)}

@@ -45,6 +45,7 @@ export interface FleetAnswer {
 export interface StopReply {
   readonly name: string;
   readonly delivered: boolean;
+  readonly kept: boolean; // on that robot's disk
   readonly detail: string;
 }
 
@@ -67,7 +68,14 @@ export function parseStopReplies(value: unknown): readonly StopReply[] | null {
   if (!isRecord(value) || !Array.isArray(value["robots"])) return null;
   return list(value["robots"]).flatMap((each) =>
     isRecord(each) && text(each["name"]) !== ""
-      ? [{ name: text(each["name"]), delivered: each["delivered"] === true, detail: text(each["detail"]) }]
+      ? [
+          {
+            name: text(each["name"]),
+            delivered: each["delivered"] === true,
+            kept: each["kept"] === true,
+            detail: text(each["detail"]),
+          },
+        ]
       : [],
   );
 }

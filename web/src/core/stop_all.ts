@@ -5,8 +5,11 @@ const REPEAT_MS = 1000;
 const DOUBT_AFTER_MS = 3000;
 const GIVE_UP_MS = 60_000;
 
-/** What became of a press at one robot. `stopped`: that robot confirmed this press; `kept`: it was not delivered. */
-export type StopFate = "stopped" | "kept" | "asking";
+/**
+ * What became of a press at one robot. `stopped`: that robot confirmed this press, `unsaved`: it has, and its disk has not;
+ * `kept`: it was not delivered, and the console keeps it.
+ */
+export type StopFate = "stopped" | "unsaved" | "kept" | "asking";
 
 /** One press of STOP ALL, until every robot has confirmed it or nobody waits any more. */
 export interface StopAll {
@@ -49,7 +52,7 @@ export function pressStopAll(stop: StopAll, press: string, names: readonly strin
 export function stepStopAll(stop: StopAll, now: number): boolean {
   if (stop.pressedMs === null || stop.isOver) return false;
   const fates = [...stop.fates.values()];
-  if (stop.answered && fates.every(({ fate }) => fate === "stopped")) stop.isOver = true;
+  if (stop.answered && fates.every(({ fate }) => isStopped(fate))) stop.isOver = true;
   else if (now - stop.pressedMs > GIVE_UP_MS) stop.isOver = true;
   else if (now - stop.pressedMs > DOUBT_AFTER_MS) stop.isDoubtful = true;
   if (stop.isOver || now < stop.nextMs) return false;
@@ -62,9 +65,15 @@ export function tookStopReplies(stop: StopAll, press: string, replies: readonly 
   if (stop.pressedMs === null || stop.press !== press) return;
   stop.answered = true;
   stop.failure = "";
-  for (const { name, delivered, detail } of replies)
-    if (stop.fates.get(name)?.fate !== "stopped")
-      stop.fates.set(name, { fate: delivered ? "stopped" : "kept", detail });
+  for (const { name, delivered, kept, detail } of replies) {
+    const known = stop.fates.get(name)?.fate;
+    if (known === "stopped" || (known === "unsaved" && !(delivered && kept))) continue;
+    stop.fates.set(name, { fate: delivered ? (kept ? "stopped" : "unsaved") : "kept", detail });
+  }
+}
+
+function isStopped(fate: StopFate): boolean {
+  return fate === "stopped" || fate === "unsaved";
 }
 
 export function stopFailed(stop: StopAll, press: string, why: string): void {
@@ -89,6 +98,7 @@ export interface StopWords {
   readonly title: string;
   readonly stopped: readonly string[]; // names
   readonly missing: readonly { readonly name: string; readonly detail: string }[];
+  readonly unsaved: readonly string[]; // names, of those that are stopped
   readonly advice: string; // what to do
 }
 
@@ -96,23 +106,26 @@ export interface StopWords {
 export function stopAllWords(stop: StopAll): StopWords | null {
   if (stop.pressedMs === null) return null;
   const all = [...stop.fates];
-  const stopped = all.filter(([, { fate }]) => fate === "stopped").map(([name]) => name);
+  const stopped = all.filter(([, { fate }]) => isStopped(fate)).map(([name]) => name);
+  const unsaved = all.filter(([, { fate }]) => fate === "unsaved").map(([name]) => name);
   const missing = all
-    .filter(([, { fate }]) => fate !== "stopped")
+    .filter(([, { fate }]) => !isStopped(fate))
     .map(([name, { fate, detail }]) => ({ name, detail: fateWords(fate, detail) }));
-  const words = { stopped, missing };
+  const words = { stopped, missing, unsaved };
   const isLate = stop.isOver || stop.isDoubtful;
   if (!stop.answered && isLate && stopped.length === 0)
     return { tone: "bad", title: "STOP is not confirmed", ...words, advice: unansweredWords(stop) };
   if (missing.length === 0 && stop.answered)
     return {
-      tone: "done",
-      title: all.length === 1 ? "The robot is stopped" : `All ${robotsWords(all.length)} are stopped`,
+      tone: unsaved.length === 0 ? "done" : "bad",
+      title: `${all.length === 1 ? "The robot is stopped" : `All ${robotsWords(all.length)} are stopped`}${notSavedWords(unsaved.length, all.length)}`,
       ...words,
       advice:
         all.length === 0
           ? "This link is good for no robot."
-          : "Each is reset on its own page. A reset moves nothing.",
+          : unsaved.length > 0
+            ? UNSAVED_ADVICE
+            : "Each is reset on its own page. A reset moves nothing.",
     };
   const counted = `${stopped.length} of ${robotsWords(all.length)} stopped`;
   const isKept = all.some(([, { fate }]) => fate === "kept");
@@ -124,9 +137,17 @@ export function stopAllWords(stop: StopAll): StopWords | null {
     tone: "bad",
     title: counted,
     ...words,
-    advice: `${stop.failure === "" ? "" : `${stop.failure} `}Stop the others by their own emergency stops. ${nextWords(stop)}`,
+    advice: `${stop.failure === "" ? "" : `${stop.failure} `}Stop the others by their own emergency stops. ${nextWords(stop)}${unsaved.length > 0 ? ` ${UNSAVED_ADVICE}` : ""}`,
   };
 }
+
+function notSavedWords(unsaved: number, all: number): string {
+  if (unsaved === 0) return "";
+  return unsaved === all ? ", NOT SAVED" : `, ${unsaved} NOT SAVED`;
+}
+
+const UNSAVED_ADVICE =
+  "A robot that has not saved its stop may move again when it restarts. Switch it off by its hardware stop.";
 
 function fateWords(fate: StopFate, detail: string): string {
   if (fate === "asking") return "not answered yet";

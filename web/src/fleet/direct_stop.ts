@@ -24,7 +24,8 @@ export class DirectStop {
     try {
       const api = new ConsoleApi(this.token, url);
       const answer = await stopAnswerOf(api.stop(reason, press), press);
-      if (answer.kind === "taken") this.confirmed(press, { name, delivered: true, detail: "" });
+      if (answer.kind === "taken")
+        this.confirmed(press, { name, delivered: true, kept: answer.kept, detail: "" });
     } finally {
       this.asking.delete(name);
     }

@@ -52,9 +52,10 @@ function createAnswer(events: StopBarEvents): Answer {
   const title = h("strong", "answer-title");
   const advice = h("p", "answer-advice");
   const missing = h("ul", "answer-missing");
+  const unsaved = h("ul", "answer-missing");
   const stopped = h("p", "answer-stopped");
   const close = button("field-button", "Close", () => events.putAway());
-  const said = h("div", "answer", { role: "alert" }, title, advice, missing, stopped);
+  const said = h("div", "answer", { role: "alert" }, title, advice, missing, unsaved, stopped);
   const idle = h("p", "answer-idle muted");
   setText(
     idle,
@@ -72,15 +73,21 @@ function createAnswer(events: StopBarEvents): Answer {
       setText(title, words.title);
       setText(advice, words.advice);
       setHidden(advice, words.advice === "");
-      showMissing(missing, words.missing);
+      showLines(
+        missing,
+        words.missing.map(({ name, detail }) => `${name}: ${detail}`),
+      );
+      showLines(
+        unsaved,
+        words.unsaved.map((name) => `${name}: stopped, but NOT SAVED on its disk`),
+      );
       setText(stopped, words.stopped.length === 0 ? "" : `Stopped: ${words.stopped.join(", ")}`);
     },
   };
 }
 
 /** Rebuilt only when it says something else: it is read out when it changes. */
-function showMissing(element: HTMLElement, missing: StopWords["missing"]): void {
-  const lines = missing.map(({ name, detail }) => `${name}: ${detail}`);
+function showLines(element: HTMLElement, lines: readonly string[]): void {
   setHidden(element, lines.length === 0);
   if (lines.join("\n") === [...element.children].map((each) => each.textContent).join("\n")) return;
   element.replaceChildren(...lines.map((line) => h("li", "", {}, line)));

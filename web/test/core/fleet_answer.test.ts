@@ -91,13 +91,13 @@ describe("the fleet's answer", () => {
 
   it("says what became of a stop at each robot", () => {
     const robots = [
-      { name: "a", delivered: true, event: 3, detail: "" },
+      { name: "a", delivered: true, kept: true, event: 3, detail: "" },
       { name: "b", delivered: "yes", detail: "no link" },
       { delivered: true },
     ];
     expect(parseStopReplies({ robots })).toEqual([
-      { name: "a", delivered: true, detail: "" },
-      { name: "b", delivered: false, detail: "no link" },
+      { name: "a", delivered: true, kept: true, detail: "" },
+      { name: "b", delivered: false, kept: false, detail: "no link" },
     ]);
     expect(parseStopReplies({ delivered: true })).toBeNull();
   });

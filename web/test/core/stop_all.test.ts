@@ -13,7 +13,8 @@ import {
 import { robotOf } from "./fleets";
 
 const STOPPED = { stopped: true, stop_by: "Ann" };
-const replies = (...names: string[]) => names.map((name) => ({ name, delivered: true, detail: "" }));
+const replies = (...names: string[]) =>
+  names.map((name) => ({ name, delivered: true, kept: true, detail: "" }));
 
 const PRESS = "ab12";
 
@@ -58,7 +59,9 @@ describe("STOP ALL", () => {
   it("stays confirmed when another way did not get through", () => {
     const stop = pressed("a");
     tookStopReplies(stop, PRESS, replies("a"));
-    tookStopReplies(stop, PRESS, [{ name: "a", delivered: false, detail: "the board is silent" }]);
+    tookStopReplies(stop, PRESS, [
+      { name: "a", delivered: false, kept: false, detail: "the board is silent" },
+    ]);
     expect(stopAllWords(stop)?.stopped).toEqual(["a"]);
   });
 
@@ -66,8 +69,8 @@ describe("STOP ALL", () => {
     const stop = pressed("a", "b", "c");
     tookStopReplies(stop, PRESS, [
       ...replies("a"),
-      { name: "b", delivered: false, detail: "no answer from hall-b" },
-      { name: "c", delivered: false, detail: "" },
+      { name: "b", delivered: false, kept: false, detail: "no answer from hall-b" },
+      { name: "c", delivered: false, kept: false, detail: "" },
     ]);
     const words = stopAllWords(stop);
     expect(words).toMatchObject({ tone: "bad", title: "1 of 3 robots stopped", stopped: ["a"] });
@@ -76,6 +79,32 @@ describe("STOP ALL", () => {
       { name: "c", detail: "not delivered: it is kept and sent first when the robot is back" },
     ]);
     expect(words?.advice).toContain("emergency stops");
+  });
+
+  it("says which robots are stopped and have not saved that, and what to do", () => {
+    const stop = pressed("a", "b");
+    tookStopReplies(stop, PRESS, [{ name: "b", delivered: true, kept: false, detail: "" }]);
+    tookStopReplies(stop, PRESS, replies("a"));
+    expect(stepStopAll(stop, 2000)).toBe(false);
+    const words = stopAllWords(stop);
+    expect(words).toMatchObject({ tone: "bad", title: "All 2 robots are stopped, 1 NOT SAVED", missing: [] });
+    expect(words).toMatchObject({ stopped: ["a", "b"], unsaved: ["b"] });
+    expect(words?.advice).toMatch(/may move again when it restarts/);
+    tookStopReplies(stop, PRESS, [{ name: "b", delivered: false, kept: false, detail: "" }]);
+    expect(stopAllWords(stop)?.unsaved).toEqual(["b"]);
+    tookStopReplies(stop, PRESS, replies("b"));
+    expect(stopAllWords(stop)).toMatchObject({ tone: "done", title: "All 2 robots are stopped" });
+  });
+
+  it("says so of the stopped ones while others are not, too", () => {
+    const stop = pressed("a", "b");
+    tookStopReplies(stop, PRESS, [
+      { name: "a", delivered: true, kept: false, detail: "" },
+      { name: "b", delivered: false, kept: false, detail: "no link" },
+    ]);
+    const words = stopAllWords(stop);
+    expect(words).toMatchObject({ tone: "bad", title: "1 of 2 robots stopped", unsaved: ["a"] });
+    expect(words?.advice).toMatch(/Stop the others .* may move again when it restarts/);
   });
 
   it("says after three seconds that nobody confirmed it, goes on for a minute, and then asks to press again", () => {

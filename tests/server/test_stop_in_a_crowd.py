@@ -1,0 +1,49 @@
+"""An observer's STOP while a crowd of observers has more to say than the console can hear."""
+
+import asyncio
+
+import pytest
+
+from robot_bridge.protocol.messages import Stop, StopTaken
+from server.loop_turns import turns_of_loop
+from tests.server.rig import PATIENCE, running_rig
+
+CROWD = 200
+PRESS = "5f" * 16
+
+
+class _Talker:
+    """An observer of whom there is always another datagram."""
+
+    def __init__(self) -> None:
+        self.handled = 0
+        self.goes_on = True
+
+    def handle_next(self) -> bool:
+        self.handled += 1
+        return self.goes_on
+
+
+async def test_it_waits_behind_the_crowd_on_its_channel_and_for_nobody_over_http_and_is_one_stop(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What the page does: it says each press on its channels and over HTTP at the same moment."""
+    crowd = [_Talker() for _ in range(CROWD)]
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        turns = rig.services.media._turns
+        monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)  # one datagram in each turn of the loop
+        for each in crowd:
+            turns.add(each)
+        before = sum(each.handled for each in crowd)
+        peer.send("stop", Stop(press=PRESS))
+        answer = await rig.http.post("/api/stop", headers=peer.headers, json={"press": PRESS})
+        rounds = (sum(each.handled for each in crowd) - before) / CROWD
+        assert (answer.status_code, answer.json()["press"]) == (200, PRESS)
+        assert rounds < 3, "turns of the loop that an answer over HTTP takes, not turns of the crowd"
+        assert rig.services.console.peers.taken == 1
+        for each in crowd:
+            each.goes_on = False
+        async with asyncio.timeout(PATIENCE):
+            taken = await peer.until(lambda each: isinstance(each, StopTaken))
+        assert isinstance(taken, StopTaken)
+        assert (taken.press, taken.number) == (PRESS, answer.json()["number"])
