@@ -1,6 +1,7 @@
 """Host names, and requests of an address; over real HTTP where the console's own answer matters."""
 
 import asyncio
+import time
 from collections import Counter
 from collections.abc import Callable
 
@@ -163,11 +164,13 @@ async def test_nothing_else_that_looks_like_a_stop_passes_the_limits(path: str, 
 async def test_one_link_that_floods_the_stop_loads_nobody_and_the_stops_of_others_are_answered() -> None:
     async with running_rig(max_request_burst=5, max_request_rate=0.001) as rig:
         flood, other = rig.token("observer"), rig.token("observer")
+        since = time.monotonic()
         asked = [rig.http.post("/api/stop", headers=flood) for _ in range(200)]
         codes = Counter([answer.status_code for answer in await asyncio.gather(*asked)])
-        assert set(codes) == {200, 429}
+        took = time.monotonic() - since
+        assert codes.total() == codes[200] + codes[429]
         assert rig.count("lockstep_stops_total", where="http") == codes[200]
-        assert codes[429] > 100, "twenty at once, twenty in each second that this took, and five of the address"
+        assert codes[200] <= STOP_BURST + STOP_RATE * took + 5, "however long this took; five are those of the address"
         assert (await rig.http.post("/api/stop", headers=other)).status_code == 200
 
 
