@@ -1,7 +1,6 @@
 """The overview of a fleet in Chromium: three simulated robots of one console."""
 
 import asyncio
-import os
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -109,8 +108,6 @@ async def test_stop_all_says_which_robot_is_stopped_and_has_not_saved_that(
         await expect(answer).to_contain_text("All 3 robots are stopped, 1 NOT SAVED")
         await expect(answer.get_by_role("listitem")).to_have_text(["left: stopped, but NOT SAVED on its disk"])
         await expect(answer).to_contain_text("may move again when it restarts")
-        if os.environ.get("SHOT"):
-            await page.screenshot(path=os.environ["SHOT"])
 
 
 async def test_a_robot_that_is_away_says_so_first_and_stop_reaches_the_others(fleet: Stack, chromium: Browser) -> None:
