@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from robot_bridge.robots.mujoco_view.graphics import choose_graphics
 
 choose_graphics()  # before a test file imports mujoco
 
-settings.register_profile("any-machine", deadline=None)  # no test asserts a time
-settings.load_profile("any-machine")
+settings.register_profile("any-machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any-machine")  # no test asserts a time
 
 
 ROOT = Path(__file__).parents[1]
