@@ -105,6 +105,18 @@ async def test_strangers_that_say_nothing_or_owe_the_proof_keep_nobody_out(begin
                 writer.close()
 
 
+async def test_an_address_with_many_strangers_takes_no_place_from_another() -> None:
+    async with bridge_with(SECRET, max_strangers=3) as bridge:
+        patient = await asyncio.open_connection(*bridge.address)
+        many = [await asyncio.open_connection(*bridge.address, local_addr=("127.0.0.2", 0)) for _ in range(9)]
+        await happens(lambda: bridge.counters.endings["full"] == 7)
+        patient[1].write(frame(encode_message(Hello(role="operator", nonce=b"n" * 32))))
+        async with asyncio.timeout(PATIENCE):
+            assert b"challenge" in await patient[0].read(64)
+        for _, writer in (patient, *many):
+            writer.transport.abort()
+
+
 async def test_connections_are_accepted_at_a_bounded_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link_acceptor, "BURST", 2)
     monkeypatch.setattr(link_acceptor, "RATE", 0.001)

@@ -27,6 +27,14 @@ def test_of_one_key_only_the_newest_waits_and_the_others_are_counted() -> None:
     assert outbox.drops == {"feedback": 2}
 
 
+def test_a_newer_one_waits_behind_what_was_put_in_before_it() -> None:
+    """Of STOP, RESET, STOP the last is what the other side hears last."""
+    outbox: NewestOutbox[str, str] = NewestOutbox()
+    for key, item in (("stop", "first"), ("reset", "reset"), ("stop", "second")):
+        outbox.put(key, item)
+    assert [outbox.pop(), outbox.pop(), outbox.pop()] == ["reset", "second", None]
+
+
 def test_of_one_camera_only_the_newest_picture_waits() -> None:
     outbox: MediaOutbox[int] = MediaOutbox()
     for stamp in (1, 2, 3):
