@@ -42,7 +42,10 @@ async def node(tmp_path: Path) -> AsyncIterator[RosRobot]:
 
 @pytest.fixture
 async def bridge(tmp_path: Path, node: RosRobot) -> AsyncIterator[RosBridge]:
-    async with running_ros_bridge(tmp_path, node, EXAMPLES / "base.yaml") as running:
+    """A base whose watchdog lets a busy machine be slow: it would take a neutral command more."""
+    settings = tmp_path / "base.yaml"
+    settings.write_text((EXAMPLES / "base.yaml").read_text() + "\nwatchdog: 0.4\n")
+    async with running_ros_bridge(tmp_path, node, settings) as running:
         yield running
 
 
@@ -266,7 +269,7 @@ async def test_an_arm_is_driven_a_short_way_ahead_and_told_to_stay_once(tmp_path
 async def test_plain_twists_and_joint_states_are_spoken_too(tmp_path: Path, node: RosRobot) -> None:
     settings = tmp_path / "both.yaml"
     settings.write_text(
-        "name: both\n"
+        "name: both\nhold: 0.5\nwatchdog: 0.4\n"
         "base:\n  forward: {maximum: 0.5}\n  turn: {maximum: 1}\n"
         "  command: {topic: /cmd_vel_plain, message: Twist}\n"
         "arm:\n  command: {topic: /joint_command, message: JointState}\n  joints:\n"
