@@ -12,7 +12,8 @@ from server.request_turns import RequestTurns
 
 __all__ = ["PROXIES", "Acceptor", "PlacedProtocol"]
 
-PROXIES = frozenset({"127.0.0.1", "::1"})  # whose X-Forwarded-For is believed; uvicorn's default too
+# Whose X-Forwarded-For is believed: uvicorn's default, and how IPv4 looks to a socket of both families.
+PROXIES = frozenset({"127.0.0.1", "::1", "::ffff:127.0.0.1"})
 HANDSHAKE_SECONDS = 5.0  # for TLS
 ACCEPT = "accept"  # whose turns those of new connections are
 PAUSE = 0.1  # s, when there is no descriptor left

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 import signal
 import socket
 from collections.abc import AsyncIterator, Iterator
@@ -11,7 +12,7 @@ from typing import Any, cast
 import uvicorn
 from starlette.applications import Starlette
 
-from server.acceptor import Acceptor, PlacedProtocol
+from server.acceptor import PROXIES, Acceptor, PlacedProtocol
 from server.guarded_http import GuardedConnections
 from server.guarded_websocket import GuardedWebSocket
 from server.tls import Certificate
@@ -123,6 +124,7 @@ async def running(
         lifespan="on",
         ws=GuardedWebSocket,
         ws_max_size=MAX_WEBSOCKET_MESSAGE,
+        forwarded_allow_ips=os.environ.get("FORWARDED_ALLOW_IPS") or sorted(PROXIES),
         timeout_graceful_shutdown=SHUTDOWN_TIMEOUT,
         server_header=False,
         http="h11" if http is None else http.protocol,

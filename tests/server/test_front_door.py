@@ -231,8 +231,9 @@ async def test_a_stop_does_not_wait_for_the_turn_of_others() -> None:
     assert sorted(order) == sorted(paths)
 
 
-async def test_an_address_that_a_proxy_forwards_is_the_one_that_counts_and_nobody_elses_word_is() -> None:
-    async with running_rig(max_request_burst=2, max_request_rate=0.001) as rig:
+@pytest.mark.parametrize("host", ["127.0.0.1", "::"])
+async def test_an_address_that_a_proxy_forwards_is_the_one_that_counts_and_nobody_elses_word_is(host: str) -> None:
+    async with running_rig(host=host, max_request_burst=2, max_request_rate=0.001) as rig:
         for address in ("192.0.2.1", "192.0.2.2", "2001:db8::1"):
             ask = {"X-Forwarded-For": address}
             assert [(await rig.http.get("/", headers=ask)).status_code for _ in range(3)] == [200, 200, 429]
