@@ -1,6 +1,7 @@
 """Everything that looks whether the ticks go on: the loop itself, and what acts beside it where the robot allows."""
 
 import asyncio
+import math
 from typing import NamedTuple, Protocol
 
 from robot_bridge import clock
@@ -34,6 +35,7 @@ class Watchdogs:
         self._now = now
         self._gauge: StallGauge | None = None  # None before the first tick
         self._last = now()
+        self._moved_at = -math.inf  # s, last tick that applied what is not at rest
         self._beside: list[Watchdog] = []
         if robot.rests_from_thread:
             self._beside.append(WatchdogThread(limit, robot.rest_from_thread, now))
@@ -61,11 +63,17 @@ class Watchdogs:
     def ticked(self, now: float, moving: bool) -> None:
         """The tick goes on; `moving`: what it applies is not at rest.
 
+        A robot counts as one that moves until rest has been applied for `limit` seconds: the call that applies it may
+        hang, and what it says may still be on its way when the bridge is killed.
+
         Raises:
             RobotUnavailable: the watchdog process is gone, so that nothing watches over the robot.
         """
+        if moving:
+            self._moved_at = now
+        moves = now - self._moved_at <= self._limit
         for watchdog in self._beside:
-            watchdog.ticked(now, moving)
+            watchdog.ticked(now, moves)
 
     def close(self) -> None:
         """May be called again."""

@@ -93,9 +93,9 @@ def test_a_robot_that_tells_too_few_positions_does_not_move() -> None:
     assert demand.is_blind
 
 
-SPEED = st.floats(-1, 1)
-PLACE = st.floats(-2, 2)
-RATE = st.floats(-5, 5)
+SPEED = st.floats(-1, 1, allow_subnormal=False)
+PLACE = st.floats(-2, 2, allow_subnormal=False)
+RATE = st.floats(-5, 5, allow_subnormal=False)
 
 
 @given(offsets=st.tuples(SPEED, SPEED), joints=st.tuples(PLACE, PLACE), rates=st.tuples(RATE, RATE))

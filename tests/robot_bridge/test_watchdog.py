@@ -204,6 +204,24 @@ async def test_a_watchdog_that_acts_while_a_tick_begins_is_told_with_the_time_th
     assert held.seconds >= LIMIT
 
 
+async def test_a_bridge_that_hangs_while_it_applies_rest_is_one_that_hangs_in_motion() -> None:
+    robot = RecordingRobot()
+    acted = threading.Event()
+    robot.rest_from_thread = acted.set  # type: ignore[method-assign]
+    watchdogs = Watchdogs(robot, LIMIT, clock.now)
+    await watchdogs.start()
+    try:
+        watchdogs.ticked(clock.now(), True)
+        watchdogs.ticked(clock.now(), False)
+        assert await asyncio.to_thread(acted.wait, PATIENCE)
+        acted.clear()
+        watchdogs.begin(clock.now(), True)
+        watchdogs.ticked(clock.now() + 2 * LIMIT, False)  # rest was applied long enough
+        assert not await asyncio.to_thread(acted.wait, 3 * LIMIT)
+    finally:
+        watchdogs.close()
+
+
 def test_the_thread_acts_again_and_again_while_nothing_comes_and_only_for_a_robot_that_moves() -> None:
     acts: list[float] = []
     often = threading.Event()
