@@ -3,9 +3,9 @@
     python -m robot_bridge.watchdog_process SECONDS package.module:function ARGUMENT...
 
 The function is called at once and returns what brings the robot to rest. The process hears of every tick through a pipe
-and calls that when none comes for so long while the robot moves, again every so often, and when the pipe ends while the
-robot moves: then the bridge was killed. It needs nothing of the bridge's interpreter, so that it also works while
-native code keeps that from running anything.
+and calls that when none comes for so long while the robot moves, again every so often, and for three seconds when the
+pipe ends while the robot moves: then the bridge was killed. It needs nothing of the bridge's interpreter, so that it
+also works while native code keeps that from running anything.
 """
 
 import logging
@@ -14,7 +14,9 @@ import select
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
 
 from robot_bridge import clock
@@ -28,6 +30,7 @@ START_SECONDS = 20.0  # for the function's module to be imported and the functio
 CLOSE_SECONDS = 2.0
 SAYS_PER_LIMIT = 4  # ticks that are told, at least, in the time without any that counts
 TRIES = 3
+LAST_ACTS, LAST_INTERVAL = 30, 0.1  # s; when the bridge was killed
 
 _logger = logging.getLogger(__name__)
 
@@ -124,31 +127,37 @@ def watch(heard: int, said: int, limit: float, act: Callable[[], None], now: clo
     while True:
         timeout = max(0.0, limit - (now() - last)) if moving else None
         if not select.select([heard], [], [], timeout)[0]:
+            _logger.error("no tick of the bridge: the robot is brought to rest by its watchdog process")
             _act(act, said)
             last = now()  # again, if still nothing comes
             continue
         news = os.read(heard, 4096)
         if not news:
             if moving:
-                _act(act, said)
+                _act_for_good(act, said)
             return
         if LEAVING in news:
             return
         last, moving = now(), news[-1:] == MOVING
 
 
+def _act_for_good(act: Callable[[], None], said: int) -> None:
+    """The bridge is gone. What listens may not have found this process yet, and nobody says it later."""
+    _logger.error("the bridge is gone: the robot is brought to rest by its watchdog process")
+    for _ in range(LAST_ACTS):
+        _act(act, said)
+        time.sleep(LAST_INTERVAL)
+
+
 def _act(act: Callable[[], None], said: int) -> None:
-    _logger.error("no tick of the bridge: the robot is brought to rest by its watchdog process")
     for _ in range(TRIES):
         try:
             act()
             break
         except BaseException as error:
             _logger.critical("the watchdog process cannot bring the robot to rest: %r", error)
-    try:
+    with suppress(OSError):  # nobody hears it any more
         os.write(said, ACTED)
-    except OSError:  # nobody hears it any more
-        _logger.error("the bridge is gone")
 
 
 def load(call: str, arguments: Sequence[str]) -> Callable[[], None]:
