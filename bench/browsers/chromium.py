@@ -1,13 +1,15 @@
 """Chromium for a test, through Playwright; always the system's own browser with a profile of its own."""
 
+import asyncio
 import shutil
+import time
 from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 from playwright.async_api import Browser, BrowserContext, Page, async_playwright
 
-__all__ = ["PAD", "chromium_program", "open_page", "running_chromium"]
+__all__ = ["PAD", "chromium_program", "missed_in_page", "open_page", "running_chromium"]
 
 PAD = Path(__file__).with_name("test_pad.js")
 FLAGS = [
@@ -17,6 +19,10 @@ FLAGS = [
     "--disable-sync",
     "--autoplay-policy=no-user-gesture-required",
 ]
+
+
+ASKED_SECONDS = 5.0  # what the page waits for one answer
+ANSWER_SECONDS = 15.0  # for it to come
 
 
 def chromium_program() -> Path:
@@ -66,3 +72,19 @@ async def open_page(
             raise AssertionError("the page threw: " + "; ".join(errors))
     finally:
         await context.close()
+
+
+async def missed_in_page(page: Page, script: str, seconds: float) -> str | None:
+    """What `script`, a function of milliseconds, found instead of what it waits for; None once it has that.
+
+    It is asked again every few seconds: an answer is lost where the page turns to another document meanwhile.
+    """
+    end = time.monotonic() + seconds
+    while True:
+        wait = max(0.0, min(ASKED_SECONDS, end - time.monotonic()))
+        missed: str | None = "the page does not answer"
+        with suppress(TimeoutError):
+            async with asyncio.timeout(ANSWER_SECONDS):
+                missed = await page.evaluate(script, wait * 1000)
+        if missed is None or time.monotonic() >= end:
+            return missed

@@ -6,7 +6,7 @@ from typing import Any
 
 from playwright.async_api import Browser, Page
 
-from bench.browsers.chromium import open_page
+from bench.browsers.chromium import missed_in_page, open_page
 
 __all__ = ["LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
 
@@ -65,7 +65,7 @@ class ConsolePage:
           };
           look();
         })"""
-        missed = await self.page.evaluate(waiting % holds, seconds * 1000)
+        missed = await missed_in_page(self.page, waiting % holds, seconds)
         if missed is not None:
             shown = " | ".join((await self.page.inner_text("body")).split("\n"))
             raise AssertionError(f"never came true: {condition}\nthe page's statistics: {missed}\nthe page: {shown}")

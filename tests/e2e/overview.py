@@ -4,6 +4,8 @@ from typing import Any
 
 from playwright.async_api import Page
 
+from bench.browsers.chromium import missed_in_page
+
 __all__ = ["in_view", "stats", "until"]
 
 
@@ -24,7 +26,7 @@ async def until(page: Page, condition: str, seconds: float = 30.0) -> None:
       };
       look();
     })"""
-    missed = await page.evaluate(waiting % condition, seconds * 1000)
+    missed = await missed_in_page(page, waiting % condition, seconds)
     if missed is not None:
         raise AssertionError(f"never came true: {condition}\nthe overview: {missed}")
 
