@@ -58,6 +58,13 @@ async def test_an_offer_is_answered_and_the_resource_can_be_deleted() -> None:
         assert gone.status_code == 404, "another token's resource is as good as none"
 
 
+async def test_the_answer_offers_the_addresses_that_were_set_and_no_other() -> None:
+    async with running_rig(ice_hosts=("127.0.0.2",)) as rig:
+        answer = await rig.http.post("/whep", content=await _real_offer(), headers={**rig.token("observer"), **SDP})
+        hosts = {line.split()[4] for line in answer.text.splitlines() if line.startswith("a=candidate:")}
+        assert hosts == {"127.0.0.2"}
+
+
 async def test_who_made_a_peer_can_trickle_to_it_and_end_it() -> None:
     async with running_rig() as rig:
         headers = rig.token("observer")
