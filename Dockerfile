@@ -15,6 +15,7 @@ COPY requirements.lock ./
 RUN pip install --require-hashes -r requirements.lock
 COPY pyproject.toml README.md LICENSE NOTICE ./
 COPY robot_bridge ./robot_bridge
+COPY rtc ./rtc
 COPY server ./server
 COPY client ./client
 # A new volume takes over the owner of the folder that it covers.
