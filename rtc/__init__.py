@@ -3,11 +3,11 @@
 Every protocol is a core that opens no socket, starts no task and reads no clock. `now` is seconds of one monotonic
 clock, and randomness is handed in, so that a test repeats exactly. All cores have one shape:
 
-    core.receive_datagram(data, address, now)  # what came in; bad input is dropped and counted, never raised
-    core.handle_timer(now)                     # call when `timer()` is due
-    core.datagrams_to_send()                   # send these; drained
-    core.events()                              # frozen dataclasses; drained
-    core.timer()                               # when `handle_timer` is due next; None: never
+    core.receive_datagram(data, path, now)  # what came in; bad input is dropped and counted, never raised
+    core.handle_timer(now)                  # call when `timer()` is due
+    core.datagrams_to_send()                # send these; drained
+    core.events()                           # frozen dataclasses; drained
+    core.timer()                            # when `handle_timer` is due next; None: never
 
 After each `receive_datagram`, `handle_timer` or call of yours, drain the other two and ask for the timer again.
 This package imports nothing else of this repository.

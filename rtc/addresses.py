@@ -1,16 +1,31 @@
 """Where datagrams come from and go to."""
 
-from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
-__all__ = ["Address", "Datagram"]
+__all__ = ["Address", "Datagram", "Path", "Transport"]
 
 Address = tuple[str, int]  # IP address as `ipaddress` writes it, and port
+Transport = Literal["udp", "tcp"]  # tcp: datagrams framed as in RFC 4571 on one connection
 
 
-@dataclass(frozen=True, slots=True)
-class Datagram:
-    """One datagram to send. It leaves from `local`: an answer comes from the address that was asked."""
+class Path(NamedTuple):
+    """One way between an address of ours and one of a peer's. An answer takes the path of the question."""
 
-    data: bytes
     local: Address
     remote: Address
+    transport: Transport = "udp"
+
+
+class Datagram(NamedTuple):
+    """One datagram to send."""
+
+    data: bytes
+    path: Path
+
+    @property
+    def local(self) -> Address:
+        return self.path.local
+
+    @property
+    def remote(self) -> Address:
+        return self.path.remote
