@@ -34,6 +34,7 @@ TARGETS = {
         ),
     ),
     "sdp": Target("tests.fuzz.sdp", ("server.offer", "server.whep", "aiortc.sdp")),
+    "rtc_sdp": Target("tests.fuzz.rtc_sdp", ("rtc.sdp",)),
     "channels": Target("tests.fuzz.channels", ("server.channels", "server.scene_proxy", "robot_bridge.protocol")),
 }
 

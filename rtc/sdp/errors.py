@@ -1,0 +1,19 @@
+"""What is wrong with a description."""
+
+__all__ = ["SdpError"]
+
+
+class SdpError(ValueError):
+    """A description that cannot be used. The one error of this package.
+
+    `section` is the mid of the media section that is to blame, or "#0" by its place when it has none; None when it is
+    the description as a whole. `reason` is for whoever wrote the description.
+    """
+
+    def __init__(self, reason: str, section: str | None = None) -> None:
+        super().__init__(reason, section)
+        self.reason = reason
+        self.section = section
+
+    def __str__(self) -> str:
+        return self.reason if self.section is None else f"section {self.section}: {self.reason}"
