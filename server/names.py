@@ -9,6 +9,59 @@ __all__ = ["MAX_NAME", "clean_name", "printable", "unique_names"]
 MAX_NAME = 40  # characters
 MAX_MARKS = 4  # on one character: more are drawn over the lines above and below
 
+# Letters and digits that are drawn like one of a to z in most fonts, by that letter. Small letters and capitals are
+# apart: Greek "Ν" is like "N", and "ν" like "v". Styled Latin letters are not here: their normal form is the letter.
+_LIKE = {
+    "a": "аαɑ",
+    "A": "АΑᎪꓮ",
+    "B": "ВΒᏴꓐ",
+    "c": "сᴄ",
+    "C": "СᏟꓚ",
+    "d": "ԁᏧ",
+    "D": "Ꭰꓓ",
+    "e": "еҽ",
+    "E": "ЕΕᎬꓰ",
+    "F": "Ϝꓝ",
+    "g": "ɡց",
+    "G": "ԌᏀꓖ",
+    "h": "һհᏂ",
+    "H": "НΗᎻꓧ",
+    "i": "іιıɩ",
+    "j": "јϳ",
+    "J": "ЈᎫꓙͿ",
+    "k": "кκᴋ",
+    "K": "КΚᏦꓗ",
+    "l": "Iӏ|1ⵏІΙᏆꓲӀ",
+    "L": "Ꮮꓡ",
+    "M": "МΜᎷꓟϺ",
+    "n": "ոп",
+    "N": "Νꓠ",
+    "o": "оοօσ",
+    "O": "0ОΟՕꓳ",
+    "p": "рρ",
+    "P": "РΡᏢꓑ",
+    "q": "ԛզ",
+    "r": "гᴦ",
+    "R": "ᎡᏒꓣ",
+    "s": "ѕꜱ",
+    "S": "ЅՏᏚꓢ",
+    "t": "т",
+    "T": "ТΤᎢꓔ",
+    "u": "υսᴜ",
+    "U": "ՍᑌꓴԱ",
+    "v": "νѵᴠ",
+    "V": "ѴᏙꓦ",
+    "w": "ԝաᴡ",
+    "W": "ԜᎳꓪ",
+    "x": "хχ",
+    "X": "ХΧꓫ",
+    "y": "уүγ",
+    "Y": "ΥҮꓬ",
+    "z": "ᴢ",
+    "Z": "ΖᏃꓜ",
+}
+_LATIN = str.maketrans({like: letter for letter, likes in _LIKE.items() for like in likes})
+
 # Letters, marks and symbols of Unicode that show nothing: a name with one looks like the name without it.
 _BLANK = {0x034F, 0x115F, 0x1160, 0x17B4, 0x17B5, 0x2800, 0x3164, 0xFFA0}
 _BLANK |= {*range(0x180B, 0x1810), *range(0xFE00, 0xFE10), *range(0xE0100, 0xE01F0)}
@@ -51,13 +104,14 @@ def unique_names(people: Sequence[tuple[str, str]]) -> list[str]:
     names = [""] * len(people)
     for place in sorted(range(len(people)), key=lambda each: _claim(*people[each])):
         wanted, current = people[place]
-        name = wanted
-        if _key(name) in taken and _claim(wanted, current) is _Claim.NUMBERED:
+        name, keys = wanted, _keys(wanted)
+        if not taken.isdisjoint(keys) and _claim(wanted, current) is _Claim.NUMBERED:
             name = current
-        while _key(name) in taken:
-            number = numbers[_key(wanted)] = numbers.get(_key(wanted), 1) + 1
+        while not taken.isdisjoint(_keys(name)):
+            number = max(numbers.get(key, 1) for key in keys) + 1
+            numbers.update((key, number) for key in keys)
             name = f"{wanted} {number}"
-        taken.add(_key(name))
+        taken |= _keys(name)
         names[place] = name
     return names
 
@@ -65,6 +119,11 @@ def unique_names(people: Sequence[tuple[str, str]]) -> list[str]:
 def _key(name: str) -> str:
     """The same for names that differ in case, or in forms of the same characters."""
     return unicodedata.normalize("NFKC", name).casefold()
+
+
+def _keys(name: str) -> set[str]:
+    """Names that have one in common are the same, or look the same: "Аda" with a Cyrillic letter and "Ada"."""
+    return {_key(name), _key(unicodedata.normalize("NFKC", name).translate(_LATIN))}
 
 
 class _Claim(IntEnum):

@@ -1,3 +1,5 @@
+import itertools
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -124,3 +126,33 @@ def test_what_nobody_sees_is_in_no_name_and_marks_are_few(wanted: str, shown: st
 
 def test_nobody_has_a_name_that_looks_like_that_of_another() -> None:
     assert unique_names([("Ada", ""), ("\uff21da", "")]) == ["Ada", "\uff21da 2"]
+
+
+@pytest.mark.parametrize(
+    ("name", "alike"),
+    [
+        ("Ada", "\u0410d\u0430"),  # Cyrillic
+        ("ADA", "\u0391D\u0391"),  # Greek
+        ("Ian", "lan"),
+        ("Bo", "B0"),
+        ("supervisor", "\u0455u\u0440\u0435rvi\u0455\u043er"),
+        ("\u041d\u043e\u0440\u0430", "Hopa"),  # the other way round
+        ("Ada 2", "Ad\u0430 2"),
+    ],
+)
+def test_a_name_of_letters_that_look_like_those_of_another_gets_a_number(name: str, alike: str) -> None:
+    assert unique_names([(name, ""), (alike, "")]) == [name, f"{alike} 2"]
+    assert unique_names([(alike, "Grace"), (name, name)]) == [f"{alike} 2", name], "also who takes it later"
+
+
+def test_names_that_look_different_are_left_as_they_are() -> None:
+    names = ["Kai", "Kal", "Anna", "\u0418\u0432\u0430\u043d", "\u0413\u0440\u0435\u0442\u0430", "Bob 10"]
+    assert unique_names([(each, "") for each in names]) == names
+
+
+def test_a_crowd_of_names_that_look_alike_is_counted_as_one() -> None:
+    spellings = ["".join(letters) for letters in itertools.product("Il1", "Oo0", "a\u0430", "p\u0440", "e\u0435")]
+    names = unique_names([(each, "") for each in spellings])
+    numbers = sorted(int(name.rpartition(" ")[2]) for name in names if " " in name)
+    assert len(set(numbers)) == len(numbers)
+    assert max(numbers) <= len(spellings)
