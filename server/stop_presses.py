@@ -6,6 +6,10 @@ up, before anything else. The bridge knows a press by its id, so sending it agai
 
 At most `MAX_PENDING` are kept. One more takes the place of the newest, which from then on has the outcome of the
 press that took its place: that one was made later, so its stop is the newer one.
+
+A link that presses faster than people do has its presses *held*: the first of them waits for `take_held`, and those
+that the link makes meanwhile share its outcome. It is sent after all of them were made, so its stop is as new as any
+of them. A press that is held is pending like any other.
 """
 
 import hashlib
@@ -26,6 +30,7 @@ __all__ = [
     "MAX_GIVEN",
     "MAX_REASON",
     "AlreadyTaken",
+    "Held",
     "NewPress",
     "Press",
     "PressOutcome",
@@ -97,8 +102,15 @@ class NewPress(NamedTuple):
     replaced: Press | None
 
 
+class Held(NamedTuple):
+    """It goes with the next `take_held`. `replaced`: as in `NewPress`."""
+
+    press: Press
+    replaced: Press | None
+
+
 class UnderWay(NamedTuple):
-    """The same press is pending: it has the outcome of its first."""
+    """The same press is pending, or one that is held for the same link: it has the outcome of that one."""
 
     press: Press
 
@@ -109,7 +121,7 @@ class AlreadyTaken(NamedTuple):
     taken: StopTaken
 
 
-PressOutcome = NewPress | UnderWay | AlreadyTaken
+PressOutcome = NewPress | Held | UnderWay | AlreadyTaken
 
 
 class Settled(NamedTuple):
@@ -126,6 +138,7 @@ class StopPresses:
         self._pending: dict[str, Press] = {}  # by id, oldest first
         self._same: dict[str, list[Press]] = {}  # id of a pending press -> those that have its outcome
         self._leader: dict[str, str] = {}  # id of a press -> id of the pending one whose outcome it has
+        self._held: dict[str, str] = {}  # link -> id of its pending press that was not sent yet
         self._taken: OrderedDict[str, StopTaken] = OrderedDict()
 
     @property
@@ -136,18 +149,34 @@ class StopPresses:
     def is_pending(self, press: str) -> bool:
         return press in self._pending or press in self._leader
 
+    def knows(self, press: str) -> bool:
+        """Whether it would be a repeat."""
+        return press in self._taken or self.is_pending(press)
+
     def outcome(self, press: str) -> StopTaken | None:
         """The bridge's answer; None: there was none, or it was long ago."""
         return self._taken.get(press)
 
-    def press(self, press: Press) -> PressOutcome:
-        """Somebody pressed, or what somebody pressed came once more."""
+    def press(self, press: Press, *, hold: bool = False) -> PressOutcome:
+        """Somebody pressed, or what somebody pressed came once more. `hold`: its link presses too fast."""
         known = self._taken.get(press.id)
         if known is not None:
             return AlreadyTaken(known)
         if self.is_pending(press.id):
             return UnderWay(self._pending[self._leader.get(press.id, press.id)])
-        return NewPress(press, self._add(press))
+        if not hold:
+            return NewPress(press, self._add(press))
+        if (held := self._held.get(press.by.link)) is not None:
+            self._join(press, held)
+            return UnderWay(self._pending[held])
+        replaced = self._add(press)
+        self._held[press.by.link] = press.id
+        return Held(press, replaced)
+
+    def take_held(self) -> list[Press]:
+        """Those that are held; they are to be sent now."""
+        held, self._held = self._held, {}
+        return [self._pending[press] for press in held.values()]
 
     def again(self, press: Press) -> bool:
         """A press that was answered and has to be said to another epoch of the bridge; whether that is news."""
@@ -163,6 +192,7 @@ class StopPresses:
         press = self._pending.pop(taken.press, None)
         if press is None:
             return []
+        self._let_go(press)
         settled = [Settled(press, taken)]
         for same in self._same.pop(taken.press, []):
             self._leader.pop(same.id, None)
@@ -175,6 +205,7 @@ class StopPresses:
         replaced = None
         if len(self._pending) >= MAX_PENDING:
             newest, replaced = self._pending.popitem()
+            self._let_go(replaced)
             same = [replaced, *self._same.pop(newest, [])]
             for forgotten in same[MAX_SAME:]:
                 self._leader.pop(forgotten.id, None)
@@ -182,6 +213,16 @@ class StopPresses:
             self._leader.update((each.id, press.id) for each in same[:MAX_SAME])
         self._pending[press.id] = press
         return replaced
+
+    def _join(self, press: Press, leader: str) -> None:
+        same = self._same.setdefault(leader, [])
+        if len(same) < MAX_SAME:
+            same.append(press)
+            self._leader[press.id] = leader
+
+    def _let_go(self, press: Press) -> None:
+        if self._held.get(press.by.link) == press.id:
+            del self._held[press.by.link]
 
     def _remember(self, taken: StopTaken) -> None:
         self._taken[taken.press] = taken

@@ -37,7 +37,7 @@ from server.reset_attempts import RESET_REASONS, ResetAttempts, ResetOutcome
 from server.session_tap import SessionTap
 from server.silenced_links import SilencedLinks
 from server.stop_keeper import StopKeeper
-from server.stop_presses import AlreadyTaken, NewPress, Press, Settled, told_id
+from server.stop_presses import AlreadyTaken, Held, NewPress, Press, Settled, told_id
 
 __all__ = ["SILENCED", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
 
@@ -47,6 +47,7 @@ CONFIRM_SECONDS = 1.0  # that whoever pressed waits for the bridge's answer
 AGAIN_SECONDS = 0.5  # until what has no answer is sent again, on a link that lives
 WATCH_SECONDS = 0.1  # between two looks, while something has no answer
 MAX_LISTENERS = 16  # connections that are told of one press
+PRESSES, PRESS_RATE = 20, 20.0  # Hz, of one link by whatever they come: new ones, and answers to repeats
 RECORDS, RECORD_RATE = 5, 0.2  # of stops of one link in full; what is more becomes one record a second
 RESETS, RESET_RATE = 5, 1.0  # Hz, of one link
 ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
@@ -143,6 +144,8 @@ class StopService:
         self._resets: ResetAttempts[_Asker] = ResetAttempts()
         self._link_resets = RateLimits(RESET_RATE, RESETS)
         self._robot_resets = RateLimits(ROBOT_RESET_RATE, ROBOT_RESETS)
+        self._link_presses = RateLimits(PRESS_RATE, PRESSES)
+        self._link_repeats = RateLimits(PRESS_RATE, PRESSES)
         self._records = RateLimits(RECORD_RATE, RECORDS)
         self._listeners: dict[str, list[tuple[str, str]]] = {}  # press -> who waits for it, and calls it what
         self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
@@ -178,31 +181,42 @@ class StopService:
         if by.link and self._silenced.holds(by.link, time.monotonic()):
             self._audit.refused(by, "silenced")
             raise Silenced(SILENCED)
-        self._listen(by.peer, press.id, told_id(press, given))
-        match self._presses.press(press):
+        rate = self._link_repeats if self._presses.knows(press.id) else self._link_presses
+        too_fast = bool(by.link) and not rate.spend(by.link, time.monotonic())
+        outcome = self._presses.press(press, hold=too_fast)
+        if self._presses.is_pending(press.id) or not too_fast:
+            self._listen(by.peer, press.id, told_id(press, given))
+        match outcome:
             case AlreadyTaken(taken):
                 self._audit.again("stop", by, f"{where}, again")
-                self._answer(press.id, taken)
+                self._answer(press.id, taken)  # one that comes too fast is in the state of the stop all the same
             case NewPress(_, replaced):
-                self._send_new(press, replaced)
+                self._await(press, replaced)
+                self._send_new(press)
+            case Held(_, replaced):
+                self._await(press, replaced)
             case _:
                 self._audit.again("stop", by, f"{where}, again")
 
-    def _send_new(self, press: Press, replaced: Press | None) -> None:
-        sent, now = self._robot.send_stop(press.message()), time.monotonic()
+    def _await(self, press: Press, replaced: Press | None) -> None:
+        """Its answer, for so long that nobody takes it for delivered who is told nothing."""
+        now = time.monotonic()
         self._deadlines[press.id] = now + CONFIRM_SECONDS
         if len(self._presses.pending) == 1:
             self._sent_at = now
         self._wake.set()
+        if replaced is not None:
+            self._keeper.settled(replaced.id)
+            self._forget_settled()
+
+    def _send_new(self, press: Press) -> None:
+        sent = self._robot.send_stop(press.message())
         self._tap.stop_asked(press.by, press.where, press.reason, press.id, delivered=sent)
         log.warning("stop", by=press.by.name, where=press.where, reason=press.reason, sent=sent)
         if not sent:
             if len(self._presses.pending) == 1:
                 self._peers.tell("session", Notice(level="error", text=UNDELIVERED))
             self._not_delivered(press)
-        if replaced is not None:
-            self._keeper.settled(replaced.id)
-            self._forget_settled()
 
     def _forget_settled(self) -> None:
         """So many presses that some share an outcome: what is known of those that nobody waits for goes."""
@@ -462,6 +476,8 @@ class StopService:
 
     def _look(self, now: float) -> bool:
         """Whether anything is left to wait for."""
+        for press in self._presses.take_held():
+            self._send_new(press)
         late = [press for press in self._presses.pending if now >= self._deadlines.get(press.id, now + 1)]
         for press in late:
             self._not_delivered(press)

@@ -7,6 +7,7 @@ from server.stop_presses import (
     MAX_REMEMBERED,
     MAX_SAME,
     AlreadyTaken,
+    Held,
     NewPress,
     Press,
     Settled,
@@ -18,8 +19,8 @@ from server.stop_presses import (
 )
 
 
-def _press(name: str) -> Press:
-    return Press(id=name, by=Actor("Ann"), where="http", reason="smoke")
+def _press(name: str, link: str = "") -> Press:
+    return Press(id=name, by=Actor("Ann", link=link), where="http", reason="smoke")
 
 
 def _ids(presses: StopPresses) -> list[str]:
@@ -77,6 +78,45 @@ def test_a_flood_of_presses_takes_bounded_memory() -> None:
     assert presses.outcome("t0") is None
     assert presses.outcome(f"t{2 * MAX_REMEMBERED - 1}") is not None
     assert not presses.is_pending("100")
+
+
+def test_what_a_link_presses_too_fast_waits_together_for_the_first_of_them_and_has_its_outcome() -> None:
+    presses = StopPresses()
+    first, second, third, others = _press("a", "L"), _press("b", "L"), _press("c", "L"), _press("d", "M")
+    assert presses.press(first, hold=True) == Held(first, None)
+    assert presses.press(second, hold=True) == UnderWay(first)
+    assert presses.press(others, hold=True) == Held(others, None)
+    assert presses.pending == [first, others], "nothing passes a stop that is held"
+    assert all(presses.knows(each) for each in "abd")
+    assert presses.take_held() == [first, others]
+    assert presses.take_held() == []
+    assert presses.press(third, hold=True) == Held(third, None), "the first may have been taken before this was pressed"
+    settled = presses.taken(StopTaken(press="a", number=5))
+    assert [(each.press.id, each.taken.number) for each in settled] == [("a", 5), ("b", 5)]
+    assert presses.press(second) == AlreadyTaken(StopTaken(press="b", number=5))
+    presses.taken(StopTaken(press="c", number=6))
+    assert presses.take_held() == [], "sent with all that is pending, and answered"
+
+
+def test_however_many_a_link_presses_too_fast_take_bounded_memory_and_are_one_stop() -> None:
+    presses = StopPresses()
+    for number in range(3 * MAX_SAME):
+        presses.press(_press(str(number), "L"), hold=True)
+    assert [press.id for press in presses.take_held()] == ["0"]
+    assert len(presses.taken(StopTaken(press="0", number=1))) == 1 + MAX_SAME
+    assert not presses.knows(str(2 * MAX_SAME))
+
+
+def test_a_press_that_is_held_can_be_the_one_that_makes_room_for_another() -> None:
+    presses = StopPresses()
+    for number in range(MAX_PENDING - 1):
+        presses.press(_press(str(number)))
+    held, another = _press("held", "L"), _press("another", "M")
+    presses.press(held, hold=True)
+    assert presses.press(another) == NewPress(another, held)
+    assert presses.take_held() == []
+    assert presses.press(_press("next", "L"), hold=True) == Held(_press("next", "L"), another)
+    assert [press.id for press in presses.take_held()] == ["next"]
 
 
 def test_a_press_is_said_again_to_another_epoch_though_it_was_answered_in_the_last() -> None:
