@@ -35,6 +35,7 @@ TARGETS = {
     ),
     "sdp": Target("tests.fuzz.sdp", ("server.offer", "server.whep", "aiortc.sdp")),
     "rtc_sdp": Target("tests.fuzz.rtc_sdp", ("rtc.sdp",)),
+    "ice": Target("tests.fuzz.ice", ("rtc.stun", "rtc.ice", "rtc.demux")),
     "channels": Target("tests.fuzz.channels", ("server.channels", "server.scene_proxy", "robot_bridge.protocol")),
 }
 

@@ -1,0 +1,31 @@
+"""What an ICE agent tells whoever uses it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from rtc.addresses import Path
+
+__all__ = ["Ended", "Event", "PathChanged", "RestartFailed"]
+
+
+@dataclass(frozen=True, slots=True)
+class PathChanged:
+    """Send there from now on. None: nowhere, until a restart that is under way has found a path."""
+
+    path: Path | None
+    nominated: bool  # false: it works, and the controlling agent has not decided yet (RFC 8445 12.1)
+
+
+@dataclass(frozen=True, slots=True)
+class RestartFailed:
+    """The restart found no path. The path before it goes on for as long as the peer consents."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """Nothing may be sent any more; the last event."""
+
+    reason: Literal["no_path", "consent_expired"]
+
+
+Event = PathChanged | RestartFailed | Ended

@@ -1,0 +1,93 @@
+"""Many ICE agents on one UDP port: whose datagram it is, and what strangers may cost.
+
+Nothing that a stranger sends makes anything grow: until MESSAGE-INTEGRITY holds, the only state is a table of a fixed
+size. The checks of that run from the cheap to the dear:
+
+1. A response must name a transaction that an agent has begun; a request must name a user that exists. Both are one look
+   into a dictionary, and whoever has not seen our signalling cannot guess either.
+2. From a path that nobody has claimed, requests pass a rate limit for their source and one for all together.
+3. The agent checks the integrity, and only then remembers anything.
+"""
+
+import ipaddress
+from collections import Counter
+from dataclasses import dataclass
+
+from rtc.addresses import Path
+from rtc.demux import DatagramKind, datagram_kind
+from rtc.ice.agent import Agent
+from rtc.ice.directory import Directory
+from rtc.ice.token_bucket import TokenBuckets
+from rtc.stun import Kind, transaction_of, username_of
+
+__all__ = ["Port", "PortSettings"]
+
+
+@dataclass(frozen=True, slots=True)
+class PortSettings:
+    """Bounds of what comes from paths that no agent has claimed."""
+
+    source_rate: float = 20.0  # requests a second of one address (IPv6: network): several browsers that connect
+    source_burst: float = 40.0
+    total_rate: float = 500.0  # requests a second of all together: 2 % of a core
+    total_burst: float = 500.0
+    source_slots: int = 4096  # sources that share a slot share its rate
+
+
+class Port:
+    """Give agents `directory`; hand what comes in to whomever `route` returns."""
+
+    def __init__(self, settings: PortSettings | None = None) -> None:
+        self.directory = Directory()
+        self.counts: Counter[str] = Counter()  # what was dropped, by reason
+        self._limit = SourceLimit(settings or PortSettings())
+
+    def route(self, data: bytes, path: Path, now: float) -> Agent | None:
+        """The agent that this datagram is for; None: drop it."""
+        kind = datagram_kind(data)
+        if kind is DatagramKind.STUN:
+            return self._route_stun(data, path, now)
+        agent = None if kind is DatagramKind.UNKNOWN else self.directory.owner(path)
+        if agent is None:
+            self.counts["unknown_source" if kind is not DatagramKind.UNKNOWN else "unknown_protocol"] += 1
+        return agent
+
+    def _route_stun(self, data: bytes, path: Path, now: float) -> Agent | None:
+        head = transaction_of(data)
+        if head is None:
+            self.counts["malformed"] += 1
+            return None
+        kind, transaction = head
+        if kind is Kind.REQUEST:
+            return self._route_request(data, path, now)
+        agent = self.directory.owner(path) if kind is Kind.INDICATION else self.directory.transactions.get(transaction)
+        if agent is None:
+            self.counts["unknown_transaction"] += 1
+        return agent
+
+    def _route_request(self, data: bytes, path: Path, now: float) -> Agent | None:
+        agent = self.directory.ufrags.get((username_of(data) or "").partition(":")[0])
+        if agent is None:
+            self.counts["unknown_username"] += 1
+        elif self.directory.claims.get(path) is not agent and not self._limit.take(path.remote[0], now):
+            self.counts["requests_over_rate"] += 1
+            agent = None
+        return agent
+
+
+class SourceLimit:
+    """A rate for each source and one for all, in memory of a fixed size."""
+
+    def __init__(self, settings: PortSettings) -> None:
+        # A dictionary of sources would grow with forged ones, or forget honest ones. Python seeds the hash of texts
+        # anew in each process, so that nobody can choose whose slot to share.
+        self._sources = TokenBuckets(settings.source_rate, settings.source_burst, settings.source_slots)
+        self._total = TokenBuckets(settings.total_rate, settings.total_burst)
+
+    def take(self, host: str, now: float) -> bool:
+        return self._sources.take(now, hash(source_of(host)) % len(self._sources)) and self._total.take(now)
+
+
+def source_of(host: str) -> str:
+    """Whoever has one IPv6 address has the 2⁶⁴ of its network."""
+    return host if ":" not in host else ipaddress.IPv6Address(host).packed[:8].hex()
