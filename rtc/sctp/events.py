@@ -1,0 +1,53 @@
+"""What an association tells its owner."""
+
+from dataclasses import dataclass
+
+__all__ = ["Closed", "Established", "Event", "MessageReceived", "OutgoingStreamsReset", "StreamsReset"]
+
+
+@dataclass(frozen=True, slots=True)
+class Established:
+    """Both ends know each other."""
+
+    streams: int  # the peer takes messages on streams below this number
+    interleaving: bool  # RFC 8260 is in use
+
+
+@dataclass(frozen=True, slots=True)
+class MessageReceived:
+    """A whole message."""
+
+    stream: int
+    protocol: int  # PPID
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class StreamsReset:
+    """The peer has reset these streams of its own: no message comes on them until it begins anew (RFC 6525 5.2.2)."""
+
+    streams: tuple[int, ...]  # empty: all
+
+
+@dataclass(frozen=True, slots=True)
+class OutgoingStreamsReset:
+    """The peer has answered `Association.reset_streams`."""
+
+    streams: tuple[int, ...]
+    done: bool  # False: it refused
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """The association has ended; the last event.
+
+    `reason` is a stable name: `closed` and `aborted` by the owner, `peer_closed`, `peer_aborted`, `peer_restarted`, or
+    the protocol error that ended it: `receive_window_exceeded`, `message_too_large`, `empty_data`,
+    `interleaving_violated`, `init_invalid`.
+    """
+
+    reason: str
+    detail: str = ""
+
+
+Event = Established | MessageReceived | StreamsReset | OutgoingStreamsReset | Closed

@@ -1,0 +1,125 @@
+"""Messages that have not been sent yet, and whose turn it is."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from rtc.sctp.errors import SendQueueFull
+from rtc.sctp.settings import SctpSettings
+
+if TYPE_CHECKING:
+    from rtc.sctp.sender import Outgoing
+
+__all__ = ["Message", "SendQueue"]
+
+
+@dataclass(slots=True, eq=False)
+class Message:
+    """A message on its way out. It may be given up after `max_retransmits` repeats or at the time `expires`."""
+
+    stream: int
+    protocol: int  # PPID
+    payload: bytes
+    ordered: bool = True
+    max_retransmits: int | None = None
+    expires: float | None = None
+    sequence: int = 0  # on its stream; given when its first fragment leaves
+    taken: int = 0  # bytes that are in chunks already
+    abandoned: bool = False
+    chunks: "list[Outgoing]" = field(default_factory=list)  # of a message of several
+
+    @property
+    def newest_wins(self) -> bool:
+        """Nobody waits for it: it is neither repeated nor put in order."""
+        return not self.ordered and self.max_retransmits == 0
+
+
+class SendQueue:
+    """Newest-wins messages by themselves; all others by stream, and the streams take turns (RFC 8831 6.4 without
+    priorities).
+
+    `dropped` counts newest-wins messages that made room for newer ones, `expired` messages whose time had passed
+    before they could leave.
+    """
+
+    def __init__(self, settings: SctpSettings) -> None:
+        self._limit = settings.send_queue
+        self._newest_limit = settings.newest_wins_queue
+        self._newest_size = 0
+        self._streams: dict[int, deque[Message]] = {}
+        self._sizes: dict[int, int] = {}
+        self._turns: deque[int] = deque()  # streams that have something
+        self.newest: deque[Message] = deque()
+        self.dropped = 0
+        self.expired = 0
+
+    def __len__(self) -> int:
+        return len(self.newest) + sum(map(len, self._streams.values()))
+
+    def put(self, message: Message) -> None:
+        """
+        Raises:
+            SendQueueFull: too much waits on this stream; the message was not taken.
+        """
+        size = len(message.payload)
+        if message.newest_wins:
+            self.newest.append(message)
+            self._newest_size += size
+            while self._newest_size > self._newest_limit and len(self.newest) > 1:
+                self.take_newest()
+                self.dropped += 1
+            return
+        waiting = self._sizes.get(message.stream, 0)
+        if waiting and waiting + size > self._limit:
+            raise SendQueueFull(f"{waiting} bytes wait on stream {message.stream}")
+        self._sizes[message.stream] = waiting + size
+        queue = self._streams.get(message.stream)
+        if queue is None:
+            queue = self._streams[message.stream] = deque()
+            self._turns.append(message.stream)
+        queue.append(message)
+
+    def take_newest(self) -> Message:
+        message = self.newest.popleft()
+        self._newest_size -= len(message.payload)
+        return message
+
+    def head(self, now: float) -> Message | None:
+        """The message of the stream whose turn it is; without those that have expired and were never begun."""
+        while self._turns:
+            message = self._streams[self._turns[0]][0]
+            late = message.expires is not None and now >= message.expires and not message.taken
+            if not late and not message.abandoned:
+                return message
+            self.expired += late
+            self.took(message, len(message.payload) - message.taken)
+        return None
+
+    def took(self, message: Message, size: int) -> None:
+        """So many bytes more of the head are in chunks. The next stream has its turn."""
+        message.taken += size
+        stream = message.stream
+        self._turns.rotate(-1)
+        self._sizes[stream] -= size
+        if message.taken < len(message.payload):
+            return
+        queue = self._streams[stream]
+        queue.popleft()
+        if not queue:
+            del self._streams[stream], self._sizes[stream]
+            self._turns.remove(stream)
+
+    def buffered(self, stream: int) -> int:
+        """Bytes that wait on this stream; newest-wins messages do not count."""
+        return self._sizes.get(stream, 0)
+
+    def has(self, stream: int) -> bool:
+        """Whether anything waits on this stream, newest-wins messages included."""
+        return stream in self._streams or any(message.stream == stream for message in self.newest)
+
+    def clear(self) -> None:
+        self.newest.clear()
+        self._streams.clear()
+        self._sizes.clear()
+        self._turns.clear()
+        self._newest_size = 0
