@@ -36,6 +36,7 @@ TARGETS = {
     "sdp": Target("tests.fuzz.sdp", ("server.offer", "server.whep", "aiortc.sdp")),
     "rtc_sdp": Target("tests.fuzz.rtc_sdp", ("rtc.sdp",)),
     "ice": Target("tests.fuzz.ice", ("rtc.stun", "rtc.ice", "rtc.demux")),
+    "sctp": Target("tests.fuzz.sctp", ("rtc.sctp", "rtc.channels", "rtc.dcep")),
     "rtc_rtp": Target("tests.fuzz.rtc_rtp", ("rtc.rtp",)),
     "channels": Target("tests.fuzz.channels", ("server.channels", "server.scene_proxy", "robot_bridge.protocol")),
 }
