@@ -108,6 +108,8 @@ def guarded_http(
         def on_response_complete(self) -> None:
             super().on_response_complete()
             self._awaited = self.conn.their_state is h11.SEND_BODY  # else uvicorn's own timer runs, until the next one
+            if self._awaited and self.loop.time() >= self.app_state[DEADLINE]:
+                self.transport.close()  # the answer was given without the rest of the body, and says or counts so
 
         def _begin(self) -> None:
             """An exchange: from its first byte, or from the connection on."""

@@ -1,6 +1,7 @@
 """Notes to everyone: cleaned, numbered, limited in rate. No I/O, no clock.
 
-Newcomers get the last ones of this run of the console; what earlier sessions wrote is in the audit and the recordings.
+Newcomers get the last ones of this session, which ends when nobody has been there for SESSION_GAP. What earlier ones
+wrote is in the audit and the recordings, for those who may read them.
 """
 
 from collections import deque
@@ -19,6 +20,7 @@ BURST = 5  # notes of one link at once, however many connections it has
 LINK_RATE = 0.5  # notes a second of one link
 BOARD_BURST = 20.0  # of all peers together: every note goes to everyone
 BOARD_RATE = 4.0
+SESSION_GAP = 600.0  # s; whoever reloads the page, or comes back after a cut, still finds the notes
 
 
 class NoteBoard:
@@ -29,6 +31,17 @@ class NoteBoard:
         self._next_id = 1
         self._all = TokenBucket(BOARD_RATE, BOARD_BURST, now)
         self._links = RateLimits(LINK_RATE, BURST)
+        self._empty_since: float | None = None
+
+    def left_empty(self, now: float) -> None:
+        """Nobody is there any more."""
+        self._empty_since = now
+
+    def joined(self, now: float) -> None:
+        """Somebody came. What was written before a time without anybody is not for them to read."""
+        if self._empty_since is not None and now - self._empty_since >= SESSION_GAP:
+            self._kept.clear()
+        self._empty_since = None
 
     def __iter__(self) -> Iterator[SharedNote]:
         """The last ones, oldest first."""

@@ -44,11 +44,14 @@ class People:
         if peer.thumbnail:
             peer.name = peer.wanted_name  # nobody sees it, but a stop says whose it is
             return
+        self._board.joined(time.monotonic())
         self._audit.record("joined", peer.actor, ", ".join(sorted({stream.carrier for stream in peer.streams})))
 
     def left(self, peer: Peer) -> None:
         if not peer.thumbnail:
             self._audit.record("left", peer.actor, peer.ended)
+            if all(each.thumbnail or each is peer for each in self._peers):
+                self._board.left_empty(time.monotonic())
 
     def welcome(self, peer: Peer) -> None:
         """Tell a newcomer who is here and what was written."""

@@ -12,16 +12,7 @@ __all__ = ["LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
 
 START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
 LEFT_X, LEFT_Y = 0, 1
-ARM_TRIES, ARM_MILLISECONDS = 3, 3000
-ARMED = """(limit) => new Promise((resolve) => {
-  const end = performance.now() + limit;
-  const look = () => {
-    if (window.lockstep.stats().armed) resolve(true);
-    else if (performance.now() > end) resolve(false);
-    else setTimeout(look, 20);
-  };
-  look();
-})"""
+ARM_TRIES, ARM_SECONDS = 3, 3.0
 
 # The true event, read out of the strip that the planar robot draws into its pictures (robots/event_strip.py),
 # together with the stamp that the page believes it has. One expression: no picture is drawn in between.
@@ -63,6 +54,13 @@ class ConsolePage:
 
     async def until(self, condition: str, seconds: float = 20.0) -> None:
         """Until `condition`, an expression over `s`, the page's statistics, is true; one that throws is not."""
+        missed = await self._missed(condition, seconds)
+        if missed is not None:
+            shown = " | ".join((await self.page.inner_text("body")).split("\n"))
+            raise AssertionError(f"never came true: {condition}\nthe page's statistics: {missed}\nthe page: {shown}")
+
+    async def _missed(self, condition: str, seconds: float) -> str | None:
+        """The page's statistics in the end, if the condition did not come true; else None."""
         holds = f"const s = window.lockstep?.stats(); return Boolean(s && ({condition}));"
         # The condition is part of the script: the page's content security policy forbids evaluating strings.
         waiting = """(limit) => new Promise((resolve) => {
@@ -75,10 +73,7 @@ class ConsolePage:
           };
           look();
         })"""
-        missed = await missed_in_page(self.page, waiting % holds, seconds)
-        if missed is not None:
-            shown = " | ".join((await self.page.inner_text("body")).split("\n"))
-            raise AssertionError(f"never came true: {condition}\nthe page's statistics: {missed}\nthe page: {shown}")
+        return await missed_in_page(self.page, waiting % holds, seconds)
 
     async def until_live(self) -> None:
         """Connected, and every picture stream was drawn a few times."""
@@ -102,9 +97,9 @@ class ConsolePage:
         await self.until("s.seat && s.seat.mine")
         for _ in range(ARM_TRIES - 1):
             await self.press(START)
-            armed = await self.page.evaluate(ARMED, ARM_MILLISECONDS)
+            missed = await self._missed("s.armed", ARM_SECONDS)
             await self.press(START, False)
-            if armed:
+            if missed is None:
                 return
         await self.press(START)
         await self.until("s.armed", 5)

@@ -126,9 +126,9 @@ async def body_holders(target: Target, random: Random) -> None:
 
 
 async def slow_posts(target: Target, random: Random) -> None:
-    """A good token, and a body that does not come."""
-    head = f"POST /api/stop HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {target.token}\r\n"
-    await _hold(target, head.encode() + b"Content-Length: 1000\r\n\r\n")
+    """A good token, and a body that does not come. (That of a STOP would not be waited for: it is a stop.)"""
+    head = f"POST /whep HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {target.token}\r\n"
+    await _hold(target, head.encode() + f"Content-Type: {SDP}\r\nContent-Length: 1000\r\n\r\n".encode())
 
 
 async def silent_connections(target: Target, random: Random) -> None:

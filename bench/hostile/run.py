@@ -11,6 +11,7 @@ import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
+from random import Random
 from statistics import median, quantiles
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -28,7 +29,7 @@ __all__ = ["FRONTS", "hostile", "memory_of"]
 FRONTS = ("direct", "tls", "caddy")  # how the crowd comes
 
 WARM_UP = 3.0  # s
-INTERVAL = 0.05  # s between two commands
+INTERVAL = (0.046, 0.054)  # s between commands: spread over two ticks of the robot, or each waits for its tick alike
 ALLOWED = 1.2  # times the undisturbed median
 CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
 CROWD_SECONDS = 60.0  # for it to say something
@@ -124,12 +125,12 @@ async def _until_open(port: int) -> None:
 async def _drive(console: Console, seconds: float) -> list[float]:
     """Seconds from each command's first sending to its feedback."""
     end, taken = time.monotonic() + seconds, list[float]()
-    values = [0.0] * len(console.description.axes)
+    values, random = [0.0] * len(console.description.axes), Random(1)
     while time.monotonic() < end:
         began = time.perf_counter()
         await console.drive(values)
         taken.append(time.perf_counter() - began)
-        await asyncio.sleep(INTERVAL)
+        await asyncio.sleep(random.uniform(*INTERVAL))
     return taken
 
 

@@ -3,9 +3,7 @@
 import asyncio
 import contextlib
 import ssl
-import sys
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
 import pytest
@@ -19,6 +17,7 @@ from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.protocol.messages import Hello, encode_message
 from robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import RecordingRobot
+from tests.robot_bridge.flooding import flooding
 from tests.support.certificates import Authority
 
 SECRET = LinkSecret.draw()
@@ -97,21 +96,9 @@ while True:
 """
 
 
-@asynccontextmanager
-async def flood(address: tuple[str, int], host: str, says: bytes) -> AsyncIterator[None]:
+def flood(address: tuple[str, int], host: str, says: bytes) -> AbstractAsyncContextManager[None]:
     """Connections from `host`, each of which says this and nothing else."""
-    arguments = (host, str(address[1]), str(FLOOD), str(OPEN), says.hex())
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-c", FLOODING, *arguments), stdout=asyncio.subprocess.PIPE
-    )
-    try:
-        assert process.stdout is not None
-        async with asyncio.timeout(20):
-            await process.stdout.readline()
-        yield
-    finally:
-        process.kill()
-        await process.wait()
+    return flooding(FLOODING, host, str(address[1]), str(FLOOD), str(OPEN), says.hex())
 
 
 async def _opens(path: SlowPath, trust: ssl.SSLContext | None) -> bool:

@@ -1,10 +1,8 @@
 """Whoever is admitted and sends as fast as TCP takes it: the ticks go on, others drive and stop, memory is bounded."""
 
 import asyncio
-import contextlib
-import sys
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from collections.abc import Iterator
+from contextlib import AbstractAsyncContextManager
 
 import pytest
 
@@ -27,6 +25,7 @@ from robot_bridge.protocol.messages import (
 )
 from robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import DRIVE, RecordingRobot, operator, raw_link
+from tests.robot_bridge.flooding import flooding
 
 FLOODING = """
 import contextlib, os, socket, sys
@@ -51,21 +50,8 @@ with contextlib.suppress(ConnectionError):
 """
 
 
-@asynccontextmanager
-async def flood(bridge: Bridge, role: LinkRole, said: bytes) -> AsyncIterator[None]:
-    arguments = (str(bridge.address[1]), frame(encode_message(Hello(role=role))).hex(), said.hex())
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-c", FLOODING, *arguments), stdout=asyncio.subprocess.PIPE
-    )
-    try:
-        assert process.stdout is not None
-        async with asyncio.timeout(20):
-            await process.stdout.readline()
-        yield
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            process.kill()
-        await process.wait()
+def flood(bridge: Bridge, role: LinkRole, said: bytes) -> AbstractAsyncContextManager[None]:
+    return flooding(FLOODING, str(bridge.address[1]), frame(encode_message(Hello(role=role))).hex(), said.hex())
 
 
 class CountingRobot(RecordingRobot):

@@ -8,7 +8,8 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import msgspec
@@ -185,32 +186,34 @@ async def test_a_command_of_before_a_suspend_is_late() -> None:
 # the thread
 
 
-async def test_a_watchdog_that_acts_while_a_tick_begins_is_told_with_the_time_that_it_waited() -> None:
+@asynccontextmanager
+async def watched_robot() -> AsyncIterator[tuple[Watchdogs, threading.Event]]:
+    """The watchdogs of a robot that declares a call beside a hung tick, and whether that call was made."""
     robot = RecordingRobot()
     acted = threading.Event()
     robot.rest_from_thread = acted.set  # type: ignore[method-assign]
     watchdogs = Watchdogs(robot, LIMIT, clock.now)
     await watchdogs.start()
     try:
+        yield watchdogs, acted
+    finally:
+        watchdogs.close()
+
+
+async def test_a_watchdog_that_acts_while_a_tick_begins_is_told_with_the_time_that_it_waited() -> None:
+    async with watched_robot() as (watchdogs, acted):
         began = clock.now()
         assert watchdogs.begin(began, False) is None
         watchdogs.ticked(began, True)
         assert await asyncio.to_thread(acted.wait, PATIENCE)
         held = watchdogs.begin(began + 0.004, True)
-    finally:
-        watchdogs.close()
     assert held is not None
     assert held.acted
     assert held.seconds >= LIMIT
 
 
 async def test_a_bridge_that_hangs_while_it_applies_rest_is_one_that_hangs_in_motion() -> None:
-    robot = RecordingRobot()
-    acted = threading.Event()
-    robot.rest_from_thread = acted.set  # type: ignore[method-assign]
-    watchdogs = Watchdogs(robot, LIMIT, clock.now)
-    await watchdogs.start()
-    try:
+    async with watched_robot() as (watchdogs, acted):
         watchdogs.ticked(clock.now(), True)
         watchdogs.ticked(clock.now(), False)
         assert await asyncio.to_thread(acted.wait, PATIENCE)
@@ -218,8 +221,6 @@ async def test_a_bridge_that_hangs_while_it_applies_rest_is_one_that_hangs_in_mo
         watchdogs.begin(clock.now(), True)
         watchdogs.ticked(clock.now() + 2 * LIMIT, False)  # rest was applied long enough
         assert not await asyncio.to_thread(acted.wait, 3 * LIMIT)
-    finally:
-        watchdogs.close()
 
 
 def test_the_thread_acts_again_and_again_while_nothing_comes_and_only_for_a_robot_that_moves() -> None:

@@ -14,12 +14,14 @@ from typing import Any
 
 import pytest
 
+from robot_bridge.protocol.console import Welcome
 from server import body, guarded_http
 from server.access import Identity
 from server.connection_places import ConnectionPlaces, Place
 from server.front_door import PATIENCE as PATIENCE_OF_THE_DOOR
 from server.tls import self_signed
-from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console
+from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console, running_rig
+from tests.server.watch_lines import NOWHERE, open_line
 
 HEAD = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n"
 
@@ -62,26 +64,26 @@ async def test_a_second_head_on_the_same_connection_may_not_dawdle_either() -> N
         assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
 
 
+async def _answer_to_half_a_body(rig: Rig, port: int, asked: bytes) -> bytes:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    head = HEAD.replace(b"GET /healthz", asked) + b"Authorization: " + rig.token("operator")["Authorization"].encode()
+    writer.write(head + b"\r\nContent-Length: 9\r\n\r\n{")
+    answer = await _said(reader)
+    writer.close()
+    return answer
+
+
 async def test_a_body_that_does_not_come_is_refused_by_name() -> None:
     async with guarded_console(request_timeout=0.2) as (rig, port):
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        token = rig.token("operator")["Authorization"].encode()
-        head = HEAD.replace(b"GET /healthz", b"POST /api/reset") + b"Authorization: " + token
-        writer.write(head + b"\r\nContent-Length: 9\r\n\r\n{")
-        assert b'"too_slow"' in await _said(reader)
-        writer.close()
+        assert b'"too_slow"' in await _answer_to_half_a_body(rig, port, b"POST /api/reset")
+        assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
 
 
 async def test_a_stop_whose_body_does_not_come_is_a_stop_all_the_same() -> None:
     async with guarded_console(request_timeout=0.2) as (rig, port):
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        token = rig.token("observer")["Authorization"].encode()
-        head = HEAD.replace(b"GET /healthz", b"POST /api/stop") + b"Authorization: " + token
-        writer.write(head + b"\r\nContent-Length: 9\r\n\r\n{")
-        assert b'"delivered":true' in await _said(reader)
-        writer.close()
-        assert rig.services.console.clock.stop.stopped
-        assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") >= 1
+        assert b'"delivered":true' in await _answer_to_half_a_body(rig, port, b"POST /api/stop")
+        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
 
 
 async def test_a_head_that_is_too_large_is_refused() -> None:
@@ -324,3 +326,10 @@ async def test_a_tls_handshake_that_never_ends_is_ended(monkeypatch: pytest.Monk
         writer.close()
         assert rig.count("lockstep_bad_input_total", where="http", reason="no_handshake") == 1
         assert len(rig.app.state.connection_places) == 0
+
+
+async def test_a_line_of_an_observer_gives_back_the_place_that_its_request_had() -> None:
+    """Lines last for hours and are bounded by themselves; requests, STOP among them, need the places."""
+    async with running_rig(relay=NOWHERE, observers_direct=0) as rig, open_line(rig) as line:
+        await line.until(lambda each: isinstance(each, Welcome))
+        assert len(rig.app.state.connection_places) == 1  # of the request for the ticket, which is kept alive

@@ -1,4 +1,5 @@
 import itertools
+from typing import cast
 
 import pytest
 from hypothesis import given
@@ -6,7 +7,7 @@ from hypothesis import strategies as st
 
 from robot_bridge.protocol.console import SharedNote
 from server.names import MAX_NAME, clean_name, printable, unique_names
-from server.notes import BOARD_BURST, BURST, KEPT, LINK_RATE, NoteBoard
+from server.notes import BOARD_BURST, BURST, KEPT, LINK_RATE, SESSION_GAP, NoteBoard
 from server.token_bucket import TokenBucket
 
 
@@ -156,3 +157,17 @@ def test_a_crowd_of_names_that_look_alike_is_counted_as_one() -> None:
     numbers = sorted(int(name.rpartition(" ")[2]) for name in names if " " in name)
     assert len(set(numbers)) == len(numbers)
     assert max(numbers) <= len(spellings)
+
+
+def test_newcomers_do_not_get_the_notes_of_a_session_that_is_over_and_whoever_comes_back_soon_does() -> None:
+    board = NoteBoard(0.0)
+    _write(board, "the code of the door is 4711")
+    board.left_empty(100.0)
+    board.joined(100.0 + SESSION_GAP - 1)
+    assert [note.text for note in board] == ["the code of the door is 4711"]
+    board.left_empty(2000.0)
+    board.joined(2000.0 + SESSION_GAP)
+    assert list(board) == []
+    assert cast(SharedNote, _write(board, "hello", now=3000.0)).id == 2
+    board.joined(1e9)
+    assert [note.text for note in board] == ["hello"]
