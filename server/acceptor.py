@@ -9,16 +9,12 @@ from collections.abc import Callable
 from server.client_address import counted_address
 from server.connection_places import ConnectionPlaces, Place
 from server.request_turns import RequestTurns
-from server.token_bucket import TokenBucket
 
 __all__ = ["PROXIES", "Acceptor", "PlacedProtocol"]
 
 # Whose X-Forwarded-For is believed: uvicorn's default, and how IPv4 looks to a socket of both families.
 PROXIES = frozenset({"127.0.0.1", "::1", "::ffff:127.0.0.1"})
 HANDSHAKE_SECONDS = 5.0  # for TLS
-ACCEPT = "accept"  # whose turns those of new connections are
-RATE, TLS_RATE = 1500.0, 400.0  # Hz, of new connections; with TLS each costs a handshake
-BURST = 2000.0
 PAUSE = 0.1  # s, when there is no descriptor left
 
 
@@ -50,11 +46,10 @@ class Acceptor:
         """Until cancelled; connections that have begun by then go on.
 
         Each has its turn before the next one is accepted: the others wait in the kernel, where they cost nothing and
-        where the newest cannot push out one that has not begun. They have a pace of their own and come before what
-        strangers send: somebody who comes to say STOP is a stranger until the connection has begun.
+        where the newest cannot push out one that has not begun. However many strangers' requests wait, it has its
+        turn: somebody who comes to say STOP is a stranger until the connection has begun.
         """
         loop = asyncio.get_running_loop()
-        pace = TokenBucket(RATE if self._tls is None else TLS_RATE, BURST, loop.time())
         async with asyncio.TaskGroup() as tasks:
             while True:
                 try:
@@ -67,10 +62,7 @@ class Acceptor:
                         await asyncio.sleep(0)  # it was gone before it was accepted
                     continue
                 try:
-                    if wait := pace.wait(loop.time()):
-                        await asyncio.sleep(wait)
-                    pace.take(loop.time())
-                    await self._turns.take(ACCEPT, first=True)
+                    await self._turns.begin()
                 except BaseException:
                     connection.close()
                     raise

@@ -16,6 +16,7 @@ from server.acceptor import PlacedProtocol
 from server.connection_places import ConnectionPlaces, Place
 from server.known_tokens import KnownTokens
 from server.limit_settings import LimitSettings
+from server.rate_limits import RateLimits
 from server.request_turns import RequestTurns
 from server.token_bucket import TokenBucket
 
@@ -24,6 +25,9 @@ __all__ = ["DEADLINE", "PLACE", "GuardedConnections", "guarded_by", "guarded_htt
 DEADLINE, PLACE = "request_deadline", "place"  # keys of a request's `state`
 GRACE = 1.0  # s after the deadline, in which the answer that says so may leave
 LEAST_READ = 16 * 1024  # bytes of an answer that a client reads within the time of a request
+LINK_RATE, LINK_BURST = 50.0, 300  # Hz, of what one link sends before all others; a page that loads takes some thirty
+STOP_RATE, STOP_BURST = 50.0, 100  # the same for its stops, apart
+STOP = re.compile(rb"POST [!-~]{0,500}/api/(?:fleet/)?stop[ ?]")
 BEARER = re.compile(rb"\r\nauthorization:[ \t]*bearer[ \t]+([!-~]{1,4096})[ \t]*\r\n", re.IGNORECASE)
 
 
@@ -39,6 +43,7 @@ def guarded_http(
     places: ConnectionPlaces, turns: RequestTurns, tokens: KnownTokens, seconds: float
 ) -> type[PlacedProtocol]:
     """uvicorn's protocol within bounds. `seconds`: for a whole request, and for each part of its answer."""
+    budgets = {True: RateLimits(STOP_RATE, STOP_BURST), False: RateLimits(LINK_RATE, LINK_BURST)}  # whether of stops
 
     class GuardedHttp(H11Protocol, PlacedProtocol):
         place: Place
@@ -48,6 +53,7 @@ def guarded_http(
         _unread = 0  # bytes, when it was looked at
         _upgraded = False
         _awaited = True  # a whole request, or the rest of one
+        _is_stop = False  # the request that is coming
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
@@ -64,12 +70,18 @@ def guarded_http(
             if not self._asked:
                 self._asked = True
                 self.transport.pause_reading()
-                first = self._brings_known_token() if self.conn.their_state is h11.IDLE else bool(self.place.link)
-                turns.ask(self.place.link if first and self.place.link else self.place.address, self._take, first=first)
+                known = self._known()
+                first = bool(known) and budgets[self._is_stop].spend(known, self.loop.time())
+                turns.ask(known or self.place.address, self._take, first=first)
 
-        def _brings_known_token(self) -> bool:
+        def _known(self) -> str:
+            """The good token, or the link, that brings what has come; "": a stranger does."""
+            if self.conn.their_state is not h11.IDLE:
+                return self.place.link
+            self._is_stop = STOP.match(self._arrived) is not None
             found = BEARER.search(self._arrived)
-            return found is not None and found[1].decode("ascii") in tokens
+            token = "" if found is None else found[1].decode("ascii")
+            return token if token in tokens else ""
 
         def _take(self) -> None:
             """In its turn: what has come so far."""

@@ -8,14 +8,17 @@ from server.token_bucket import TokenBucket
 
 __all__ = ["RequestTurns"]
 
+OTHERS = 2  # pieces of work between two beginnings, where both wait
+
 Work = Callable[[], None]
 
 
 class RequestTurns:
     """One piece of work in each turn of the loop; addresses take turns, and each one's work keeps its order.
 
-    Work that is `first` comes before all other, by turns among itself. The other has a pace, if there is one. The bound
-    of what waits is that of connections, since each has one thing under way.
+    Work that is `first` comes before all other, by turns among itself. The other has a pace, if there is one, and
+    beginnings have every third turn of it. The bound of what waits is that of connections, since each has one thing
+    under way.
     """
 
     def __init__(self, pace: Callable[[float], TokenBucket] | None = None) -> None:
@@ -25,6 +28,8 @@ class RequestTurns:
         self._pace: TokenBucket | None = None
         self._first: dict[str, deque[Work]] = {}  # by address, the next first
         self._others: dict[str, deque[Work]] = {}
+        self._beginnings: deque[Work] = deque()
+        self._since = 0  # others that had their turn since the last beginning
         self._timer: asyncio.TimerHandle | None = None  # while the pace holds others back
 
     async def take(self, address: str, *, first: bool = False) -> None:
@@ -33,6 +38,18 @@ class RequestTurns:
             return
         turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._queue(address, lambda: _settle(turn), first)
+        await turn
+
+    async def begin(self) -> None:
+        """As `take`, for a new connection: it has its turn however many others wait, and they theirs.
+
+        Each beginning leaves room for two others: what has begun is served before the next one can push it out.
+        """
+        if self._may_begin(False):
+            return
+        turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._beginnings.append(lambda: _settle(turn))
+        self._come_back_soon()
         await turn
 
     def ask(self, address: str, work: Work, *, first: bool = False) -> None:
@@ -44,7 +61,7 @@ class RequestTurns:
 
     def _may_begin(self, first: bool) -> bool:
         loop = asyncio.get_running_loop()
-        if not self._is_free or not (first or (not self._others and self._paced(loop.time()))):
+        if not self._is_free or not (first or (not self._waits and self._paced(loop.time()))):
             return False
         self._is_free = False
         loop.call_soon(self._pass_on)
@@ -52,7 +69,10 @@ class RequestTurns:
 
     def _queue(self, address: str, work: Work, first: bool) -> None:
         (self._first if first else self._others).setdefault(address, deque()).append(work)
-        if self._is_free:  # nothing would come back for it
+        self._come_back_soon()
+
+    def _come_back_soon(self) -> None:
+        if self._is_free:  # nothing would come back for what waits
             self._is_free = False
             asyncio.get_running_loop().call_soon(self._pass_on)
 
@@ -67,15 +87,27 @@ class RequestTurns:
         loop = asyncio.get_running_loop()
         if self._first:
             work = _next(self._first)
-        elif self._others and self._paced(loop.time()):
-            work = _next(self._others)
+        elif self._waits and self._paced(loop.time()):
+            work = self._next_other()
         else:
             self._is_free = True
-            if self._others and self._timer is None and self._pace is not None:
+            if self._waits and self._timer is None and self._pace is not None:
                 self._timer = loop.call_later(self._pace.wait(loop.time()), self._come_back)
             return
         loop.call_soon(self._pass_on)
         work()
+
+    @property
+    def _waits(self) -> bool:
+        """Work that is not `first`."""
+        return bool(self._others or self._beginnings)
+
+    def _next_other(self) -> Work:
+        if self._beginnings and (self._since >= OTHERS or not self._others):
+            self._since = 0
+            return self._beginnings.popleft()
+        self._since += 1
+        return _next(self._others)
 
     def _come_back(self) -> None:
         self._timer = None

@@ -9,7 +9,6 @@ import pytest
 from server.acceptor import Acceptor, PlacedProtocol
 from server.connection_places import ConnectionPlaces, Place
 from server.request_turns import RequestTurns
-from server.token_bucket import TokenBucket
 
 
 class _Places(ConnectionPlaces):
@@ -54,22 +53,6 @@ async def test_an_ipv6_client_is_counted_by_its_network_and_a_proxy_only_on_this
         _, writer = await asyncio.open_connection(*address, local_addr=(comes_from, 0))
         async with asyncio.timeout(20):
             assert await places.came.get() == counted
-        writer.transport.abort()
-        accepting.cancel()
-        await asyncio.wait([accepting])
-
-
-async def test_what_strangers_send_holds_up_no_new_connection() -> None:
-    """However many of them wait: whoever comes to say STOP comes as a stranger."""
-    turns, places = RequestTurns(lambda now: TokenBucket(1e-6, 1, now)), _Places()
-    for number in range(100):
-        turns.ask(f"stranger {number}", lambda: None)
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        listener.setblocking(False)
-        accepting = asyncio.create_task(Acceptor(listener, places, turns, PlacedProtocol, None).run())
-        _, writer = await asyncio.open_connection(*listener.getsockname())
-        async with asyncio.timeout(20):
-            assert await places.came.get() == ("127.0.0.1", True)
         writer.transport.abort()
         accepting.cancel()
         await asyncio.wait([accepting])

@@ -7,7 +7,7 @@ import math
 import os
 import socket
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from server import body, guarded_http
 from server.access import Identity
 from server.connection_places import ConnectionPlaces, Place
 from server.front_door import PATIENCE as PATIENCE_OF_THE_DOOR
+from server.request_turns import RequestTurns
 from server.tls import self_signed
 from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console, running_rig
 from tests.server.watch_lines import NOWHERE, open_line
@@ -175,6 +176,42 @@ async def test_strangers_wait_for_their_pace_and_who_brings_a_good_token_does_no
         waiting.cancel()
         for each in (writer, other):
             each.close()
+
+
+async def test_a_link_that_floods_comes_first_no_more_but_its_stops_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else strangers would get no answer while it does: a page that somebody opens, a health check."""
+    came_first: list[bool] = []
+    ask = RequestTurns.ask
+
+    def spied(self: RequestTurns, address: str, work: Callable[[], None], *, first: bool = False) -> None:
+        came_first.append(first)
+        ask(self, address, work, first=first)
+
+    monkeypatch.setattr(RequestTurns, "ask", spied)
+    for name in ("LINK_RATE", "STOP_RATE"):
+        monkeypatch.setattr(guarded_http, name, 1e-6)
+    monkeypatch.setattr(guarded_http, "LINK_BURST", 2)
+    monkeypatch.setattr(guarded_http, "STOP_BURST", 3)
+    async with guarded_console() as (rig, port):
+        header = rig.token("observer")
+        await rig.http.get("/api/session", headers=header)  # a token is known from its first use on
+        token = b"Authorization: " + header["Authorization"].encode() + b"\r\n"
+        reader, writer = await _open(port)
+        stop = HEAD.replace(b"GET /healthz", b"POST /api/stop") + token + b"Content-Length: 2\r\n\r\n"
+        came_first.clear()
+        for _ in range(3):
+            writer.write(HEAD + token + b"\r\n")
+            await _answer(reader)
+            await reader.readuntil(b"}")
+        assert came_first == [True, True, False]
+        came_first.clear()
+        writer.write(stop)
+        await eventually(lambda: len(came_first) == 1)
+        writer.write(b"{}")
+        await _answer(reader)
+        writer.close()
+        assert came_first == [True, True]
+        await eventually(lambda: rig.services.console.clock.stop.stopped)
 
 
 async def test_a_link_that_has_ended_is_a_strangers_and_no_longer_comes_first() -> None:

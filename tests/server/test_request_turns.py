@@ -113,3 +113,25 @@ async def test_work_that_raises_holds_up_nobody() -> None:
     turns.ask("a", partial(done.append, "after"))
     await turns_of_the_loop(5)
     assert done == ["planted", "after"]
+
+
+async def test_a_beginning_gets_every_third_turn_however_many_others_wait() -> None:
+    rig = Rig()
+
+    async def begin(name: str) -> None:
+        await rig.turns.begin()
+        rig.served.append(name)
+
+    tasks = [*rig.begin("a1", "b1", "c1", "d1", "e1"), *(asyncio.create_task(begin(name)) for name in ("x1", "x2"))]
+    await asyncio.gather(*tasks)
+    assert rig.served == ["a1", "b1", "c1", "x1", "d1", "e1", "x2"]
+
+
+async def test_a_beginning_keeps_to_the_pace_and_comes_when_there_is_budget_again() -> None:
+    turns = RequestTurns(lambda now: TokenBucket(20, 1, now))
+    async with asyncio.timeout(20):
+        await turns.begin()
+        waiting = asyncio.create_task(turns.begin())
+        await turns_of_the_loop(5)
+        assert not waiting.done()
+        await waiting
