@@ -33,6 +33,7 @@ SECTIONS = (
     "scene",
     "memory",
     "recording",
+    "datagrams",
 )
 BUSY_PERCENT = 8.0  # of the machine, by others, above which the figures say more about them
 LOOK_SECONDS = 1.5  # at the neighbours before each section

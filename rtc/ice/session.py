@@ -63,7 +63,7 @@ class Session:
         self._list = CheckList(settings.max_pairs)
         self._triggered: deque[Pair] = deque()
         self._transactions: dict[bytes, Transaction] = {}
-        self._seen: dict[bytes, Path] = {}  # transactions of the peer's checks, the newest last
+        self._seen: dict[bytes, None] = {}  # transactions of the peer's checks, the newest last
         self._answers = TokenBuckets(settings.max_checks_per_second, settings.check_burst)
         self._out: list[Datagram] = []
         self._next_check_at = 0.0
@@ -133,10 +133,6 @@ class Session:
         if not self._answers.take(now):
             self._counts["checks_over_rate"] += 1
             return
-        seen_on = self._seen.get(request.transaction)
-        if seen_on is not None and seen_on != path:
-            self._counts["repeated_elsewhere"] += 1  # a recorded check, sent again by whoever has seen it
-            return
         if request.not_understood:  # RFC 8489 6.3.1
             self._answer_error(request, path, StunErrorCode(420, "Unknown Attribute"), request.not_understood)
         elif request.method != BINDING or request.priority is None:
@@ -149,7 +145,7 @@ class Session:
                 self._repeat_checks_with_new_role()
             success = Message(Kind.SUCCESS, request.transaction, mapped=path.remote)
             self._out.append(Datagram(serialize(success, self.local_credentials.password), path))
-            self._learn_from_check(request, path, new=seen_on is None, now=now)
+            self._learn_from_check(request, path, now)
 
     def has_asked(self, transaction: bytes) -> bool:
         return transaction in self._transactions
@@ -238,8 +234,12 @@ class Session:
         answer = Message(Kind.ERROR, request.transaction, request.method, error=error, unknown_attributes=unknown)
         self._out.append(Datagram(serialize(answer, self.local_credentials.password), path))
 
-    def _learn_from_check(self, request: Message, path: Path, new: bool, now: float) -> None:
-        """RFC 8445 7.3.1.3 to 7.3.1.5."""
+    def _learn_from_check(self, request: Message, path: Path, now: float) -> None:
+        """RFC 8445 7.3.1.3 to 7.3.1.5.
+
+        A recorded check that comes again may be the peer's own repetition, by another port of its NAT. It shows an
+        address, which counts for nothing until it has answered, and is no sign of consent.
+        """
         pair = self._list.pairs.get(path) or self._pair_shown_by(request, path)
         if pair is None:
             return
@@ -247,10 +247,8 @@ class Session:
         self._directory.hint(path, self._agent)
         if self._retired:
             return
-        if new:
-            self._remember(request.transaction, path)
-            if pair is self.selected and self.consent is not None:
-                self.consent.given(now)
+        if self._is_new(request.transaction) and pair is self.selected and self.consent is not None:
+            self.consent.given(now)
         works = pair.state is PairState.SUCCEEDED and self._is_fresh(pair, now)
         if request.use_candidate and not self._role.controlling:
             pair.nominated_by_peer = True
@@ -259,10 +257,13 @@ class Session:
         if not works:
             self._trigger(pair, now)
 
-    def _remember(self, transaction: bytes, path: Path) -> None:
-        self._seen[transaction] = path
+    def _is_new(self, transaction: bytes) -> bool:
+        if transaction in self._seen:
+            return False
+        self._seen[transaction] = None
         if len(self._seen) > self._settings.remembered_checks:
             del self._seen[next(iter(self._seen))]
+        return True
 
     def _pair_shown_by(self, request: Message, path: Path) -> Pair | None:
         """A pair that is not in the check list. Its address may be new: a peer-reflexive candidate (7.3.1.3)."""

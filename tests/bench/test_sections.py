@@ -9,7 +9,7 @@ from bench.cli import SECTIONS, measure
 from bench.context import Context
 from bench.driving import console_trips, link_trips
 from bench.event_log import robot_times
-from bench.sections import command_to_feedback, scene
+from bench.sections import command_to_feedback, datagrams, scene
 from bench.stack import running_bridge, running_stack
 from client import Console
 from robot_bridge.link_client import RobotLink
@@ -44,6 +44,13 @@ async def test_command_to_feedback_reports_each_figure_with_its_baseline(monkeyp
     assert own.value is not None
     assert total.value is not None
     assert own.value < total.value
+
+
+async def test_the_datagrams_section_sends_pictures_in_one_call_and_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(datagrams, "QUICK_TURNS", 2)
+    results = await datagrams.run(Context(quick=True, robots=[], say=lambda _: None))
+    assert all(result.value and result.baseline and result.samples == 768 for result in results)
+    assert len(results) == 3
 
 
 async def test_the_scene_section_drives_with_and_without_viewers_who_get_the_scene(

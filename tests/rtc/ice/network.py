@@ -50,6 +50,9 @@ class Network:
         agent.receive_datagram(data, path, self.now)
         self.drain(agent)
 
+    def lose_what_is_under_way(self) -> None:
+        self._under_way.clear()
+
     def drain(self, agent: Agent) -> None:
         for datagram in agent.datagrams_to_send():
             self.sent.append((self.now, datagram))

@@ -497,14 +497,29 @@ def test_answers_are_sent_at_a_bounded_rate() -> None:
     assert here.counts["checks_over_rate"] >= 900
 
 
-def test_a_check_that_is_recorded_and_sent_from_elsewhere_shows_no_candidate() -> None:
+def test_a_check_that_is_recorded_and_sent_from_elsewhere_changes_no_path() -> None:
     network, here, there = connected()
-    data = check_by(network, here, there)
-    network.inject(data, Path(HERE, THERE))
-    pairs = len(here._current._list.pairs)
-    network.inject(data, Path(HERE, ("203.0.113.9", 9)))
-    assert len(here._current._list.pairs) == pairs
-    assert here.counts["repeated_elsewhere"] == 1
+    network.run(60)
+    recorded = [each.data for _, each in network.sent if each.remote == HERE and parse(each.data).kind is Kind.REQUEST]
+    for number in range(1000):
+        network.inject(recorded[number % len(recorded)], Path(HERE, (f"203.0.113.{number % 250 + 1}", 1024 + number)))
+        network.run(0.1)
+        assert here.path == Path(HERE, THERE)
+    assert here._directory.size < 200
+
+
+def test_a_repetition_that_comes_by_another_port_of_the_nat_is_heard() -> None:
+    """The nomination is under way when the NAT changes, so that the peer repeats it with one transaction."""
+    network = Network()
+    here, there = agent_at("10.0.0.9", controlling=True), agent_at(THERE[0])
+    network.translate = nat("10.0.0.9", "203.0.113.50", 61000)
+    connect(network, here, there)
+    assert network.run(5, lambda: settled(network, there))
+    assert not settled(network, here)
+    network.lose_what_is_under_way()
+    network.translate = nat("10.0.0.9", "203.0.113.50", 62000)
+    assert network.run(2, lambda: settled(network, here))
+    assert network.run(2, lambda: there.path == Path(THERE, ("203.0.113.50", 62000)))
 
 
 def test_an_agent_that_ends_leaves_nothing_behind() -> None:

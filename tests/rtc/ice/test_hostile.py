@@ -107,7 +107,6 @@ COUNTS = {
     "indication",
     "malformed",
     "not_stun",
-    "repeated_elsewhere",
     "too_many_addresses",
     "unauthentic",
     "unexpected_response",
