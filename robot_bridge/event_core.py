@@ -281,7 +281,7 @@ class EventCore:
         self._issue_wanted = False
         nonce, stop = self._nonces(), self._latch.state
         self._remember_issue(_Issued(now, nonce, self._interlock.spell))
-        self._latch.shown(stop)
+        self._latch.shown(stop, now)
         self._issued_at = now
         self._feedback = Feedback(
             event=self._current,

@@ -1,7 +1,7 @@
 """The latched stop: its numbers, the presses behind them, and which reset releases it. No I/O, no clock.
 
-Call `stop`, `reset`, `lock_out` and `let_in` in any order, and `shown` with every stop state that was fed back. Where
-the latch is kept on a disk, whatever changes it raises `version`: write `record` away from the loop, and call `written`
+Call `stop`, `reset`, `lock_out` and `let_in` in any order, and `shown` with every stop state that was fed back, at least
+twice a second. Where the latch is kept on a disk, whatever changes it raises `version`: write `record` away from the loop, and call `written`
 with the version that was written, or could not be. Without a disk a reset takes effect at once and nothing is kept.
 Rules and reasons: docs/robot-link.md, "Stop and reset".
 """
@@ -30,6 +30,7 @@ __all__ = [
 ]
 
 LEAST_STOP = 1.0  # s between the newest stop and the first reset that may release it
+HELD_UP = 1.5  # s without a feedback: a reset that comes then may have waited for as long as the bridge was held up
 MAX_PRESSES = 256  # remembered; a repeat of a forgotten one counts as a new stop, which is the safe side
 MAX_NUMBER = 2**53 - 1
 TEXT = 500  # characters of `by` and `reason`, as on the link
@@ -111,6 +112,7 @@ class StopLatch:
         self._last_number = max(record.number, numbers_after)
         self._stopped_at = now  # s, when the newest stop came
         self._shown = 0  # newest stop that a feedback has shown
+        self._shown_at = math.inf  # s, when the last feedback was; infinite before the first
         self._resetting: tuple[int, int] | None = None  # number of the reset that waits for the disk, and its version
         self._written = 0  # newest version on the disk
 
@@ -161,8 +163,10 @@ class StopLatch:
         self.version += 1
         return StopGiven(number, is_new=True, latched=latched, overtaken=overtaken)
 
-    def shown(self, state: StopState) -> None:
-        """A feedback said this."""
+    def shown(self, state: StopState, now: float) -> None:
+        """A feedback says this now."""
+        self._look(now)
+        self._shown_at = now
         if state.stopped:
             self._shown = max(self._shown, state.number)
 
@@ -175,6 +179,7 @@ class StopLatch:
             return ResetNeedless(number)
         if self._state.locked_out:
             return ResetRefused(number, "locked_out", self._state.locked_out)
+        self._look(now)
         if now - self._stopped_at < LEAST_STOP or self._shown < newest:
             return ResetRefused(number, "too_soon", f"a stop lasts at least {LEAST_STOP:g} s")
         self.version += 1
@@ -210,6 +215,11 @@ class StopLatch:
             return False
         self._state = msgspec.structs.replace(self._state, locked_out="")
         return True
+
+    def _look(self, now: float) -> None:
+        """After a bridge that was held up the stop counts as new: nobody knows how old the resets are that waited."""
+        if now - self._shown_at > HELD_UP:
+            self._stopped_at = now
 
     def _next_number(self) -> int:
         self._last_number = min(self._last_number + 1, MAX_NUMBER)

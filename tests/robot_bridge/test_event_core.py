@@ -268,12 +268,29 @@ def test_reset_releases_the_stop_causes_an_issue_and_moves_nothing_before_a_neut
 
 def test_a_stop_that_no_feedback_has_shown_cannot_be_reset() -> None:
     core = core_at()
+    core.issue(MEASURED, 100.0)
     core.stop("", "Ada", "", 100.0)
-    outcome = core.reset(1, 200.0)
+    outcome = core.reset(1, 101.2)
     assert isinstance(outcome, ResetRefused)
     assert outcome.reason == "too_soon"
-    core.issue(MEASURED, 200.0)
-    assert core.reset(1, 200.0) == ResetTaken(1)
+    core.issue(MEASURED, 101.2)
+    assert core.reset(1, 101.2) == ResetTaken(1)
+
+
+@pytest.mark.parametrize("tick_first", [True, False])
+def test_a_reset_that_waited_while_the_bridge_was_held_up_has_no_effect(tick_first: bool) -> None:
+    core = core_at()
+    core.stop("", "Ada", "", 100.0)
+    core.issue(MEASURED, 100.0)
+    woken = 4000.0
+    if tick_first:
+        core.issue(MEASURED, woken)
+    outcome = core.reset(1, woken)
+    assert isinstance(outcome, ResetRefused)
+    assert outcome.reason == "too_soon"
+    core.issue(MEASURED, woken)
+    assert isinstance(core.reset(1, woken + 0.9), ResetRefused)
+    assert core.reset(1, woken + 1.1) == ResetTaken(1)
 
 
 def test_reset_without_a_stop_changes_nothing() -> None:

@@ -5,6 +5,7 @@
 
 static const uint32_t LAST_EVENT = 0x7fffffff;
 static const double LEAST_STOP = 1.0; /* s between the newest stop and a reset */
+static const double HELD_UP = 1.5; /* s without a feedback, after which a reset may have waited as long */
 static const double EVENT_INTERVAL = 1 / 25.0; /* s, of max_event_rate; the description leaves it at its default */
 static const int BURST = 2;                    /* events that may come ahead of it */
 static const double REFRESH = 0.5; /* s between feedbacks while nothing is commanded */
@@ -105,10 +106,16 @@ uint64_t events_stop(events *of, const char *press, const char *by, const char *
     return of->number;
 }
 
+/* After a bridge that was held up the stop counts as new: nobody knows how old the resets are that waited. */
+static void look(events *of, double now) {
+    if (of->issue != 0 && now - of->issues[of->issue % ISSUES].time > HELD_UP) of->stopped_at = now;
+}
+
 const char *events_reset(events *of, uint64_t number, double now, bool *released) {
     *released = false;
     if (number != of->number) return "stale_reset";
     if (!of->stopped) return NULL;
+    look(of, now);
     if (now - of->stopped_at < LEAST_STOP || of->shown < of->number) return "too_soon";
     of->stopped = false;
     of->stopped_by[0] = of->stop_reason[0] = '\0';
@@ -157,6 +164,7 @@ bool events_issue_due(const events *of, double now) {
 }
 
 void events_issue(events *of, double now, uint64_t nonce) {
+    look(of, now);
     if (of->pending != 0) {
         of->current = of->pending;
         of->pending = 0;
