@@ -92,5 +92,9 @@ def check_origin(headers: Headers, allowed: tuple[str, ...]) -> None:
     origin = headers.get("origin")
     if origin is None or origin in allowed:
         return  # not a browser, or a friend
-    if urlsplit(origin).netloc != headers.get("host"):
+    try:
+        site = urlsplit(origin).netloc
+    except ValueError as error:  # "http://["
+        raise OriginRefused("the Origin header is not valid") from error
+    if site != headers.get("host"):
         raise OriginRefused("requests from pages of other sites are refused")

@@ -202,6 +202,9 @@ async def test_pages_of_other_sites_are_refused() -> None:
             ("https://friend.example", 200),
             ("https://evil.example", 403),
             ("null", 403),
+            ("http://[", 403),
+            ("http://a]b", 403),
+            ("", 403),
         ]:
             answer = await rig.http.post("/api/stop", headers={**headers, "Origin": origin})
             assert answer.status_code == status, origin
