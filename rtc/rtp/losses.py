@@ -9,6 +9,8 @@ from rtc.rtp.stage import PacketsGone, RoundTrip, Stage
 
 __all__ = ["Losses", "LossSettings"]
 
+MAX_ASKED = 200  # packets in one NACK: it fits a datagram however they lie
+
 
 @dataclass(frozen=True, slots=True)
 class LossSettings:
@@ -73,8 +75,9 @@ class Losses(Stage):
         for _, each in wanted:
             each.asked += 1
             each.ask_at = now + max(self._settings.patience, self._round_trip.seconds)
-        if wanted:
-            self.control(Nack(self._own_ssrc, self._ssrc, tuple(number & 0xFFFF for number, _ in wanted)), now)
+        numbers = [number & 0xFFFF for number, _ in wanted]
+        for start in range(0, len(numbers), MAX_ASKED):
+            self.control(Nack(self._own_ssrc, self._ssrc, tuple(numbers[start : start + MAX_ASKED])), now)
         if given_up:
             self.event(PacketsGone(self._ssrc, "late"))
         super().handle_timer(now)

@@ -12,7 +12,9 @@ from rtc.rtp.rtcp import RtcpPacket
 from rtc.rtp.sender_reports import SenderReports
 from rtc.rtp.stage import RoundTrip, Sink, Stage, StreamEvent
 
-__all__ = ["OutgoingParameters", "OutgoingStream", "PathShare"]
+__all__ = ["MAX_PAYLOAD", "OutgoingParameters", "OutgoingStream", "PathShare"]
+
+MAX_PAYLOAD = 1200  # bytes; headers and encryption add some sixty, and paths carry 1,400
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +74,17 @@ class OutgoingStream:
         """Send one frame.
 
         Args:
-            payloads: of its packets, each at most 1,200 bytes
+            payloads: of its packets, each at most MAX_PAYLOAD bytes
             media_time: in the codec's clock, from any beginning
             marker: whether the last packet says that the frame is whole
             values: of header extensions, by URI
             captured_at: when, on the clock of `now`; None: now
+
+        Raises:
+            ValueError: a payload is too long.
         """
+        if any(len(payload) > MAX_PAYLOAD for payload in payloads):
+            raise ValueError(f"a payload of more than {MAX_PAYLOAD} bytes")
         parameters = self.parameters
         timestamp = (parameters.timestamp_offset + media_time) & 0xFFFFFFFF
         last = len(payloads) - 1

@@ -116,10 +116,12 @@ def test_keys_are_in_no_text() -> None:
     assert "remote" not in repr(client)
 
 
-RECEIVER = pair()[1]
+@pytest.fixture(scope="module")
+def attacked() -> SrtpReceiver:
+    return pair()[1]
 
 
 @given(st.binary(max_size=2000))
-def test_no_bytes_raise(data: bytes) -> None:
-    assert RECEIVER.unprotect(data) is None
-    assert RECEIVER.unprotect_rtcp(data) is None
+def test_no_bytes_raise(attacked: SrtpReceiver, data: bytes) -> None:
+    assert attacked.unprotect(data) is None
+    assert attacked.unprotect_rtcp(data) is None

@@ -1,0 +1,446 @@
+"""One WebRTC peer without I/O: ICE, DTLS, SRTP, SCTP with its channels, and RTP, put together for one BUNDLE.
+
+    way in:   receive_datagram → (rtc.demux) → ICE | DTLS → SCTP → channels | SRTP → streams → events
+    way out:  send, send_frame → channels → SCTP → DTLS | streams → SRTP → datagrams_to_send, on the path of ICE
+
+Negotiate with `answer`, or with `offer` and then `accept`; then live as every core: `receive_datagram`, `handle_timer`;
+drain `datagrams_to_send` and `events` after each; `timer`.
+"""
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from random import Random, SystemRandom
+
+from OpenSSL import SSL
+
+from rtc.addresses import Datagram, Path
+from rtc.channels import DataChannels
+from rtc.dcep import Reliability
+from rtc.demux import DatagramKind, datagram_kind
+from rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsFailed, DtlsSettings, DtlsState
+from rtc.fingerprint import Fingerprint
+from rtc.ice.agent import Agent
+from rtc.ice.candidates import CandidateError, parse_candidate
+from rtc.ice.check_list import LocalCandidate
+from rtc.ice.credentials import Credentials
+from rtc.ice.directory import Directory
+from rtc.ice.events import Ended, PathChanged
+from rtc.ice.settings import IceSettings
+from rtc.peer_events import Connected, MediaEvent, PacketReceived, PathFound, PeerEnded, PeerEvent
+from rtc.rtp.outgoing import PathShare
+from rtc.rtp.stage import earliest
+from rtc.rtp.streams import Identity, NegotiatedMedia, Streams
+from rtc.sctp import SctpSettings
+from rtc.sdp import (
+    LocalMedia,
+    MediaSection,
+    SessionDescription,
+    Source,
+    SourceGroup,
+    Transport,
+    answer_to,
+    check_answer,
+    data_section,
+    media_section,
+    offer_of,
+    reverse,
+)
+from rtc.srtp import SrtpPacketTooLong, SrtpReceiver, SrtpSender
+
+__all__ = ["OfferedMedia", "Peer", "PeerNotReady", "PeerSettings"]
+
+DATA_MID = "data"  # of the section for channels in our offers
+EXTENSION_IDS = (*range(1, 15), *range(16, 256))  # of header extensions; 15 is reserved (RFC 8285 4.2)
+
+
+class PeerNotReady(RuntimeError):
+    """The peer has no such stream or no channels: not negotiated, not yet, or not any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class PeerSettings:
+    """What an application may want otherwise."""
+
+    ice: IceSettings = field(default_factory=IceSettings)
+    dtls: DtlsSettings = field(default_factory=DtlsSettings)
+    sctp: SctpSettings = field(default_factory=SctpSettings)
+    epoch: float = 0.0  # s since 1970 at which the clock of `now` was 0; for sender reports
+    held: int = 32  # datagrams of DTLS that overtake the description they need; a handshake has fewer
+
+
+@dataclass(frozen=True, slots=True)
+class OfferedMedia:
+    """A section of an offer of ours."""
+
+    mid: str
+    kind: str  # "audio" or "video"
+    media: LocalMedia
+
+
+@dataclass(slots=True)
+class _Ssrcs:
+    stream: int
+    repair: int
+
+
+class Peer:
+    """One session with one peer. It ends with PeerEnded; another one is another object."""
+
+    def __init__(
+        self,
+        context: SSL.Context,
+        fingerprint: Fingerprint,
+        candidates: Iterable[LocalCandidate],
+        *,
+        offerer: bool,
+        settings: PeerSettings | None = None,
+        directory: Directory | None = None,
+        random: Random | None = None,
+    ) -> None:
+        """
+        Args:
+            context: from `rtc.dtls.dtls_context`; `fingerprint` is of its certificate.
+            candidates: where the peer may reach us.
+            offerer: whether we make the offer; then we decide on the path (RFC 8445 6.1.1).
+            directory: of the `rtc.ice.port.Port` whose sockets it shares.
+            random: nobody may foresee it: a SystemRandom except in tests.
+        """
+        self.settings = settings or PeerSettings()
+        self.counts: Counter[str] = Counter()
+        self._random = random or SystemRandom()
+        self.ice = Agent(
+            candidates, controlling=offerer, settings=self.settings.ice, directory=directory, rng=self._random
+        )
+        self._context = context
+        self._fingerprint = fingerprint
+        self._identity = Identity.new(self._random)
+        self._session_id = self._random.getrandbits(62)  # RFC 8829 5.2.1
+        self._ssrcs: dict[str, _Ssrcs] = {}  # by mid
+        self._offer: SessionDescription | None = None  # ours, until it is answered
+        self._dtls: DtlsConnection | None = None  # None until both descriptions are known
+        self._held: deque[bytes] = deque(maxlen=self.settings.held)
+        self.channels: DataChannels | None = None  # None when there are none
+        self.streams: Streams | None = None  # None until both descriptions are known
+        self._protect: SrtpSender | None = None
+        self._unprotect: SrtpReceiver | None = None
+        self._out: list[Datagram] = []
+        self._events: list[PeerEvent] = []
+        self._now = 0.0
+        self._ended = False
+
+    # Negotiation
+
+    def answer(self, offer: SessionDescription, media: Mapping[str, LocalMedia], now: float) -> SessionDescription:
+        """Our answer to a peer's offer. `media`: what we can do, by the offer's mid. Raises SdpError."""
+        answer = answer_to(
+            offer,
+            self._own_transport(),
+            {mid: self._with_sources(mid, own) for mid, own in media.items()},
+            max_message_size=self.settings.sctp.max_receive_message,
+            session_id=self._session_id,
+        )
+        self._negotiated(offer, answer, answer.sections, now)
+        return answer
+
+    def offer(self, media: Sequence[OfferedMedia], *, data: bool = True) -> SessionDescription:
+        """Our offer, with channels if `data`. The peer's answer goes to `accept`."""
+        uris = dict.fromkeys(uri for each in media for uri in each.media.extensions)
+        ids = dict(zip(uris, EXTENSION_IDS, strict=False))
+        sections = [media_section(x.mid, x.kind, self._with_sources(x.mid, x.media), ids) for x in media]
+        if data:
+            sections.append(data_section(DATA_MID, self.settings.sctp.max_receive_message))
+        self._offer = offer_of(sections, self._own_transport(), session_id=self._session_id)
+        return self._offer
+
+    def accept(self, answer: SessionDescription, now: float) -> None:
+        """The peer's answer to our offer. Raises SdpError; RuntimeError without an offer that waits for one."""
+        if self._offer is None:
+            raise RuntimeError("there is no offer of ours to answer")
+        check_answer(self._offer, answer)
+        ours = [replace(section, direction=reverse(section.direction)) for section in answer.sections]
+        self._offer = None
+        self._negotiated(answer, answer, ours, now)
+
+    def add_candidate(self, line: str) -> None:
+        """One more of the peer's, "candidate:…" (RFC 8838). What nobody understands is counted and ignored."""
+        try:
+            self.ice.add_remote_candidate(parse_candidate(line))
+        except CandidateError:
+            self.counts["candidate_malformed"] += 1
+
+    def _own_transport(self) -> Transport:
+        credentials = self.ice.local_credentials
+        return Transport(
+            ufrag=credentials.ufrag,
+            password=credentials.password,
+            fingerprints=(self._fingerprint,),
+            setup="passive",  # the peer knows first that ICE has found a path, if it is the one that asks
+            candidates=tuple(local.candidate.line() for local in self.ice.local_candidates),
+            end_of_candidates=True,
+            ice_options=("trickle",),
+        )
+
+    def _with_sources(self, mid: str, own: LocalMedia) -> LocalMedia:
+        """With the SSRCs that we send under."""
+        ssrcs = self._ssrcs.setdefault(mid, _Ssrcs(self._random.getrandbits(32), self._random.getrandbits(32)))
+        names = {"cname": self._identity.cname} | ({"msid": own.msid} if own.msid else {})
+        if not any(codec.name.lower() == "rtx" for codec in own.codecs):
+            return replace(own, sources=(Source(ssrcs.stream, names),))
+        sources = (Source(ssrcs.stream, names), Source(ssrcs.repair, names))
+        return replace(own, sources=sources, source_groups=(SourceGroup("FID", (ssrcs.stream, ssrcs.repair)),))
+
+    def _negotiated(
+        self, remote: SessionDescription, answer: SessionDescription, ours: Sequence[MediaSection], now: float
+    ) -> None:
+        """`ours`: the answer's sections with our direction."""
+        self._now = now
+        media = [
+            NegotiatedMedia(
+                section,
+                own.direction,
+                self._ssrcs[section.mid].stream,
+                self._ssrcs[section.mid].repair,
+                frozenset(source.ssrc for source in (theirs.sources if theirs else ())),
+            )
+            for section, own in zip(answer.sections, ours, strict=True)
+            if section.is_media and not section.rejected
+            for theirs in (remote.section(section.mid),)
+        ]
+        self.streams = Streams(media, self._identity, PathShare(self.settings.epoch), self._random)
+        we_answer = remote is not answer
+        active = (answer.transport.setup == "active") is we_answer
+        self._dtls = DtlsConnection(
+            self._context, "client" if active else "server", remote.transport.fingerprints, self.settings.dtls
+        )
+        data = next((each for each in answer.accepted if each.sctp_port is not None), None)
+        theirs = remote.section(data.mid) if data is not None else None
+        if theirs is not None:
+            self.channels = DataChannels(
+                self.settings.sctp,
+                self._random.randbytes,
+                client=active,
+                peer_port=theirs.sctp_port,
+                peer_max_message=theirs.max_message_size,
+            )
+        self._begin_ice(remote.transport, now)
+
+    def _begin_ice(self, remote: Transport, now: float) -> None:
+        self.ice.set_remote(Credentials(remote.ufrag, remote.password), (), now)
+        for line in remote.candidates:
+            self.add_candidate(line)
+        if self.ice.path is not None:
+            self._start_dtls(now)
+
+    # What the application sends
+
+    def open_channel(
+        self, label: str, now: float, *, protocol: str = "", reliability: Reliability | None = None
+    ) -> int:
+        """As `DataChannels.open`. Raises PeerNotReady as well."""
+        self._now = now
+        return self._need_channels().open(label, now, protocol=protocol, reliability=reliability)
+
+    def send(self, channel: int, data: str | bytes, now: float) -> None:
+        """As `DataChannels.send`. Raises PeerNotReady as well."""
+        self._now = now
+        self._need_channels().send(channel, data, now)
+
+    def close_channel(self, channel: int, now: float) -> None:
+        self._now = now
+        self._need_channels().close(channel, now)
+
+    def send_frame(
+        self,
+        mid: str,
+        payloads: Sequence[bytes],
+        media_time: int,
+        now: float,
+        *,
+        marker: bool = True,
+        values: Mapping[str, bytes] | None = None,
+        captured_at: float | None = None,
+    ) -> None:
+        """As `OutgoingStream.send`, in section `mid`. Raises PeerNotReady: it is not up, or we do not send there."""
+        stream = self.streams.outgoing.get(mid) if self.streams is not None else None
+        if stream is None or self._protect is None:
+            raise PeerNotReady(f"nothing can be sent in section {mid!r}")
+        self._now = now
+        stream.send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
+
+    def request_keyframe(self, mid: str, now: float) -> None:
+        """Raises PeerNotReady: we do not receive in section `mid`."""
+        stream = self.streams.incoming.get(mid) if self.streams is not None else None
+        if stream is None:
+            raise PeerNotReady(f"nothing is received in section {mid!r}")
+        self._now = now
+        stream.request_keyframe(now)
+
+    def close(self, now: float) -> None:
+        """Say goodbye in every protocol that has a word for it. Idempotent; drain `datagrams_to_send` once more."""
+        if self._ended:
+            return
+        self._now = now
+        if self.streams is not None:
+            self.streams.close(now)
+        if self.channels is not None:
+            self.channels.abort(now)
+        self._collect()
+        if self._dtls is not None:
+            self._dtls.close(now)
+        self._collect()
+        self._end("closed")
+
+    def _need_channels(self) -> DataChannels:
+        if self.channels is None or self._ended:
+            raise PeerNotReady("there are no data channels")
+        return self.channels
+
+    # What every core has
+
+    def receive_datagram(self, data: bytes, path: Path, now: float) -> None:
+        """From the peer, as far as `rtc.ice.port.Port` can say; whatever it is."""
+        self._now = now
+        if self._ended:
+            self.counts["ended"] += 1
+            return
+        kind = datagram_kind(data)
+        if kind is DatagramKind.STUN:
+            self.ice.receive_datagram(data, path, now)
+        elif not self.ice.accepts(path):
+            self.counts["unknown_path"] += 1
+        elif kind is DatagramKind.DTLS:
+            self._receive_dtls(data, now)
+        elif kind in (DatagramKind.RTP, DatagramKind.RTCP):
+            self._receive_media(data, kind, now)
+        else:
+            self.counts["unknown_protocol"] += 1
+        self._settle(now)
+
+    def handle_timer(self, now: float) -> None:
+        self._now = now
+        if self._ended:
+            return
+        self.ice.handle_timer(now)
+        for core in (self._dtls, self.channels, self.streams):
+            due = core.timer() if core is not None else None
+            if core is not None and due is not None and now >= due:
+                core.handle_timer(now)
+        self._settle(now)
+
+    def timer(self) -> float | None:
+        if self._ended:
+            return None
+        cores = (self.ice, self._dtls, self.channels, self.streams)
+        return earliest(*(core.timer() for core in cores if core is not None))
+
+    def datagrams_to_send(self) -> list[Datagram]:
+        self._collect()
+        out, self._out = self._out, []
+        return out
+
+    def events(self) -> list[PeerEvent]:
+        self._settle(self._now)
+        events, self._events = self._events, []
+        return events
+
+    # Inside: the way in
+
+    def _receive_dtls(self, data: bytes, now: float) -> None:
+        if self._dtls is None or self._dtls.state is DtlsState.NEW:
+            self._held.append(data)  # the peer's answer, or our own look at the path, is on its way
+            self.counts["dtls_early"] += 1
+        else:
+            self._dtls.receive_datagram(data, now)
+
+    def _receive_media(self, data: bytes, kind: DatagramKind, now: float) -> None:
+        if self._unprotect is None or self.streams is None:
+            self.counts["media_early"] += 1
+        elif kind is DatagramKind.RTP:
+            plain = self._unprotect.unprotect(data)
+            if plain is not None:
+                self.streams.receive_rtp(plain, now)
+        else:
+            plain = self._unprotect.unprotect_rtcp(data)
+            if plain is not None:
+                self.streams.receive_rtcp(plain, now)
+
+    def _settle(self, now: float) -> None:
+        """Hand on what one core tells the next, and tell the application."""
+        for event in self.ice.events():
+            if isinstance(event, PathChanged):
+                self._events.append(PathFound(event.path))
+                self._start_dtls(now)
+            elif isinstance(event, Ended):
+                self._end(event.reason)
+        if self._dtls is not None:
+            self._settle_dtls(self._dtls, now)
+        if self.channels is not None:
+            self._events += self.channels.events()
+        if self.streams is not None:
+            self._events += [PacketReceived(mid, packet) for mid, packet in self.streams.packets()]
+            self._events += [MediaEvent(mid, event) for mid, event in self.streams.events()]
+
+    def _start_dtls(self, now: float) -> None:
+        if self._dtls is not None and self._dtls.state is DtlsState.NEW and self.ice.path is not None:
+            self._dtls.start(now)
+            while self._held:
+                self._dtls.receive_datagram(self._held.popleft(), now)
+
+    def _settle_dtls(self, dtls: DtlsConnection, now: float) -> None:
+        for event in dtls.events():
+            if isinstance(event, DtlsConnected):
+                self._connected(event, now)
+            elif isinstance(event, DtlsData):
+                if self.channels is None:
+                    self.counts["data_without_channels"] += 1
+                else:
+                    self.channels.receive_packet(event.data, now)
+            elif isinstance(event, DtlsClosed):
+                self._end("peer_closed")
+            elif isinstance(event, DtlsFailed):
+                self._end(f"dtls_{event.reason}", event.detail)
+
+    def _connected(self, event: DtlsConnected, now: float) -> None:
+        if event.srtp is not None:
+            self._protect, self._unprotect = SrtpSender(event.srtp), SrtpReceiver(event.srtp)
+        self._events.append(Connected(event.srtp.profile.name if event.srtp is not None else None))
+        if self.channels is not None:
+            self.channels.start(now)
+
+    def _end(self, reason: str, detail: str = "") -> None:
+        if self._ended:
+            return
+        self._collect()  # an alert or a close_notify may still go out
+        self._ended = True
+        self.ice.close()
+        if self.channels is not None:
+            self._events += self.channels.events()
+        self._events.append(PeerEnded(reason, detail))
+
+    # Inside: the way out
+
+    def _collect(self) -> None:
+        """Take from each core what is due, the innermost first."""
+        if self._ended:
+            return
+        self._out += self.ice.datagrams_to_send()
+        dtls, path = self._dtls, self.ice.path
+        if dtls is None:
+            return
+        if self.channels is not None and dtls.state is DtlsState.CONNECTED:
+            for packet in self.channels.packets_to_send():
+                dtls.send(packet, self._now)
+        sent = dtls.datagrams_to_send()
+        if self.streams is not None and self._protect is not None:
+            sent += self._protected(self._protect.protect_rtcp, self.streams.rtcp_to_send())
+            sent += self._protected(self._protect.protect, self.streams.rtp_to_send())
+        if path is not None:  # where there is none, everything is as good as lost, and repeated as such
+            self._out += [Datagram(data, path) for data in sent]
+
+    def _protected(self, protect: Callable[[bytes], bytes], packets: Iterable[bytes]) -> Iterator[bytes]:
+        for packet in packets:
+            try:
+                yield protect(packet)
+            except SrtpPacketTooLong:  # header extensions of the application's, of hundreds of bytes
+                self.counts["packet_too_long"] += 1

@@ -1,0 +1,55 @@
+"""What a peer tells whoever uses it. Events of its data channels are in `rtc.channels`."""
+
+from dataclasses import dataclass
+
+from rtc.addresses import Path
+from rtc.channels import ChannelEvent
+from rtc.rtp.packet import RtpPacket
+from rtc.rtp.stage import StreamEvent
+
+__all__ = ["Connected", "MediaEvent", "PacketReceived", "PathFound", "PeerEnded", "PeerEvent"]
+
+
+@dataclass(frozen=True, slots=True)
+class PathFound:
+    """Datagrams take this way from now on. None: a restart of ICE is to find another."""
+
+    path: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class Connected:
+    """DTLS is up: media and channels flow, with the peer that its session description names."""
+
+    srtp_profile: str | None  # None: no media
+
+
+@dataclass(frozen=True, slots=True)
+class PacketReceived:
+    """A packet of the peer's stream in section `mid`, decrypted. It may come before one that it follows."""
+
+    mid: str
+    packet: RtpPacket
+
+
+@dataclass(frozen=True, slots=True)
+class MediaEvent:
+    """Something about the stream in section `mid`."""
+
+    mid: str
+    event: StreamEvent
+
+
+@dataclass(frozen=True, slots=True)
+class PeerEnded:
+    """Nothing may be sent any more; the last event.
+
+    `reason` is a stable name: "closed" by us, "peer_closed", "no_path" and "consent_expired" of ICE, "dtls_protocol",
+    "dtls_fingerprint", "dtls_timeout", "dtls_too_much_handshake".
+    """
+
+    reason: str
+    detail: str = ""
+
+
+PeerEvent = PathFound | Connected | PacketReceived | MediaEvent | ChannelEvent | PeerEnded

@@ -1,0 +1,79 @@
+"""Two peers with a network between them that has a clock of its own, a delay and losses that repeat."""
+
+import heapq
+from collections.abc import Callable
+from itertools import count
+from random import Random
+
+from rtc.addresses import Datagram, Path
+from rtc.certificate import Certificate
+from rtc.dtls import dtls_context
+from rtc.ice.gathering import gather
+from rtc.peer import Peer, PeerSettings
+from rtc.peer_events import PeerEvent
+from rtc.rtp.stage import earliest
+from rtc.sdp import SessionDescription, parse_description, write_description
+
+__all__ = ["DELAY", "PeerPair", "through_text"]
+
+DELAY = 0.02  # s, one way
+CERTIFICATES = [Certificate.generate(), Certificate.generate()]
+CONTEXTS = [dtls_context(certificate) for certificate in CERTIFICATES]
+
+
+def through_text(description: SessionDescription) -> SessionDescription:
+    """As signalling carries it."""
+    return parse_description(write_description(description))
+
+
+class PeerPair:
+    """`peers[0]` offers, `peers[1]` answers."""
+
+    def __init__(self, settings: PeerSettings | None = None, seed: int = 1) -> None:
+        random = Random(seed)
+        self.now = 1000.0
+        self.lost: Callable[[int, bytes], bool] = lambda side, data: False  # of what `peers[side]` sent
+        self.peers = [
+            Peer(
+                CONTEXTS[side],
+                CERTIFICATES[side].fingerprint,
+                gather([f"192.0.2.{side + 1}"], 4000),
+                offerer=side == 0,
+                settings=settings,
+                random=Random(random.random()),
+            )
+            for side in (0, 1)
+        ]
+        self.events: tuple[list[PeerEvent], list[PeerEvent]] = ([], [])
+        self.sent: tuple[list[bytes], list[bytes]] = ([], [])
+        self._flying: list[tuple[float, int, int, Datagram]] = []  # when, order, sender, what
+        self._order = count()
+
+    def run(self, seconds: float) -> None:
+        end = self.now + seconds
+        while True:
+            self._collect()
+            times = [each.timer() for each in self.peers]
+            due = earliest(*times, *(each[0] for each in self._flying[:1]))
+            if due is None or due > end:
+                break
+            self.now = max(self.now, due)
+            while self._flying and self._flying[0][0] <= self.now:
+                _, _, side, datagram = heapq.heappop(self._flying)
+                path = Path(datagram.remote, datagram.local)
+                self.peers[1 - side].receive_datagram(datagram.data, path, self.now)
+            for peer, timer in zip(self.peers, times, strict=True):
+                if timer is not None and timer <= self.now:
+                    peer.handle_timer(self.now)
+        self.now = end
+
+    def _collect(self) -> None:
+        for side, peer in enumerate(self.peers):
+            self.events[side].extend(peer.events())
+            for datagram in peer.datagrams_to_send():
+                self.sent[side].append(datagram.data)
+                if not self.lost(side, datagram.data):
+                    heapq.heappush(self._flying, (self.now + DELAY, next(self._order), side, datagram))
+
+    def of(self, side: int, kind: type) -> list[PeerEvent]:
+        return [each for each in self.events[side] if isinstance(each, kind)]

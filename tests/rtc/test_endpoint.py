@@ -1,0 +1,171 @@
+"""Whole endpoints on loopback: ours with ours, and with aiortc as it is."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack
+from fractions import Fraction
+
+import pytest
+from aiortc import RTCDataChannel, RTCPeerConnection, RTCSessionDescription, VideoStreamTrack
+from av import VideoFrame
+from av.frame import Frame
+
+from rtc.channels import ChannelMessage, ChannelOpened
+from rtc.endpoint import Connection, Endpoint, EndpointSettings, TooManyPeers
+from rtc.peer import OfferedMedia
+from rtc.peer_events import Connected, PacketReceived, PeerEnded, PeerEvent
+from rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
+from tests.rtc.vp8 import packetise
+
+VP8 = Codec(96, "VP8", 90_000, feedback=("nack", "nack pli", "goog-remb"))
+RTX = Codec(97, "rtx", 90_000, parameters={"apt": "96"})
+HOST = "127.0.0.1"
+
+
+@pytest.fixture
+async def endpoint() -> AsyncIterator[Endpoint]:
+    async with Endpoint([HOST]) as found:
+        yield found
+
+
+async def until(connection: Connection, wanted: Callable[[PeerEvent], bool]) -> PeerEvent:
+    async for event in connection:
+        if wanted(event):
+            return event
+        assert not isinstance(event, PeerEnded), event
+    raise AssertionError("ended")
+
+
+def of(kind: type) -> Callable[[PeerEvent], bool]:
+    return lambda event: isinstance(event, kind)
+
+
+async def test_many_peers_share_one_port(endpoint: Endpoint) -> None:
+    async with AsyncExitStack() as stack:
+        pairs = []
+        for _ in range(5):
+            other = await stack.enter_async_context(Endpoint([HOST]))
+            offerer, answerer = endpoint.connect(offerer=True), other.connect(offerer=False)
+            offerer.accept(answerer.answer(offerer.offer(), {}))
+            pairs.append((offerer, answerer))
+        for number, (offerer, answerer) in enumerate(pairs):
+            await until(offerer, of(Connected))
+            channel = offerer.open_channel("x")
+            offerer.send(channel, f"message {number}")
+            message = await until(answerer, of(ChannelMessage))
+            assert message == ChannelMessage(channel, f"message {number}")
+        assert len({each.peer.ice.path.local for each, _ in pairs if each.peer.ice.path}) == 1
+        for offerer, answerer in pairs:
+            offerer.close()
+            assert await until_ended(offerer) == PeerEnded("closed")
+            assert await until_ended(answerer) == PeerEnded("peer_closed")
+
+
+async def until_ended(connection: Connection) -> PeerEvent:
+    return [event async for event in connection][-1]
+
+
+async def test_the_number_of_peers_is_bounded() -> None:
+    async with Endpoint([HOST], settings=EndpointSettings(peers=1)) as endpoint:
+        connection = endpoint.connect(offerer=True)
+        with pytest.raises(TooManyPeers):
+            endpoint.connect(offerer=True)
+        connection.close()
+        assert await until_ended(connection) == PeerEnded("closed")
+        endpoint.connect(offerer=True)
+
+
+class Strip(VideoStreamTrack):
+    """Pictures of one grey each, brighter from one to the next."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._number = 0
+
+    async def recv(self) -> VideoFrame:
+        pts, time_base = await self.next_timestamp()
+        frame = VideoFrame(64, 64, "yuv420p")
+        for plane in frame.planes:
+            plane.update(bytes([self._number * 16 % 256]) * plane.buffer_size)
+        self._number += 1
+        frame.pts, frame.time_base = pts, time_base
+        return frame
+
+
+async def test_aiortc_answers_and_gets_messages_and_pictures_with_header_extensions(endpoint: Endpoint) -> None:
+    pc = RTCPeerConnection()
+    frames: asyncio.Queue[Frame] = asyncio.Queue()
+    received: asyncio.Queue[str] = asyncio.Queue()
+    tasks = []
+
+    @pc.on("track")
+    def on_track(track: VideoStreamTrack) -> None:
+        async def read() -> None:
+            while True:
+                frames.put_nowait(await track.recv())
+
+        tasks.append(asyncio.create_task(read()))
+
+    @pc.on("datachannel")
+    def on_channel(channel: RTCDataChannel) -> None:
+        channel.on("message", received.put_nowait)
+        channel.send("from aiortc")
+
+    connection = endpoint.connect(offerer=True)
+    camera = LocalMedia((VP8, RTX), "sendonly", (MID_URI,), msid="camera track")
+    try:
+        offer = connection.offer([OfferedMedia("camera", "video", camera)])
+        await pc.setRemoteDescription(RTCSessionDescription(write_description(offer), "offer"))
+        await pc.setLocalDescription(await pc.createAnswer())
+        connection.accept(parse_description(pc.localDescription.sdp))
+        await until(connection, of(Connected))
+        channel = connection.open_channel("x")
+        connection.send(channel, "from us")
+        assert await received.get() == "from us"
+        assert await until(connection, of(ChannelMessage)) == ChannelMessage(channel, "from aiortc")
+        for number, payloads in enumerate(packetise(10)):
+            connection.send_frame("camera", payloads, number * 3000)
+        frame = await frames.get()
+        assert isinstance(frame, VideoFrame)
+        assert (frame.width, frame.height) == (64, 64)
+        assert frame.time_base == Fraction(1, 90_000)
+    finally:
+        for task in tasks:
+            task.cancel()
+        connection.close()
+        await pc.close()
+
+
+async def test_aiortc_offers_and_sends_pictures_and_messages(endpoint: Endpoint) -> None:
+    pc = RTCPeerConnection()
+    pc.addTrack(Strip())
+    theirs = pc.createDataChannel("theirs")
+    received: asyncio.Queue[str] = asyncio.Queue()
+    theirs.on("open", lambda: theirs.send("from aiortc"))
+    theirs.on("message", received.put_nowait)
+    connection = endpoint.connect(offerer=False)
+    try:
+        await pc.setLocalDescription(await pc.createOffer())
+        offer = parse_description(pc.localDescription.sdp)
+        video = next(section for section in offer.sections if section.kind == "video")
+        screen = LocalMedia((VP8, RTX), "recvonly", (MID_URI,))
+        answer = connection.answer(offer, {video.mid: screen})
+        await pc.setRemoteDescription(RTCSessionDescription(write_description(answer), "answer"))
+        opened = packet = message = None
+        while opened is None or packet is None or message is None:
+            event = await anext(connection)
+            assert not isinstance(event, PeerEnded), event
+            opened = event if isinstance(event, ChannelOpened) else opened
+            packet = event if isinstance(event, PacketReceived) else packet
+            message = event if isinstance(event, ChannelMessage) else message
+        assert opened.label == "theirs"
+        assert message.data == "from aiortc"
+        assert packet.mid == video.mid
+        assert packet.packet.values[MID_URI] == video.mid.encode()
+        connection.send(opened.channel, "from us")
+        assert await received.get() == "from us"
+        await pc.close()
+        assert await until_ended(connection) == PeerEnded("peer_closed")
+    finally:
+        connection.close()
+        await pc.close()

@@ -1,0 +1,225 @@
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import settings as examples
+from hypothesis import strategies as st
+
+from rtc.addresses import Path
+from rtc.certificate import Certificate
+from rtc.channels import ChannelMessage, ChannelOpened
+from rtc.peer import OfferedMedia, PeerNotReady
+from rtc.peer_events import Connected, MediaEvent, PacketReceived, PathFound, PeerEnded
+from rtc.rtp.stage import KeyframeRequested, Reception
+from rtc.sdp import MID_URI, Codec, LocalMedia, SdpError
+from tests.rtc.peer_pair import PeerPair, through_text
+
+STAMP = "urn:stamp"
+VP8 = Codec(96, "VP8", 90_000, feedback=("nack", "nack pli"))
+RTX = Codec(97, "rtx", 90_000, parameters={"apt": "96"})
+OPUS = Codec(111, "opus", 48_000, 2)
+CAMERA = LocalMedia((VP8, RTX), "sendonly", (MID_URI, STAMP), msid="camera track")
+SCREEN = LocalMedia((VP8, RTX), "recvonly", (MID_URI, STAMP))
+TALK = LocalMedia((OPUS,), "sendrecv", (MID_URI,))
+SECTIONS = [OfferedMedia("camera", "video", CAMERA), OfferedMedia("talk", "audio", TALK)]
+
+
+def negotiate(pair: PeerPair) -> None:
+    offer = pair.peers[0].offer(SECTIONS)
+    answer = pair.peers[1].answer(through_text(offer), {"camera": SCREEN, "talk": TALK}, pair.now)
+    pair.peers[0].accept(through_text(answer), pair.now)
+
+
+def connected(seed: int = 1) -> PeerPair:
+    pair = PeerPair(seed=seed)
+    negotiate(pair)
+    pair.run(2)
+    for side in (0, 1):
+        assert len(pair.of(side, Connected)) == 1, pair.events
+    return pair
+
+
+def test_both_find_a_path_and_connect() -> None:
+    pair = connected()
+    for side in (0, 1):
+        assert isinstance(pair.events[side][0], PathFound)
+        assert pair.of(side, Connected) == [Connected("SRTP_AEAD_AES_256_GCM")]
+
+
+def test_messages_go_both_ways_on_channels_of_either() -> None:
+    pair = connected()
+    for side in (0, 1):
+        channel = pair.peers[side].open_channel(f"of {side}", pair.now)
+        pair.peers[side].send(channel, "text", pair.now)
+        pair.peers[side].send(channel, b"bytes", pair.now)
+        pair.run(1)
+        [opened] = [each for each in pair.of(1 - side, ChannelOpened) if each.by_peer]  # type: ignore[union-attr]
+        assert isinstance(opened, ChannelOpened)
+        assert opened.label == f"of {side}"
+        messages = pair.of(1 - side, ChannelMessage)
+        assert messages[-2:] == [ChannelMessage(channel, "text"), ChannelMessage(channel, b"bytes")]
+        pair.peers[1 - side].send(channel, "back", pair.now)
+        pair.run(1)
+        assert pair.of(side, ChannelMessage)[-1] == ChannelMessage(channel, "back")
+        pair.peers[side].close_channel(channel, pair.now)
+
+
+def test_pictures_and_sound_arrive_in_their_sections_with_their_stamps() -> None:
+    pair = connected()
+    offerer, answerer = pair.peers
+    for frame in range(30):
+        stamp = {STAMP: frame.to_bytes(2, "big")}
+        offerer.send_frame("camera", [b"a" * 1000, b"b" * 100], frame * 3000, pair.now, values=stamp)
+        offerer.send_frame("talk", [b"hello"], frame * 960, pair.now, marker=False)
+        answerer.send_frame("talk", [b"and back"], frame * 960, pair.now, marker=False)
+        pair.run(1 / 30)
+    pair.run(1)
+    got = [each for each in pair.of(1, PacketReceived) if isinstance(each, PacketReceived)]
+    pictures = [each.packet for each in got if each.mid == "camera"]
+    assert [len(each.payload) for each in pictures] == [1000, 100] * 30
+    assert [each.values[STAMP] for each in pictures[::2]] == [frame.to_bytes(2, "big") for frame in range(30)]
+    assert [each.packet.payload for each in got if each.mid == "talk"] == [b"hello"] * 30
+    back = [each for each in pair.of(0, PacketReceived) if isinstance(each, PacketReceived)]
+    assert [each.packet.payload for each in back] == [b"and back"] * 30
+    told = [each.event for each in pair.of(0, MediaEvent) if isinstance(each, MediaEvent)]
+    assert any(isinstance(each, Reception) and each.round_trip is not None for each in told)
+
+
+def test_lost_pictures_are_repaired_and_a_keyframe_can_be_asked_for() -> None:
+    pair = connected()
+    lost = iter([False, True, False, True] * 4 + [False] * 10_000)
+    pair.lost = lambda side, data: side == 0 and len(data) > 900 and next(lost)
+    for frame in range(30):
+        pair.peers[0].send_frame("camera", [b"%04d" % frame + bytes(900)], frame * 3000, pair.now)
+        pair.run(1 / 30)
+    pair.run(1)
+    got = [each.packet for each in pair.of(1, PacketReceived) if isinstance(each, PacketReceived)]
+    assert sorted(each.payload[:4] for each in got) == [b"%04d" % frame for frame in range(30)]
+    assert any(each.is_repair for each in got)
+    pair.peers[1].request_keyframe("camera", pair.now)
+    pair.run(1)
+    told = [each.event for each in pair.of(0, MediaEvent) if isinstance(each, MediaEvent)]
+    assert any(isinstance(each, KeyframeRequested) for each in told)
+
+
+def test_what_was_not_negotiated_cannot_be_used() -> None:
+    pair = PeerPair()
+    offerer, answerer = pair.peers
+    with pytest.raises(PeerNotReady):
+        offerer.send_frame("camera", [b""], 0, 0)
+    with pytest.raises(PeerNotReady):
+        offerer.open_channel("x", 0)
+    with pytest.raises(RuntimeError, match="no offer"):
+        offerer.accept(PeerPair().peers[0].offer(SECTIONS), 0)
+    pair = PeerPair()
+    offerer, answerer = pair.peers
+    answer = answerer.answer(through_text(offerer.offer(SECTIONS, data=False)), {"talk": TALK}, pair.now)
+    offerer.accept(through_text(answer), pair.now)
+    pair.run(2)
+    for peer in pair.peers:
+        with pytest.raises(PeerNotReady):
+            peer.send_frame("camera", [b""], 0, pair.now)
+        with pytest.raises(PeerNotReady):
+            peer.request_keyframe("camera", pair.now)
+        with pytest.raises(PeerNotReady):
+            peer.open_channel("x", pair.now)
+    with pytest.raises(ValueError, match="1200"):
+        offerer.send_frame("talk", [bytes(1201)], 0, pair.now)
+
+
+def test_an_offer_that_cannot_be_answered_leaves_the_peer_as_it_was() -> None:
+    pair = PeerPair()
+    with pytest.raises(SdpError):
+        pair.peers[1].answer(pair.peers[0].offer(SECTIONS, data=False), {}, pair.now)
+    negotiate(pair)
+    pair.run(2)
+    assert pair.of(1, Connected)
+
+
+def test_who_closes_says_so_and_the_other_ends_as_well() -> None:
+    pair = connected()
+    pair.peers[0].send_frame("camera", [b"x"], 0, pair.now)
+    pair.peers[0].close(pair.now)
+    pair.peers[0].close(pair.now)
+    pair.run(1)
+    assert pair.of(0, PeerEnded) == [PeerEnded("closed")]
+    assert pair.of(1, PeerEnded) == [PeerEnded("peer_closed")]
+    assert isinstance(pair.events[1][-1], PeerEnded)
+    for peer in pair.peers:
+        assert peer.timer() is None
+        with pytest.raises(PeerNotReady):
+            peer.open_channel("x", pair.now)
+        peer.receive_datagram(b"\x16", Path(("192.0.2.1", 1), ("192.0.2.2", 1)), pair.now)
+        peer.handle_timer(pair.now)
+        assert peer.events() == []
+        assert peer.datagrams_to_send() == []
+
+
+def test_another_certificate_than_the_announced_one_ends_it_by_name() -> None:
+    pair = PeerPair()
+    offer = pair.peers[0].offer(SECTIONS)
+    stranger = Certificate.generate().fingerprint
+    forged = replace(offer, transport=replace(offer.transport, fingerprints=(stranger,)))
+    answer = pair.peers[1].answer(through_text(forged), {"camera": SCREEN}, pair.now)
+    pair.peers[0].accept(through_text(answer), pair.now)
+    pair.run(2)
+    [ended] = pair.of(1, PeerEnded)
+    assert isinstance(ended, PeerEnded)
+    assert ended.reason == "dtls_fingerprint"
+    assert not pair.of(1, Connected)
+    assert not pair.of(1, ChannelOpened)
+
+
+def test_silence_ends_it_by_name() -> None:
+    pair = connected()
+    pair.lost = lambda side, data: True
+    pair.run(60)
+    assert pair.of(0, PeerEnded) == pair.of(1, PeerEnded) == [PeerEnded("consent_expired")]
+
+
+def test_a_peer_that_never_comes_ends_it_by_name() -> None:
+    pair = PeerPair()
+    pair.lost = lambda side, data: True
+    negotiate(pair)
+    pair.run(120)
+    assert pair.of(0, PeerEnded) == [PeerEnded("no_path")]
+
+
+def test_a_restart_of_ice_changes_nothing_else() -> None:
+    pair = connected()
+    channel = pair.peers[0].open_channel("x", pair.now)
+    credentials = [peer.ice.restart() for peer in pair.peers]
+    candidates = [[each.candidate for each in peer.ice.local_candidates] for peer in pair.peers]
+    for side in (0, 1):
+        pair.peers[side].ice.set_remote(credentials[1 - side], candidates[1 - side], pair.now)
+    pair.run(5)
+    pair.peers[0].send(channel, "after", pair.now)
+    pair.run(1)
+    assert pair.of(1, ChannelMessage) == [ChannelMessage(channel, "after")]
+    assert not pair.of(0, PeerEnded)
+
+
+def test_candidates_that_nobody_understands_are_counted() -> None:
+    peer = PeerPair().peers[0]
+    peer.add_candidate("candidate:nonsense")
+    assert peer.counts == {"candidate_malformed": 1}
+
+
+@pytest.fixture(scope="module")
+def attacked() -> PeerPair:
+    return connected()
+
+
+@examples(deadline=None)
+@given(st.binary(max_size=300), st.booleans())
+def test_nothing_that_comes_from_anywhere_raises_or_ends_a_session(
+    attacked: PeerPair, data: bytes, from_the_peer: bool
+) -> None:
+    peer = attacked.peers[0]
+    path = peer.ice.path
+    assert path is not None
+    if not from_the_peer:
+        path = Path(path.local, ("203.0.113.5", 9))
+    peer.receive_datagram(data, path, attacked.now)
+    assert not [each for each in peer.events() if isinstance(each, PeerEnded)]
+    peer.datagrams_to_send()
