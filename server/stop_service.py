@@ -176,6 +176,7 @@ class StopService:
         Raises:
             Silenced: a supervisor has silenced the stops of this link.
         """
+        press = msgspec.structs.replace(press, by=self._named(press.by))
         by, where = press.by, press.where
         self._metrics.stops.labels(where).inc()
         if by.link and self._silenced.holds(by.link, time.monotonic()):
@@ -197,6 +198,13 @@ class StopService:
                 self._await(press, replaced)
             case _:
                 self._audit.again("stop", by, f"{where}, again")
+
+    def _named(self, by: Actor) -> Actor:
+        """By the name that whoever pressed is called here, where only one person has the link; a request tells none."""
+        if by.peer or not by.link:
+            return by
+        names = {peer.name for peer in self._peers if peer.identity.token_id == by.link}
+        return by._replace(name=names.pop()) if len(names) == 1 else by
 
     def _await(self, press: Press, replaced: Press | None) -> None:
         """Its answer, for so long that nobody takes it for delivered who is told nothing."""

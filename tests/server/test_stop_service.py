@@ -190,6 +190,17 @@ async def test_a_stop_is_delivered_only_when_the_robot_has_answered_with_its_num
     assert (record.who, record.what, record.detail) == ("olga", "stop, stop 7", "smoke")
 
 
+def test_a_stop_by_http_has_the_name_of_the_only_person_who_has_its_link(bench: Bench) -> None:
+    """A page sends it by HTTP too, and that may come first."""
+    link = bench.peers.all["olga"].identity.token_id
+    bench.peers.all["olga"].name = "Olga at the gate"
+    bench.service.stop(Press(id="p", by=Actor("observer", "observer", "", link), where="http"))
+    assert [message.by for message in bench.robot.sent] == ["Olga at the gate"]
+    bench.peers.all["bob"].identity = bench.peers.all["olga"].identity
+    bench.service.stop(Press(id="q", by=Actor("observer", "observer", "", link), where="http"))
+    assert [message.by for message in bench.robot.sent] == ["Olga at the gate", "observer"], "one of two"
+
+
 async def test_a_repeat_sends_nothing_and_has_the_outcome_of_its_first_also_when_that_is_not_delivered(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

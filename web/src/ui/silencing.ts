@@ -41,7 +41,7 @@ export function createSilencing(silence: (peer: string, silent: boolean) => void
       setHidden(element, !isAllowed);
       setText(
         question,
-        `STOP from ${person.name}’s link will have no effect for ten minutes. A stop that holds now stays until it is reset.`,
+        `STOP from ${person.name}’s link, and from links that were made with it, will have no effect for ten minutes. A stop that holds now stays until it is reset.`,
       );
       draw();
     },
