@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import msgspec
 
@@ -52,18 +53,17 @@ class BridgeProcess:
     ) -> None:
         """`secret`: of the robot link; an environment variable takes it there, which other users cannot read.
 
-        `python`: another interpreter than ours, such as that of a ROS installation. It finds the bridge's code here.
+        `python`: another interpreter than ours, such as that of a ROS installation. It finds the bridge's code here,
+        and none of the packages beside it: those are of another version of Python, and would hide its own.
         """
         self._robot = robot
         self._host = host
         self._port = port
         self._options = options
         self._python = python or sys.executable
+        self._is_foreign = python is not None
         self._environment = {**os.environ, "LOCKSTEP_LINK_SECRET": secret}
-        if python is not None:
-            here = str(Path(robot_bridge.__file__).parents[1])
-            paths = [self._environment.get("PYTHONPATH", ""), here]
-            self._environment["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
+        self._alone: TemporaryDirectory[str] | None = None  # while it runs: a folder with the bridge's package alone
         self._say = say
         self._process: asyncio.subprocess.Process | None = None
         self._backoff = Backoff(0.5, 10.0)
@@ -78,6 +78,10 @@ class BridgeProcess:
             *(self._python, "-m", "robot_bridge", self._robot, "--json"),
             *("--host", self._host, "--port", str(self._port), *self._options),
         ]
+        environment = self._environment
+        if self._is_foreign:
+            paths = (environment.get("PYTHONPATH", ""), self._folder_of_the_bridge())
+            environment = environment | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
         if (setpriv := shutil.which("setpriv")) is not None:
             command = [setpriv, "--pdeathsig", "TERM", *command]  # also when the console is killed
         try:
@@ -87,10 +91,11 @@ class BridgeProcess:
                 stdout=asyncio.subprocess.PIPE,
                 limit=MAX_LINE,
                 start_new_session=True,
-                env=self._environment,
+                env=environment,
             )
         except OSError as error:
             self._say(f"{error.filename}: {error.strerror}")
+            await self.close()
             raise BridgeFailed(NOT_FOUND) from error
         try:
             address = await self._read_address(self._process)
@@ -119,17 +124,18 @@ class BridgeProcess:
     async def close(self) -> None:
         """Ends it, gently first. Idempotent."""
         process, self._process = self._process, None
-        if process is None or process.returncode is not None:
-            return
-        with suppress(ProcessLookupError):
-            process.terminate()
-        try:
-            async with asyncio.timeout(STOP_TIMEOUT):
-                await process.wait()
-        except TimeoutError:
-            with suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
+        if process is not None and process.returncode is None:
+            await _end(process)
+        if self._alone is not None:
+            self._alone.cleanup()
+            self._alone = None
+
+    def _folder_of_the_bridge(self) -> str:
+        if self._alone is None:
+            self._alone = TemporaryDirectory(prefix="lockstep-bridge-")
+            package = Path(robot_bridge.__file__).resolve().parent
+            (Path(self._alone.name) / package.name).symlink_to(package, target_is_directory=True)
+        return self._alone.name
 
     async def _read_address(self, process: asyncio.subprocess.Process) -> str:
         if process.stdout is None:
@@ -145,6 +151,19 @@ class BridgeProcess:
                             return address
         except TimeoutError as error:
             raise BridgeFailed(None) from error
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    """Gently first."""
+    with suppress(ProcessLookupError):
+        process.terminate()
+    try:
+        async with asyncio.timeout(STOP_TIMEOUT):
+            await process.wait()
+    except TimeoutError:
+        with suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
 
 
 class _Announcement(msgspec.Struct):

@@ -1,3 +1,4 @@
+import os
 import sys
 from pathlib import Path
 
@@ -34,3 +35,23 @@ async def test_a_bridge_that_prints_something_and_no_address_has_not_started(
     bridge = _bridge(tmp_path, "print('no address')")
     with pytest.raises(BridgeFailed, match="did not start in time"):
         await bridge.start()
+
+
+async def test_another_interpreter_finds_the_bridges_code_and_none_of_the_consoles_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those are of another version of Python, and would hide its own, such as those of a ROS installation."""
+    monkeypatch.setenv("PYTHONPATH", "/its/own")
+    said = tmp_path / "paths"
+    tell = f"import os\nopen({str(said)!r}, 'w').write(os.environ['PYTHONPATH'])\nprint('{{\"robot\": \"{ADDRESS}\"}}')"
+    bridge = _bridge(tmp_path, tell)
+    await bridge.start()
+    try:
+        own, folder = said.read_text().split(":")
+        assert own == "/its/own"
+        assert os.listdir(folder) == ["robot_bridge"]
+        assert "__main__.py" in os.listdir(f"{folder}/robot_bridge")
+    finally:
+        await bridge.close()
+    with pytest.raises(FileNotFoundError):
+        os.listdir(folder)
