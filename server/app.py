@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 from fastapi import FastAPI, Response
 from starlette.types import Lifespan
 
-from server import api, api_access, api_ice, api_recordings, api_relay, scene_proxy, watch, whep
+from server import api, api_access, api_ice, api_recordings, api_relay, scene_proxy, watch, whep, whip
 from server.bare_app import bare_app, guard_app, open_house
 from server.json_answer import json_answer
 from server.log_context import LogContext
@@ -53,6 +53,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     """The routes of one robot but for its pages. They need `app.state.house`, and answer by `attach_session`."""
     app = bare_app("Lockstep", settings, lifespan)
     app.include_router(whep.router)
+    app.include_router(whip.router)
     app.include_router(api.router)
     app.include_router(api_access.router)
     app.include_router(api_ice.router)

@@ -28,6 +28,7 @@ AuditKind = Literal[
     "epoch",
     "recording",  # started, ended, downloaded, deleted
     "reading",  # of a recording; merged
+    "publication",  # of a camera by WHIP: begun, ended
     "audit",  # records were lost before this one
 ]
 
@@ -37,7 +38,7 @@ CHATTER: frozenset[AuditKind] = frozenset({"joined", "renamed", "left", "claim",
 # What is written one by one only as often as its link's budget allows; the rest is counted together.
 # The others are either not caused by a link, limited where they are asked for, or needed one by one: who drove.
 LIMITED: frozenset[AuditKind] = frozenset(
-    {"joined", "renamed", "left", "claim", "invitation", "revocation", "recording", "reading"}
+    {"joined", "renamed", "left", "claim", "invitation", "revocation", "recording", "reading", "publication"}
 )
 BURST = 30.0  # records of one kind and link at once
 RATE = 0.1  # Hz, afterwards

@@ -40,6 +40,7 @@ from server.cli_options import (
     TlsKey,
     Turn,
     TurnSecret,
+    Whip,
 )
 from server.cli_recordings import add_recording_commands
 from server.file_limit import raise_file_limit
@@ -138,6 +139,7 @@ def up(
     ice_host: IceHosts = None,
     camera: Cameras = None,
     microphone: Microphones = None,
+    whip: Whip = None,
     speaker: Speaker = None,
     quality: Quality = None,
     speed_cap: SpeedCap = None,
@@ -167,6 +169,7 @@ def up(
         media=_media(quality),
         cameras=_words(camera),
         microphones=_words(microphone),
+        whip=_words(whip),
         speaker=speaker,
         speed_cap=speed_cap,
         recording=_recording(record),
@@ -223,6 +226,7 @@ def serve(
     ice_host: IceHosts = None,
     camera: Cameras = None,
     microphone: Microphones = None,
+    whip: Whip = None,
     speaker: Speaker = None,
     quality: Quality = None,
     speed_cap: SpeedCap = None,
@@ -258,6 +262,7 @@ def serve(
         media=_media(quality),
         cameras=_words(camera),
         microphones=_words(microphone),
+        whip=_words(whip),
         speaker=speaker,
         speed_cap=speed_cap,
         recording=_recording(record),

@@ -23,6 +23,7 @@ __all__ = [
     "TlsKey",
     "Turn",
     "TurnSecret",
+    "Whip",
 ]
 
 
@@ -72,6 +73,15 @@ Microphones = Annotated[
         "--microphone",
         help="A microphone of the console's own, [name=]pulse:, alsa:hw:1, rtsp://…, file:…; may be given again.",
         metavar="SOURCE",
+    ),
+]
+Whip = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--whip",
+        help="A camera that operators may publish by WHIP, as a phone, OBS or GStreamer does: NAME[#label=…,latency=s]; may "
+        "be given again. docs/media.md",
+        metavar="NAME",
     ),
 ]
 Relay = Annotated[

@@ -12,6 +12,7 @@ ConsoleError
 │   ├── Silenced            a supervisor has silenced the stops of this link
 │   └── OriginRefused       a page of another site
 ├── RequestError            the request is not understood
+│   ├── AlreadyPublishing   one link publishes one camera
 │   ├── AlreadyRecording
 │   ├── BadJson
 │   ├── BadParameter
@@ -20,8 +21,10 @@ ConsoleError
 │   ├── BadSdpFragment
 │   ├── BodyTooLarge
 │   ├── BodyTooSlow
+│   ├── CameraTaken         somebody publishes it
 │   ├── HostRefused         a host name that is not ours
 │   ├── LockedOut           a reset while somebody at the robot keeps it from being driven
+│   ├── NotAcceptable       an offer of which nothing can be taken
 │   ├── NotConnected
 │   ├── NotFound
 │   ├── PreconditionFailed
@@ -61,6 +64,7 @@ from typing import NamedTuple
 __all__ = [
     "HTTP_ERRORS",
     "AccessError",
+    "AlreadyPublishing",
     "AlreadyRecording",
     "BadJson",
     "BadParameter",
@@ -69,6 +73,7 @@ __all__ = [
     "BinaryMessage",
     "BodyTooLarge",
     "BodyTooSlow",
+    "CameraTaken",
     "ChannelError",
     "ConsoleError",
     "DuplicateChannel",
@@ -84,6 +89,7 @@ __all__ = [
     "MalformedMessage",
     "NoSeat",
     "MessageTooLarge",
+    "NotAcceptable",
     "NotAllowed",
     "NotConnected",
     "NotFound",
@@ -175,6 +181,10 @@ class RequestError(ConsoleError):
     pass
 
 
+class AlreadyPublishing(RequestError):
+    pass
+
+
 class AlreadyRecording(RequestError):
     pass
 
@@ -207,7 +217,15 @@ class BodyTooSlow(RequestError):
     pass
 
 
+class CameraTaken(RequestError):
+    pass
+
+
 class HostRefused(RequestError):
+    pass
+
+
+class NotAcceptable(RequestError):
     pass
 
 
@@ -367,6 +385,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     NotAllowed: HttpError(403, "not_allowed"),
     OriginRefused: HttpError(403, "origin_refused"),
     Silenced: HttpError(403, "silenced"),
+    AlreadyPublishing: HttpError(409, "already_publishing", {"Retry-After": "2"}),
     AlreadyRecording: HttpError(409, "already_recording"),
     BadJson: HttpError(400, "bad_json"),
     BadParameter: HttpError(422, "bad_parameter"),
@@ -378,6 +397,8 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     BodyTooLarge: HttpError(413, "too_large"),
     WrongMediaType: HttpError(415, "wrong_media_type"),
     BodyTooSlow: HttpError(408, "too_slow", {"Connection": "close"}),
+    NotAcceptable: HttpError(406, "not_acceptable"),
+    CameraTaken: HttpError(409, "camera_taken", {"Retry-After": "5"}),
     NotConnected: HttpError(409, "not_connected"),
     LockedOut: HttpError(409, "locked_out"),
     ResetTooSoon: HttpError(409, "too_soon", {"Retry-After": "1"}),

@@ -69,14 +69,16 @@ class IceSession:
         gatherer: Callable[[], RTCIceGatherer],
         connect_timeout: float,
         on_refused: Callable[[str], None],
+        on_round_trip: Callable[[float], None] | None = None,
     ) -> None:
-        """`on_refused` gets the name of what a peer had too much of."""
+        """`on_refused` gets the name of what a peer had too much of, `on_round_trip` each that was measured, in s."""
         self.tag = _new_tag()
         self.username = username  # the peer's, of the newest session
         self._transport = _transport_of(pc)
         self._gatherer = gatherer
         self._connect_timeout = connect_timeout
         self._on_refused = on_refused
+        self._on_round_trip = on_round_trip
         self._candidates = 0
         self._closed = False
         self._restarting = asyncio.Lock()
@@ -146,7 +148,7 @@ class IceSession:
 
     def _prepare(self, connection: Any) -> None:
         guard_ice(connection, self._on_refused)
-        keep_consent(connection, lambda: self._expired(connection))
+        keep_consent(connection, lambda: self._expired(connection), self._on_round_trip)
 
     def _expired(self, connection: Any) -> None:
         if self._transport is not None and self._transport._connection is connection:

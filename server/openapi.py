@@ -18,6 +18,7 @@ from server.api_access import MAX_RECORDS, AuditPage, InvitationList, Invitation
 from server.api_recordings import FileTicket, RecordingDetails, RecordingList, RecordingRequest
 from server.errors import (
     HTTP_ERRORS,
+    AlreadyPublishing,
     AlreadyRecording,
     BadJson,
     BadParameter,
@@ -25,6 +26,7 @@ from server.errors import (
     BadSdpFragment,
     BodyTooLarge,
     BodyTooSlow,
+    CameraTaken,
     ConsoleError,
     HostRefused,
     HttpError,
@@ -34,6 +36,7 @@ from server.errors import (
     LinkRevoked,
     LockedOut,
     NoSeat,
+    NotAcceptable,
     NotAllowed,
     NotConnected,
     NotFound,
@@ -110,6 +113,7 @@ STAMP = Parameter("stamp", "query", {"type": "string", "enum": ["trailer"]})
 RELAY = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{0,3}$"})
 WATCHED = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{1,3}$"}, required=True)
 WATCH_TICKET = Parameter("ticket", "path", {"type": "string"}, required=True)
+CAMERA = Parameter("camera", "query", {"type": "string", "maxLength": 32})
 VIEW = Parameter("view", "query", {"type": "string", "enum": ["thumbnail"]})
 PEER = Parameter("peer", "query", {"type": "string", "maxLength": 16})
 LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
@@ -146,6 +150,28 @@ OPERATIONS: tuple[Operation, ...] = (
         also=(204,),
     ),
     Operation("delete", "/whep/{resource}", "End a connection.", 200, None, (NotFound,), parameters=(RESOURCE,)),
+    Operation(
+        *("post", "/whip", "Publish a camera (WHIP).", 201, SDP),
+        errors=(
+            *(BadSdp, NotAcceptable, NotAllowed, NotFound, WrongMediaType, BadParameter, RobotUnreachable),
+            *(AlreadyPublishing, CameraTaken, ShuttingDown, *WITH_BODY),
+        ),
+        body=SDP,
+        parameters=(CAMERA,),
+        headers=("Location", "ETag", "Accept-Patch"),
+    ),
+    Operation(
+        *("patch", "/whip/{resource}", "More ICE candidates, or an ICE restart (If-Match: *).", 200, FRAGMENT),
+        errors=(
+            *(BadSdpFragment, WrongMediaType, NotFound, NotConnected, PreconditionFailed, PreconditionRequired),
+            *WITH_BODY,
+        ),
+        body=FRAGMENT,
+        parameters=(RESOURCE, MATCH),
+        headers=("ETag",),
+        also=(204,),
+    ),
+    Operation("delete", "/whip/{resource}", "Publish no more.", 200, None, (NotFound,), parameters=(RESOURCE,)),
     Operation("get", "/api/session", "What is going on.", 200, SessionInfo),
     Operation("get", "/api/ice", "STUN and TURN servers, with credentials for a while.", 200, IceServers),
     Operation(

@@ -14,6 +14,7 @@ from server.log_context import follow_clock
 from server.media.plane import MediaPlane
 from server.media.sources.desk import SourceDesk
 from server.metrics import Metrics
+from server.publishers import Publishers
 from server.recording.library import ConsoleLibrary
 from server.recording.recorder import Recorder
 from server.recording.service import RecordingService
@@ -129,6 +130,8 @@ async def _session(
     )
     if voice.enabled:
         console.further_news.append(voice.state)
+    warden = LinkWarden(house.state.invitations, console.peers, console.audit, robot, console.stops.show_silence)
+    publishers = Publishers(sources.published, warden.ended, console.audit, metrics.faults, metrics.registry)
     follow_clock(console.clock, robot)
     audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
     made = Services(
@@ -140,11 +143,12 @@ async def _session(
         house=house,
         access=access,
         audit=audit,
-        warden=LinkWarden(house.state.invitations, console.peers, console.audit, robot, console.stops.show_silence),
+        warden=warden,
         scene=scene,
         recorder=recorder,
         relays=relays,
         voice=voice,
+        publishers=publishers,
         recordings=RecordingService(ConsoleLibrary(recorder), access, console.audit, console.link_holds_seat),
     )
     try:
@@ -153,6 +157,7 @@ async def _session(
                 tasks.create_task(console.run(), name="console"),
                 tasks.create_task(sources.run(), name="sources"),
                 tasks.create_task(voice.run(), name="voice"),
+                tasks.create_task(publishers.run(), name="publishers"),
                 tasks.create_task(recorder.run(), name="recorder"),
                 tasks.create_task(relays.run(), name="relays"),
             ]

@@ -19,6 +19,7 @@ from server.house import House
 from server.link_warden import LinkWarden
 from server.media.plane import MediaPlane
 from server.metrics import Metrics
+from server.publishers import Publishers
 from server.recording.recorder import Recorder
 from server.recording.service import RecordingService
 from server.relay.desk import RelayDesk
@@ -58,6 +59,7 @@ class Services:
     recorder: Recorder
     relays: RelayDesk
     voice: VoiceService
+    publishers: Publishers
     recordings: RecordingService
 
     @property
@@ -79,6 +81,7 @@ class Services:
         self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
         self.metrics.links_unreadable.set(bool(self.state.invitations.trouble))
         self.metrics.collect_audit(self.audit.lost, self.audit.failures)
+        self.publishers.collect()
         self.metrics.recording_failed.set(self.recorder.state().state == "failed")
         self.metrics.free_bytes.set(free_bytes(self.recorder.shelf.directory))
 

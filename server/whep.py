@@ -2,7 +2,7 @@
 
 import asyncio
 import ipaddress
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated, Literal
 
@@ -41,7 +41,17 @@ from server.peer_guards_private import guard_data
 from server.services import Services, authorized, services
 from server.webrtc_peer import WebRtcPeer
 
-__all__ = ["candidates_of", "router"]
+__all__ = [
+    "FRAGMENT",
+    "NEGOTIATION_TIMEOUT",
+    "SDP",
+    "candidates_of",
+    "discard",
+    "offered_username",
+    "offers_fault",
+    "patched",
+    "router",
+]
 
 SDP = "application/sdp"
 FRAGMENT = "application/trickle-ice-sdpfrag"
@@ -111,29 +121,36 @@ async def patch(resource: str, request: Request, caller: Annotated[Right, Depend
     here = services(request)
     peer = _own(here, resource, caller)
     peer.take_request()
-    expected = _precondition(request, peer.ice.tag)
+    return await patched(request, here, peer.pc, peer.ice, lambda: _own(here, resource, caller))
+
+
+async def patched(
+    request: Request, here: Services, pc: RTCPeerConnection, ice: IceSession, still_there: Callable[[], object]
+) -> Response:
+    """What a PATCH does, of WHEP and of WHIP. `still_there` raises when the session has ended."""
+    expected = _precondition(request, ice.tag)
     text = await read_text(request, FRAGMENT, here.settings.max_sdp_bytes)
-    first = SessionDescription.parse(peer.pc.remoteDescription.sdp).media[0]
+    first = SessionDescription.parse(pc.remoteDescription.sdp).media[0]
     fragment = parse_fragment(text, first.rtp.muxId)
     candidates = candidates_of(fragment)
-    _own(here, resource, caller)  # it may have ended while the body came
-    if fragment.username in ("", peer.ice.username):
+    still_there()  # it may have ended while the body came
+    if fragment.username in ("", ice.username):
         for candidate in candidates:
-            if not await peer.ice.add_candidate(candidate):
+            if not await ice.add_candidate(candidate):
                 raise BadSdpFragment("too many candidates for one session")
         return Response(status_code=204)
     if expected != "*" or not fragment.password:
         raise BadSdpFragment("another ice-ufrag: a restart says If-Match: * and has an ice-pwd")
-    if not peer.ice.connected:
+    if not ice.connected:
         raise NotConnected("there is no ICE session that could be restarted")
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            local = await peer.ice.restart(fragment.username, fragment.password, candidates)
+            local = await ice.restart(fragment.username, fragment.password, candidates)
     except (TimeoutError, ConnectionError) as error:
         raise NotConnected("the ICE session ended, or gathered nothing in time") from error
     lines = [f"candidate:{candidate_to_sdp(each)}" for each in local.candidates]
     body = format_fragment(local.username, local.password, first.kind, first.rtp.muxId, lines)
-    headers = {"ETag": peer.ice.tag, "Cache-Control": "no-store"}
+    headers = {"ETag": ice.tag, "Cache-Control": "no-store"}
     return Response(body, status_code=200, media_type=FRAGMENT, headers=headers)
 
 
@@ -186,7 +203,7 @@ async def _negotiate(
     pc = create_peer_connection(own_servers)
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            with _offers_fault():
+            with offers_fault():
                 await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
             peer = await _answering_peer(here, identity, offer, pc, own_servers, trailer=trailer, thumbnail=thumbnail)
             try:
@@ -195,7 +212,7 @@ async def _negotiate(
                 await peer.abandon()
                 raise
     except BaseException as error:
-        await _discard(here, pc)
+        await discard(here, pc)
         if isinstance(error, TimeoutError):
             raise BadSdp("the offer cannot be answered in time") from error
         if isinstance(error, Exception) and not isinstance(error, ConsoleError):
@@ -232,7 +249,7 @@ async def _answering_peer(
         refused = here.metrics.bad_input.labels
         session = IceSession(
             pc,
-            _username(offer),
+            offered_username(offer),
             lambda: RTCIceGatherer(own_servers),
             here.settings.peer_connect_timeout,
             lambda name: refused("transport", name).inc(),
@@ -242,7 +259,7 @@ async def _answering_peer(
         if line is not None:
             line.peer = peer
         guard_data(pc, peer.transport_refused)
-        with _offers_fault():
+        with offers_fault():
             await pc.setLocalDescription(await pc.createAnswer())
     except BaseException:
         await media.close()
@@ -251,7 +268,7 @@ async def _answering_peer(
 
 
 @contextmanager
-def _offers_fault() -> Iterator[None]:
+def offers_fault() -> Iterator[None]:
     """Whatever aiortc trips over here was in the offer: it has no error of its own for that."""
     try:
         yield
@@ -259,13 +276,13 @@ def _offers_fault() -> Iterator[None]:
         raise BadSdp("the offer cannot be answered") from error
 
 
-def _username(offer: str) -> str:
+def offered_username(offer: str) -> str:
     """The peer's ice-ufrag: that of the first section, with which all others are bundled."""
     first = SessionDescription.parse(offer).media[0].ice
     return "" if first is None else first.usernameFragment or ""
 
 
-async def _discard(here: Services, pc: RTCPeerConnection) -> None:
+async def discard(here: Services, pc: RTCPeerConnection) -> None:
     """Closes what negotiation may have left half made."""
     try:
         await close_or_force(pc)

@@ -266,8 +266,8 @@ class SourceStatus(msgspec.Struct, frozen=True, kw_only=True):
 
     stream: str
     label: str
-    state: Literal["connecting", "live", "reconnecting"]
-    detail: str = ""  # why it is reconnecting
+    state: Literal["waiting", "connecting", "live", "reconnecting"]  # waiting: nobody publishes it
+    detail: str = ""  # why it is not live; of one that is published, by whom
 
 
 class Sources(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="sources"):

@@ -15,13 +15,13 @@ __all__ = ["OWN", "robot_settings"]
 OWN = frozenset(
     {
         *("robot", "link_secret", "link_secret_file", "link_tls_cert", "link_tls_key", "link_tls_ca"),
-        *("cameras", "microphones", "speaker", "relay", "relay_public", "relay_codec", "observers_direct"),
+        *("cameras", "microphones", "whip", "speaker", "relay", "relay_public", "relay_codec", "observers_direct"),
         *("speed_cap", "seat_timeout", "seat_idle_seconds", "seat_claim_seconds", "observer_feedback_hz"),
         *("max_peers", "max_relayed", "max_thumbnails", "reserved_places", "scene", "scene_hz", "media", "recording"),
     }
 )
 # A camera hangs at one robot: given to the whole console, it would show every robot the same.
-NEVER_SHARED = ("cameras", "microphones", "speaker", "relay")
+NEVER_SHARED = ("cameras", "microphones", "whip", "speaker", "relay")
 
 
 def robot_settings(settings: Settings) -> dict[str, Settings]:

@@ -300,6 +300,10 @@ class MediaPlane:
         spec = attached.get(stream.name)
         return spec is not None and spec.passing and spec.size is None
 
+    def guard_publisher(self, pc: RTCPeerConnection) -> None:
+        """What a publisher sends waits for its turn among observers. Call after setRemoteDescription(offer)."""
+        self._guard(pc, self._turns)
+
     def _guard(self, pc: RTCPeerConnection, turns: ReceiveTurns | None) -> None:
         on_socket = self._loop_turns.yield_to if turns is None else None
         guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc(), turns, on_socket)

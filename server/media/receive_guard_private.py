@@ -4,7 +4,7 @@ aiortc and aioice have no public hooks for that. What is used and why:
 
 - `RTCDtlsTransport._recv_next`: an exception there would end the connection
 - `RTCDtlsTransport._state`, `.__handshake_done`, `._ssl`, `._write_ssl`, `._rx_srtp`, `._handle_rtcp_data`,
-  `._data_receiver`: what `_recv_next` does with a datagram
+  `._handle_rtp_data`, `._data_receiver`: what `_recv_next` does with a datagram
 - `aioice.Connection._queue`: the receive queue, which has no bound
 - `aioice.Connection._nominated`: the pair of candidates in use, whose socket slices of observers' work end for
 - `RTCRtpReceiver.__remote_bitrate_estimator`: a third of a megabyte of small objects for each picture stream, on which
@@ -39,8 +39,8 @@ class _Intake(asyncio.Queue[Any]):
     """Stands in for an ICE connection's receive queue: handles a datagram as it comes, or in its turn.
 
     The way through the queue, a task and its coroutines costs more than most datagrams do. Voice goes that way, and so
-    does what comes before DTLS is connected, within a bound. What the connection could not use, or what would raise
-    further on, is dropped and counted.
+    does what comes before DTLS is connected, within a bound; published pictures do not. What the connection could not
+    use, or what would raise further on, is dropped and counted.
     """
 
     def __init__(
@@ -110,6 +110,8 @@ class _Intake(asyncio.Queue[Any]):
                 self._take_record(data)
             elif 127 < data[0] < 192 and is_rtcp(data):
                 run_now(self._dtls._handle_rtcp_data(self._dtls._rx_srtp.unprotect_rtcp(data)))
+            elif 127 < data[0] < 192 and self._turns is not None:  # its turn: not in one go with all that wait
+                run_now(self._dtls._handle_rtp_data(self._dtls._rx_srtp.unprotect(data), 0))
             else:
                 return False
         except ConnectionError:

@@ -386,7 +386,7 @@ export interface SilenceStops {
 export interface SourceStatus {
   readonly stream: string;
   readonly label: string;
-  readonly state: "connecting" | "live" | "reconnecting";
+  readonly state: "connecting" | "live" | "reconnecting" | "waiting";
   readonly detail: string;
 }
 

@@ -9,6 +9,8 @@ from prometheus_client import CollectorRegistry, Counter, Gauge
 
 from robot_bridge.protocol.console import Sources, SourceStatus
 from robot_bridge.protocol.messages import Media
+from server.media.published.camera_spec import SCHEME
+from server.media.published.published_camera import PublishedCamera
 from server.media.sources.attached_source import AttachedSource
 from server.media.sources.source_url import SourceSpec
 from server.media.sources.source_wire import Captured
@@ -57,12 +59,20 @@ class SourceDesk:
         self._age = Gauge(
             "lockstep_media_source_age_seconds", "From capture to here, the newest", ["source"], registry=registry
         )
-        self.sources = [self._attach(spec) for spec in specs]
+        for spec in specs:
+            self._live.labels(spec.name).set(0)
+        self.published = [PublishedCamera(spec, *self._told_of(spec)) for spec in specs if spec.scheme == SCHEME]
+        self._read = [AttachedSource(spec, *self._told_of(spec)) for spec in specs if spec.scheme != SCHEME]
 
-    def _attach(self, spec: SourceSpec) -> AttachedSource:
-        self._live.labels(spec.name).set(0)
-        return AttachedSource(
-            spec,
+    @property
+    def sources(self) -> Sequence[AttachedSource | PublishedCamera]:
+        return [*self._read, *self.published]
+
+    def _told_of(
+        self, spec: SourceSpec
+    ) -> tuple[Callable[[Captured], None], Callable[[], None], Callable[[str], None]]:
+        """What a source calls when it captured, when its state changed, and when it failed."""
+        return (
             lambda medium: self._deliver(spec, medium),
             self._changed,
             lambda reason: self._failures.labels(spec.name, reason).inc(),
@@ -71,7 +81,7 @@ class SourceDesk:
     async def run(self) -> None:
         """Until cancelled."""
         async with asyncio.TaskGroup() as tasks:
-            for source in self.sources:
+            for source in self._read:
                 tasks.create_task(source.run(), name=f"source {source.spec.name}")
 
     def state(self) -> Sources:
@@ -82,7 +92,7 @@ class SourceDesk:
                     stream=self._media.stream_of(source.spec.name),
                     label=source.spec.label,
                     state=source.state,
-                    detail=source.detail if source.state == "reconnecting" else "",
+                    detail=source.detail if source.state != "live" or source in self.published else "",
                 )
                 for source in self.sources
             ]

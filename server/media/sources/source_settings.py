@@ -5,6 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode
 
+from server.media.published.camera_spec import parse_published
 from server.media.sources.source_url import BadSource, SourceSpec, parse_sources
 from server.media.speaker.speaker_url import BadSpeaker, SpeakerSpec, parse_speaker
 
@@ -18,9 +19,10 @@ class SourceSettings(BaseSettings):
 
     cameras: Sources = Field(default=(), repr=False)  # there may be passwords in them
     microphones: Sources = Field(default=(), repr=False)
+    whip: Annotated[tuple[str, ...], NoDecode] = ()  # cameras that somebody may publish; empty: nobody may
     speaker: str | None = None  # at the robot, for the voice of who drives; None: nobody's voice is taken
 
-    @field_validator("cameras", "microphones", mode="before")
+    @field_validator("cameras", "microphones", "whip", mode="before")
     @classmethod
     def _split_words(cls, value: object) -> object:
         return tuple(value.split()) if isinstance(value, str) else value
@@ -32,9 +34,13 @@ class SourceSettings(BaseSettings):
                 parse_sources("video" if kind == "video" else "audio", _revealed(given))
             except BadSource as error:
                 raise ValueError(f"{word}: {error}") from None
+        try:
+            parse_published(self.whip)
+        except BadSource as error:
+            raise ValueError(f"whip: {error}") from None
         names = [spec.name for spec in self.sources]
-        if len(set(names)) != len(names):
-            raise ValueError("camera, microphone: two have the same name")
+        if twice := next((name for name in names if names.count(name) > 1), ""):
+            raise ValueError(f"camera, microphone, whip: two have the same name, {twice}")
         try:
             _ = self.speaker_spec
         except BadSpeaker as error:
@@ -47,9 +53,10 @@ class SourceSettings(BaseSettings):
 
     @property
     def sources(self) -> tuple[SourceSpec, ...]:
-        """All attached cameras and microphones."""
+        """All attached cameras, those that are published among them, and microphones."""
         return (
             *parse_sources("video", _revealed(self.cameras)),
+            *parse_published(self.whip),
             *parse_sources("audio", _revealed(self.microphones)),
         )
 

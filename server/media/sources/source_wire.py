@@ -10,7 +10,7 @@ __all__ = ["Captured", "Said", "SourceState", "Trouble", "Working", "decode_said
 MAX_LENGTH = 16_000_000  # bytes: a picture of 8 million pixels
 _LENGTH = struct.Struct("!I")
 
-SourceState = Literal["connecting", "live", "reconnecting"]
+SourceState = Literal["waiting", "connecting", "live", "reconnecting"]
 Codec = Literal["yuv420p", "mjpeg", "h264", "pcm_s16le"]
 
 

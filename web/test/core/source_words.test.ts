@@ -16,6 +16,21 @@ test("a source that works needs no words, one that does not says why", () => {
   expect(sourceWords(front("connecting"))).toBe("Connecting…");
   expect(sourceWords(front("reconnecting"))).toBe("Reconnecting…");
   expect(sourceWords(front("reconnecting", "connection refused"))).toBe("Reconnecting… (connection refused)");
+  expect(sourceWords(front("waiting"))).toBe("Nobody publishes");
+  expect(sourceWords(front("waiting", "its publisher has left"))).toBe("Nobody publishes (its publisher has left)");
+});
+
+test("the log says who publishes a camera, and that they do no more", () => {
+  const state = createConsoleState();
+  const say = (...sources: SourceStatus[]): void => applyMessage(state, { type: "sources", sources }, 0);
+  say(front("waiting"));
+  say(front("connecting"));
+  say(front("live", "published by Ann"));
+  say(front("waiting", "its publisher has left"));
+  expect(state.log.map((line) => line.text)).toEqual([
+    "Front: Nobody publishes (its publisher has left)",
+    "Front is published by Ann",
+  ]);
 });
 
 test("a source that fails and comes back is logged once each; one that connects at first is not", () => {
