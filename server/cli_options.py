@@ -79,8 +79,8 @@ Whip = Annotated[
     list[str] | None,
     typer.Option(
         "--whip",
-        help="A camera that operators may publish by WHIP, as a phone, OBS or GStreamer does: NAME[#label=…,latency=s]; may "
-        "be given again. docs/media.md",
+        help="A camera that operators may publish by WHIP, from a phone, OBS or GStreamer: NAME[#label=…,latency=s]; "
+        "may be given again. docs/media.md",
         metavar="NAME",
     ),
 ]

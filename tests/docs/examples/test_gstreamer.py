@@ -30,10 +30,10 @@ print(*[each for each in {!r} if Gst.ElementFactory.find(each) is None])"
 LINE = re.compile(r"event \d+, gap -?\d+, (shown|left out)")
 
 
-def missing() -> str:
+def missing(needed: tuple[str, ...] = NEEDED) -> str:
     """What of GStreamer is not on this machine; "" where all is."""
     try:
-        found = subprocess.run([PYTHON, "-c", ASK.format(NEEDED)], capture_output=True, text=True, timeout=30)
+        found = subprocess.run([PYTHON, "-c", ASK.format(needed)], capture_output=True, text=True, timeout=30)
     except OSError:
         return PYTHON
     return found.stdout.strip() if found.returncode == 0 else "python3-gi or GStreamer's libraries"
