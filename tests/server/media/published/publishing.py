@@ -70,7 +70,9 @@ class TestPublisher:
             self.pc.addTransceiver("audio", direction="sendonly")
         transceiver = self.pc.addTransceiver(self.pictures, direction="sendonly")
         capabilities = RTCRtpSender.getCapabilities("video").codecs
-        transceiver.setCodecPreferences([each for each in capabilities if each.mimeType == f"video/{codec}"])
+        transceiver.setCodecPreferences(
+            [each for each in capabilities if each.mimeType in (f"video/{codec}", "video/rtx")]
+        )
 
     async def __aenter__(self) -> "TestPublisher":
         return self
