@@ -293,7 +293,10 @@ async def test_what_is_no_picture_is_counted_and_disturbs_neither_who_drives_nor
         transmit = sender.transport._send_rtp
 
         async def spoil(data: bytes) -> None:
-            await transmit(data[:12] + b"\xff" * (len(data) - 12) if 96 <= data[1] & 0x7F < 127 else data)
+            if 96 <= data[1] & 0x7F < 127:  # a packet of pictures, which has header extensions
+                head = 16 + 4 * int.from_bytes(data[14:16], "big")
+                data = data[:head] + b"\xff" * (len(data) - head)
+            await transmit(data)
 
         assert (await bad.post(rig.http, rig.token("operator"))).status_code == 201
         sender.transport._send_rtp = spoil
