@@ -1,0 +1,38 @@
+"""A camera that somebody publishes by WHIP, in real Chromium."""
+
+from pathlib import Path
+
+import httpx
+import pytest
+
+from bench.browsers.chromium import running_chromium
+from bench.browsers.console_page import open_console
+from tests.server.media.published.publishing import TestPublisher
+from tests.support.stack import running_stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+
+async def test_the_page_shows_a_published_camera_within_its_tolerance_and_says_when_nobody_publishes(
+    tmp_path: Path,
+) -> None:
+    async with (
+        running_stack(tmp_path, extra=("--whip", "phone#label=Ann's phone,latency=0.1", "--quiet")) as stack,
+        running_chromium() as browser,
+        open_console(browser, stack.observer) as console,
+        httpx.AsyncClient(base_url=stack.console, trust_env=False, timeout=30) as http,
+    ):
+        view = console.page.locator("[data-view=phone]")
+        await view.get_by_text("Nobody publishes", exact=True).wait_for()
+        async with TestPublisher("H264") as publisher:
+            token = {"Authorization": f"Bearer {stack.operator.partition('#token=')[2]}"}
+            assert (await publisher.post(http, token)).status_code == 201
+            await console.until("s.streams.phone.rendered > 20")
+            await view.get_by_text("Nobody publishes").wait_for(state="hidden")
+            stats = (await console.stats())["streams"]["phone"]
+            assert (stats["width"], stats["height"], stats["violations"]) == (320, 240, 0)
+            assert stats["stamp"] >= 1
+            await http.delete(publisher.location, headers=token)
+            await view.get_by_text("Nobody publishes (its publisher has left)").wait_for()
+        log = await console.page.content()
+        assert "Ann's phone is published by operator" in log.replace("&#39;", "'")
