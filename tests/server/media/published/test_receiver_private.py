@@ -55,7 +55,7 @@ class Section:
         section._receiver = self
         self.transport = Transport()
         self.payload_type = section._payload_type
-        [self.repair_type] = section._repair_types
+        [self.repair_type] = [each or 0 for each in section._repair_types]
 
     def packet(self, sequence: int, *, ssrc: int = 7, payload_type: int | None = None) -> RtpPacket:
         kind = self.payload_type if payload_type is None else payload_type
