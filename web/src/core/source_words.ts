@@ -4,6 +4,7 @@ import type { SourceStatus } from "../wire";
 export function sourceWords(source: SourceStatus): string | null {
   if (source.state === "live") return null;
   if (source.state === "connecting") return "Connecting…";
-  if (source.state === "waiting") return source.detail === "" ? "Nobody publishes" : `Nobody publishes (${source.detail})`;
+  if (source.state === "waiting")
+    return source.detail === "" ? "Nobody publishes" : `Nobody publishes (${source.detail})`;
   return source.detail === "" ? "Reconnecting…" : `Reconnecting… (${source.detail})`;
 }

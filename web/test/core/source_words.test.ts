@@ -17,7 +17,9 @@ test("a source that works needs no words, one that does not says why", () => {
   expect(sourceWords(front("reconnecting"))).toBe("Reconnecting…");
   expect(sourceWords(front("reconnecting", "connection refused"))).toBe("Reconnecting… (connection refused)");
   expect(sourceWords(front("waiting"))).toBe("Nobody publishes");
-  expect(sourceWords(front("waiting", "its publisher has left"))).toBe("Nobody publishes (its publisher has left)");
+  expect(sourceWords(front("waiting", "its publisher has left"))).toBe(
+    "Nobody publishes (its publisher has left)",
+  );
 });
 
 test("the log says who publishes a camera, and that they do no more", () => {
