@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from rtc.dcep import ACK, DcepError, Open, Reliability, decode_open
 from rtc.sctp import (
@@ -59,9 +60,8 @@ class ChannelOpened:
     by_peer: bool
 
 
-@dataclass(frozen=True, slots=True)
-class ChannelMessage:
-    """A message: text or bytes, as it was sent."""
+class ChannelMessage(NamedTuple):
+    """A message: text or bytes, as it was sent. A tuple for the sake of speed, as `MessageReceived` is."""
 
     channel: int
     data: str | bytes

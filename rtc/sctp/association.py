@@ -7,7 +7,6 @@ from struct import Struct
 from typing import Any
 
 from rtc.sctp.chunks import (
-    IMMEDIATE,
     Abort,
     Chunk,
     CookieAck,
@@ -31,6 +30,7 @@ from rtc.sctp.chunks import (
 from rtc.sctp.errors import AssociationClosed, MessageTooLarge, ProtocolViolation, SctpParseError
 from rtc.sctp.events import Closed, Established, Event, OutgoingStreamsReset, StreamsReset
 from rtc.sctp.handshake import CookieJar, PeerInit, own_parameters, read_init, unrecognized
+from rtc.sctp.heartbeat import Heartbeats
 from rtc.sctp.packet import COMMON_HEADER, Packet, decode_packet, encode_packet
 from rtc.sctp.parameters import (
     INVALID_STREAM,
@@ -39,10 +39,8 @@ from rtc.sctp.parameters import (
     STATE_COOKIE,
     UNRECOGNIZED_CHUNK,
     USER_ABORT,
-    encode_parameters,
 )
-from rtc.sctp.reassembly import Reassembly
-from rtc.sctp.received import ReceivedTsns
+from rtc.sctp.receiver import PLAIN_SACK, Receiver
 from rtc.sctp.round_trip import RoundTrip
 from rtc.sctp.send_queue import Message
 from rtc.sctp.sender import Sender
@@ -53,16 +51,11 @@ from rtc.sctp.stream_reset import StreamReset
 __all__ = ["Association", "State"]
 
 MOST_STREAMS = 65535  # announced; RFC 8831 6.2
-MOST_GAPS = 200  # in one SACK, which then fits into a packet beside some control chunks
 ROOM_BESIDE_SACK = 192  # bytes
-PLAIN_SACK = 16  # bytes of one without gaps or duplicates
 MOST_CONTROL = 64  # chunks that wait to leave: answers to the peer beyond them are not given
 MOST_REPORTED = 128  # bytes of an unknown chunk that are told to its sender
-HEARTBEAT_INFO = 1  # RFC 9260 3.3.5
-HEARTBEAT_PATIENCE = 5.0  # s, after which another one may be sent
 
 _word = Struct("!L")
-_nonce = Struct("!Q")
 
 
 class State(Enum):
@@ -117,6 +110,7 @@ class Association:
         self.settings = settings
         self.counts: Counter[str] = Counter()
         self.state = State.CLOSED
+        self._is_up = False
         self.round_trip = RoundTrip(settings)
         self.max_message = min(settings.max_send_message, peer_max_message or settings.max_send_message)
         self._ended = False
@@ -127,10 +121,9 @@ class Association:
         self._initial_tsn = int.from_bytes(random_bytes(4), "big")
         self._sender = Sender(settings, self.round_trip, self._initial_tsn, self.counts)
         self._peer: PeerInit | None = None
-        self._interleaving = False
-        self._received = ReceivedTsns(0, settings)
-        self._reassembly = Reassembly(settings, interleaving=False)
+        self._receiver = Receiver(settings, 0, False, self.counts)
         self._resets = StreamReset(self._initial_tsn, 0)
+        self._room = settings.max_packet - COMMON_HEADER
         self._packets: list[bytes] = []  # ready to leave
         self._control: list[bytes] = []  # chunks that leave with the next packet
         self._events: list[Event] = []
@@ -139,13 +132,7 @@ class Association:
         self._repeat_at: float | None = None  # T1 or T2
         self._repeats = 0
         self._asked_at = 0.0  # when the handshake's chunk left
-        self._unacknowledged = 0  # packets with data since the last SACK
-        self._acknowledge_at: float | None = None
-        self._data_came = False  # in this packet
-        self._acknowledge_now = False
-        self._heartbeat = b""  # that is to be answered
-        self._heartbeat_at = 0.0
-        self._heartbeats = 0
+        self._heartbeats = Heartbeats()
         self._handlers: dict[type, Callable[[Any], None]] = {
             Data: self._receive_data,
             InterleavedData: self._receive_data,
@@ -172,7 +159,7 @@ class Association:
         """Begin the handshake, when the peer has not done so already."""
         self.now = now
         if self.state is State.CLOSED and not self._ended:
-            self.state = State.COOKIE_WAIT
+            self._become(State.COOKIE_WAIT)
             self._send_init()
 
     def send(
@@ -227,7 +214,7 @@ class Association:
         """End when everything has arrived (RFC 9260 9.2). Messages that come meanwhile are still received."""
         self.now = now
         if self.state is State.ESTABLISHED:
-            self.state = State.SHUTDOWN_PENDING
+            self._become(State.SHUTDOWN_PENDING)
             self._go_on_shutting_down()
         elif self.state in (State.CLOSED, State.COOKIE_WAIT, State.COOKIE_ECHOED) and not self._ended:
             self._end("closed")
@@ -272,7 +259,7 @@ class Association:
     def packets_to_send(self) -> list[bytes]:
         """Everything that is due, as of the last `now`. SACK and data share packets."""
         if not self._ended:
-            if self.state in _UP:
+            if self._is_up:
                 self._bundle()
             elif self._cookie_is_due:
                 self._send_cookie()
@@ -286,10 +273,10 @@ class Association:
         if self._ended:
             return None
         due = self._repeat_at
-        candidates = [self._acknowledge_at, self._resets.due_at, self._sender.deadline()] if self.state in _UP else []
-        for each in candidates:
-            if each is not None and (due is None or each < due):
-                due = each
+        if self._is_up:
+            for each in (self._receiver.acknowledge_at, self._resets.due_at, self._sender.deadline()):
+                if each is not None and (due is None or each < due):
+                    due = each
         return due
 
     def handle_timer(self, now: float) -> None:
@@ -300,7 +287,7 @@ class Association:
         if self._repeat_at is not None and now >= self._repeat_at:
             self._repeats += 1
             self._repeat()
-        if self.state in _UP:
+        if self._is_up:
             self._sender.handle_timer(now)
 
     def events(self) -> list[Event]:
@@ -308,39 +295,54 @@ class Association:
         events, self._events = self._events, []
         return events
 
+    def _become(self, state: State) -> None:
+        self.state = state
+        self._is_up = state in _UP
+
     # Packets out
 
     def _bundle(self) -> None:
         self._sender.begin_burst()
         if self.state is not State.ESTABLISHED:
             self._go_on_shutting_down()
-        while chunks := self._next_chunks():
+        while self._has_due() and (chunks := self._next_chunks()):
             self._packets.append(self._packet(chunks))
+
+    def _has_due(self) -> bool:
+        """Whether anything may leave now; mostly there is nothing."""
+        acknowledge_at = self._receiver.acknowledge_at
+        return (
+            not self._sender.is_quiet
+            or (acknowledge_at is not None and acknowledge_at <= self.now)
+            or self._has_due_control()
+        )
+
+    def _has_due_control(self) -> bool:
+        sender, resets, now = self._sender, self._resets, self.now
+        return bool(
+            self._control
+            or sender.ambiguous
+            or resets.answers
+            or (sender.forward_at is not None and sender.forward_at <= now)
+            or (resets.due_at is not None and resets.due_at <= now)
+        )
 
     def _next_chunks(self) -> bytes:
         """The next packet's chunks: control first (RFC 9260 6.10); a pending SACK travels with data (6.2)."""
-        room = self.settings.max_packet - COMMON_HEADER
-        control = self._take_control(room)
-        room -= len(control)
-        if not self._unacknowledged:
-            return control + self._data(room)
-        if self._acknowledge_at is not None and self._acknowledge_at <= self.now:
+        sender, receiver, now = self._sender, self._receiver, self.now
+        control = self._take_control(self._room) if self._has_due_control() else b""
+        room = self._room - len(control)
+        if not receiver.is_pending:
+            return control + sender.chunks(room, now)
+        if receiver.acknowledge_at is not None and receiver.acknowledge_at <= now:
             if len(control) > ROOM_BESIDE_SACK:
                 return control
-            sack = self._take_sack()
-            return control + sack + self._data(room - len(sack))
-        data = self._data(room - PLAIN_SACK)
+            chunks = control + receiver.take_sack()
+            return chunks if sender.is_quiet else chunks + sender.chunks(self._room - len(chunks), now)
+        data = sender.chunks(room - PLAIN_SACK, now)
         if data:
-            return control + self._take_sack() + data
-        return control + self._data(room)
-
-    def _data(self, room: int) -> bytes:
-        sender, now = self._sender, self.now
-        chunks = sender.next_chunk(room, now)
-        if chunks:
-            while chunk := sender.next_chunk(room - len(chunks), now):
-                chunks += chunk
-        return chunks
+            return control + receiver.take_sack() + data
+        return control + sender.chunks(room, now)
 
     def _take_control(self, room: int) -> bytes:
         """Control chunks that fit; one that does not waits for the next packet."""
@@ -355,7 +357,8 @@ class Association:
         forward = sender.forward_tsn(now)
         if forward is not None:
             self._control.append(forward.encode())
-        if resets.due_at is not None and (request := resets.next_request(sender.next_tsn - 1, now)) is not None:
+        request = resets.next_request(sender.next_tsn - 1, now)
+        if request is not None:
             resets.sent(now + self.round_trip.timeout(resets.tries))
             self._control.append(request.encode())
         if resets.answers:
@@ -363,18 +366,13 @@ class Association:
             resets.answers.clear()
         if sender.ambiguous:
             sender.ambiguous = False
-            self._ask_round_trip()
+            if (heartbeat := self._heartbeats.ask(now)) is not None:
+                self._control.append(heartbeat.encode())
 
     def _say(self, chunk: Chunk) -> None:
         """An answer, which leaves with the next packet; none when too many wait."""
         if len(self._control) < MOST_CONTROL:
             self._control.append(chunk.encode())
-
-    def _take_sack(self) -> bytes:
-        self._unacknowledged = 0
-        self._acknowledge_at = None
-        window = max(0, self.settings.receive_window - self._reassembly.held)
-        return self._received.sack(window, MOST_GAPS).encode()
 
     def _packet(self, chunks: bytes) -> bytes:
         tag = 0 if self._peer is None else self._peer.tag
@@ -388,7 +386,7 @@ class Association:
         self._cookie_is_due = False
         echo = CookieEcho(self._cookie).encode()
         self._sender.begin_burst()
-        self._packets.append(self._packet(echo + self._data(self.settings.max_packet - COMMON_HEADER - len(echo))))
+        self._packets.append(self._packet(echo + self._sender.chunks(self._room - len(echo), self.now)))
 
     # Packets in
 
@@ -415,118 +413,52 @@ class Association:
             self._say(Error([(UNRECOGNIZED_CHUNK, chunk.encode()[:MOST_REPORTED])]))
         return bool(chunk.kind & 0x80)
 
-    def _after_packet(self) -> None:
-        """When to acknowledge it (RFC 9260 6.2)."""
-        self._events += self._reassembly.delivered
-        self._reassembly.delivered.clear()
-        if not self._data_came:
-            return
-        self._data_came = False
-        if self._received.has_gaps:
-            self._skip_what_was_given_up()
-        self._unacknowledged += 1
-        delay = self.settings.acknowledgement_delay
-        if self._unacknowledged >= 2 or self._acknowledge_now or delay <= 0 or self._received.has_gaps:
-            self._acknowledge_now = False
-            self._acknowledge_at = self.now
-        elif self._acknowledge_at is None:
-            self._acknowledge_at = self.now + delay
-        self._take_reset_events(self._resets.advanced(self._received.cumulative))
-
     def _receive_data(self, chunk: Data | InterleavedData) -> None:
         if self.state not in _CAN_RECEIVE:
             self.counts["unexpected"] += 1
-            return
-        if isinstance(chunk, InterleavedData) is not self._interleaving:
-            raise ProtocolViolation("interleaving_violated")  # RFC 8260 2.2.1
-        if not chunk.payload:
-            raise ProtocolViolation("empty_data")  # RFC 9260 6.2
-        self._data_came = True
-        received, reassembly = self._received, self._reassembly
-        tsn = received.unwrap(chunk.tsn)
-        if reassembly.held and self._is_too_much(len(chunk.payload), tsn):
-            return
-        problem = received.take(tsn, self.now)
-        if problem:
-            self.counts[problem] += 1
-            self._acknowledge_now = True
-            return
-        if chunk.flags & IMMEDIATE:
-            self._acknowledge_now = True
-        if chunk.stream >= self.settings.max_streams:
-            self.counts["invalid_stream"] += 1  # RFC 9260 6.5
+        elif not self._receiver.receive_data(chunk, self.now):
             self._say(Error([(INVALID_STREAM, chunk.stream.to_bytes(2, "big") + bytes(2))]))
-            return
-        reassembly.push(chunk, tsn)
-
-    def _is_too_much(self, size: int, tsn: int) -> bool:
-        """Drop what is beyond the window, but not what everything else waits for (RFC 9260 6.2)."""
-        held, window = self._reassembly.held, self.settings.receive_window
-        if held > 2 * window:
-            raise ProtocolViolation("receive_window_exceeded")
-        if held + size <= window or tsn == self._received.cumulative + 1:
-            return False
-        self.counts["window_full"] += 1
-        self._acknowledge_now = True
-        return True
-
-    def _skip_what_was_given_up(self) -> None:
-        last = self._received.given_up(self.now)
-        if last is not None and not self._reassembly.waits_in_order:
-            self.counts["given_up_by_peer"] += 1
-            self._received.forward(last, self.now)
-            self._reassembly.forward(last, [])
 
     def _receive_forward_tsn(self, chunk: ForwardTsn | InterleavedForwardTsn) -> None:
-        if self.state not in _CAN_RECEIVE:
+        if self.state in _CAN_RECEIVE:
+            self._receiver.receive_forward_tsn(chunk, self.now)
+        else:
             self.counts["unexpected"] += 1
-            return
-        if isinstance(chunk, InterleavedForwardTsn) is not self._interleaving:
-            raise ProtocolViolation("interleaving_violated")
-        self._data_came = self._acknowledge_now = True
-        cumulative = self._received.unwrap(chunk.cumulative)
-        if cumulative <= self._received.cumulative:
-            return  # RFC 3758 3.6: an old one
-        self._received.forward(cumulative, self.now)
-        skips = [skip for skip in chunk.skips if skip.stream < self.settings.max_streams]
-        self._reassembly.forward(self._received.cumulative, skips)
+
+    def _after_packet(self) -> None:
+        receiver = self._receiver
+        if receiver.packet_ends(self.now):
+            if receiver.messages:
+                self._events += receiver.messages
+                receiver.messages.clear()
+            self._take_reset_events(self._resets.advanced(receiver.received.cumulative))
 
     def _receive_sack(self, chunk: Sack) -> None:
-        if self.state in _UP:
+        if self._is_up:
             self._sender.receive_sack(chunk, self.now)
 
     def _receive_reconfig(self, chunk: Reconfig) -> None:
-        if self.state in _UP:
-            self._take_reset_events(self._resets.receive(chunk, self._received.cumulative, self.now))
+        if self._is_up:
+            self._take_reset_events(self._resets.receive(chunk, self._receiver.received.cumulative, self.now))
 
     def _take_reset_events(self, events: list[Event]) -> None:
         for event in events:
             if isinstance(event, StreamsReset):
-                self._reassembly.reset(event.streams)
+                self._receiver.reassembly.reset(event.streams)
             elif isinstance(event, OutgoingStreamsReset) and event.done:
                 self._sender.reset(event.streams)
         self._events += events
 
     # Round trip
 
-    def _ask_round_trip(self) -> None:
-        """A HEARTBEAT, where Karn's rule left no sample: on a path whose round trip is longer than the timeout,
-        everything would be repeated for ever, and nothing measured."""
-        if self._heartbeat and self.now - self._heartbeat_at < HEARTBEAT_PATIENCE:
-            return
-        self._heartbeats += 1
-        self._heartbeat = encode_parameters([(HEARTBEAT_INFO, _nonce.pack(self._heartbeats))])
-        self._heartbeat_at = self.now
-        self._control.append(Heartbeat(self._heartbeat).encode())
-
     def _receive_heartbeat(self, chunk: Heartbeat) -> None:
-        if self.state in _UP:
+        if self._is_up:
             self._say(HeartbeatAck(chunk.body))
 
     def _receive_heartbeat_ack(self, chunk: HeartbeatAck) -> None:
-        if self._heartbeat and chunk.body == self._heartbeat:
-            self._heartbeat = b""
-            self.round_trip.sample(self.now - self._heartbeat_at, self.now)
+        seconds = self._heartbeats.answered(chunk, self.now)
+        if seconds is not None:
+            self.round_trip.sample(seconds, self.now)
 
     # Handshake
 
@@ -557,7 +489,7 @@ class Association:
             self._cookie_is_due = True
             self._sender.handle_timer(self.now)  # the messages in its packet
         elif self.state is State.SHUTDOWN_SENT:
-            self._control.append(Shutdown(self._received.cumulative & MASK_32).encode())
+            self._control.append(Shutdown(self._receiver.received.cumulative & MASK_32).encode())
         else:
             self._control.append(ShutdownAck().encode())
         self._repeat_later()
@@ -571,7 +503,7 @@ class Association:
 
     def _receive_init(self, chunk: Init) -> None:
         peer = read_init(chunk)
-        if self.state in _UP and self._peer is not None and peer.tag != self._peer.tag:
+        if self._is_up and self._peer is not None and peer.tag != self._peer.tag:
             raise ProtocolViolation("peer_restarted")  # RFC 9260 5.2.2; see the class
         if self.state is State.SHUTDOWN_ACK_SENT:
             return
@@ -592,7 +524,7 @@ class Association:
         self._know(peer)
         self._cookie = cookie
         self._cookie_is_due = True
-        self.state = State.COOKIE_ECHOED
+        self._become(State.COOKIE_ECHOED)
         self._repeat_later()
 
     def _receive_cookie_echo(self, chunk: CookieEcho) -> None:
@@ -602,7 +534,7 @@ class Association:
             self.counts["bad_cookie"] += 1
             return
         peer, made = opened
-        if self.state in _UP or self.state is State.SHUTDOWN_ACK_SENT:
+        if self._is_up or self.state is State.SHUTDOWN_ACK_SENT:
             if self._peer is not None and peer.tag == self._peer.tag and self.state is State.ESTABLISHED:
                 self._say(CookieAck())  # D: the answer was lost
             return
@@ -622,22 +554,21 @@ class Association:
     def _know(self, peer: PeerInit) -> None:
         settings = self.settings
         self._peer = peer
-        self._interleaving = settings.interleaving and peer.interleaving
-        self._received = ReceivedTsns(peer.initial_tsn, settings)
-        self._reassembly = Reassembly(settings, self._interleaving)
+        interleaving = settings.interleaving and peer.interleaving
+        self._receiver = Receiver(settings, peer.initial_tsn, interleaving, self.counts)
         self._resets = StreamReset(self._initial_tsn, peer.initial_tsn)
-        self._sender.peer_is(peer.window, interleaving=self._interleaving, partial_reliability=peer.partial_reliability)
+        self._sender.peer_is(peer.window, interleaving=interleaving, partial_reliability=peer.partial_reliability)
 
     def _be_established(self) -> None:
-        self.state = State.ESTABLISHED
+        self._become(State.ESTABLISHED)
         self._repeat_at = None
         self._repeats = 0
         self._cookie_is_due = False
         if self.round_trip.smoothed is None:
-            self._ask_round_trip()
+            self._sender.ambiguous = True
         peer = self._peer
         assert peer is not None
-        self._events.append(Established(peer.inbound_streams, self._interleaving))
+        self._events.append(Established(peer.inbound_streams, self.settings.interleaving and peer.interleaving))
 
     # The end
 
@@ -646,10 +577,10 @@ class Association:
         if not self._sender.idle:
             return
         if self.state is State.SHUTDOWN_PENDING:
-            self.state = State.SHUTDOWN_SENT
-            self._control.append(Shutdown(self._received.cumulative & MASK_32).encode())
+            self._become(State.SHUTDOWN_SENT)
+            self._control.append(Shutdown(self._receiver.received.cumulative & MASK_32).encode())
         elif self.state is State.SHUTDOWN_RECEIVED:
-            self.state = State.SHUTDOWN_ACK_SENT
+            self._become(State.SHUTDOWN_ACK_SENT)
             self._control.append(ShutdownAck().encode())
         else:
             return
@@ -658,7 +589,7 @@ class Association:
 
     def _receive_shutdown(self, chunk: Shutdown) -> None:
         if self.state in (State.ESTABLISHED, State.SHUTDOWN_PENDING, State.SHUTDOWN_SENT):  # the last: both at once
-            self.state = State.SHUTDOWN_RECEIVED
+            self._become(State.SHUTDOWN_RECEIVED)
             self._go_on_shutting_down()
 
     def _receive_shutdown_ack(self, chunk: ShutdownAck) -> None:
@@ -678,7 +609,7 @@ class Association:
     def _receive_error(self, chunk: Error) -> None:
         self.counts["error_from_peer"] += 1
         if self.state is State.COOKIE_ECHOED and any(kind == STALE_COOKIE for kind, _ in chunk.causes):
-            self.state = State.COOKIE_WAIT  # RFC 9260 5.2.6: begin anew
+            self._become(State.COOKIE_WAIT)  # RFC 9260 5.2.6: begin anew
             self._cookie_is_due = False
             self._repeats = 0
             self._send_init()
@@ -689,11 +620,11 @@ class Association:
         self._end(reason)
 
     def _end(self, reason: str, detail: str = "") -> None:
-        self._events += self._reassembly.delivered
-        self._reassembly = Reassembly(self.settings, interleaving=False)
+        self._events += self._receiver.messages
+        self._receiver = Receiver(self.settings, 0, False, self.counts)
         self._ended = True
-        self.state = State.CLOSED
-        self._repeat_at = self._acknowledge_at = None
+        self._become(State.CLOSED)
+        self._repeat_at = None
         self._control.clear()
         self._sender.clear()
         self._events.append(Closed(reason, detail))

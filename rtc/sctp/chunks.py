@@ -37,6 +37,7 @@ __all__ = [
     "Skip",
     "Unknown",
     "decode_chunk",
+    "encode_data",
 ]
 
 # Flags of DATA and I-DATA, RFC 9260 3.3.1
@@ -64,6 +65,13 @@ def _packed(kind: int, flags: int, body: bytes) -> bytes:
     return _chunk.pack(kind, flags, CHUNK_HEADER + len(body)) + body + bytes(-len(body) % 4)
 
 
+def encode_data(tsn: int, flags: int, stream: int, sequence: int, protocol: int, payload: bytes) -> bytes:
+    """A DATA chunk."""
+    length = DATA_HEADER + len(payload)
+    encoded = _data.pack(0, flags, length, tsn, stream, sequence, protocol) + payload
+    return encoded + bytes(-length % 4) if length % 4 else encoded
+
+
 @dataclass(slots=True)
 class Data:
     """DATA (RFC 9260 3.3.1): a message, or a fragment of one, whose fragments have consecutive TSNs."""
@@ -77,9 +85,7 @@ class Data:
     payload: bytes
 
     def encode(self) -> bytes:
-        length = DATA_HEADER + len(self.payload)
-        header = _data.pack(0, self.flags, length, self.tsn, self.stream, self.sequence, self.protocol)
-        return header + self.payload + bytes(-length % 4)
+        return encode_data(self.tsn, self.flags, self.stream, self.sequence, self.protocol, self.payload)
 
     @classmethod
     def decode(cls, flags: int, data: bytes, start: int, end: int) -> "Data":

@@ -26,12 +26,11 @@ class Message:
     sequence: int = 0  # on its stream; given when its first fragment leaves
     taken: int = 0  # bytes that are in chunks already
     abandoned: bool = False
+    newest_wins: bool = False  # nobody waits for it: it is neither repeated nor put in order
     chunks: "list[Outgoing]" = field(default_factory=list)  # of a message of several
 
-    @property
-    def newest_wins(self) -> bool:
-        """Nobody waits for it: it is neither repeated nor put in order."""
-        return not self.ordered and self.max_retransmits == 0
+    def __post_init__(self) -> None:
+        self.newest_wins = not self.ordered and self.max_retransmits == 0
 
 
 class SendQueue:
@@ -48,7 +47,7 @@ class SendQueue:
         self._newest_size = 0
         self._streams: dict[int, deque[Message]] = {}
         self._sizes: dict[int, int] = {}
-        self._turns: deque[int] = deque()  # streams that have something
+        self.turns: deque[int] = deque()  # streams that have something
         self.newest: deque[Message] = deque()
         self.dropped = 0
         self.expired = 0
@@ -76,7 +75,7 @@ class SendQueue:
         queue = self._streams.get(message.stream)
         if queue is None:
             queue = self._streams[message.stream] = deque()
-            self._turns.append(message.stream)
+            self.turns.append(message.stream)
         queue.append(message)
 
     def take_newest(self) -> Message:
@@ -86,8 +85,8 @@ class SendQueue:
 
     def head(self, now: float) -> Message | None:
         """The message of the stream whose turn it is; without those that have expired and were never begun."""
-        while self._turns:
-            message = self._streams[self._turns[0]][0]
+        while self.turns:
+            message = self._streams[self.turns[0]][0]
             late = message.expires is not None and now >= message.expires and not message.taken
             if not late and not message.abandoned:
                 return message
@@ -99,7 +98,7 @@ class SendQueue:
         """So many bytes more of the head are in chunks. The next stream has its turn."""
         message.taken += size
         stream = message.stream
-        self._turns.rotate(-1)
+        self.turns.rotate(-1)
         self._sizes[stream] -= size
         if message.taken < len(message.payload):
             return
@@ -107,7 +106,7 @@ class SendQueue:
         queue.popleft()
         if not queue:
             del self._streams[stream], self._sizes[stream]
-            self._turns.remove(stream)
+            self.turns.remove(stream)
 
     def buffered(self, stream: int) -> int:
         """Bytes that wait on this stream; newest-wins messages do not count."""
@@ -121,5 +120,5 @@ class SendQueue:
         self.newest.clear()
         self._streams.clear()
         self._sizes.clear()
-        self._turns.clear()
+        self.turns.clear()
         self._newest_size = 0

@@ -11,12 +11,12 @@ from rtc.sctp.chunks import (
     IMMEDIATE,
     INTERLEAVED_HEADER,
     UNORDERED,
-    Data,
     ForwardTsn,
     InterleavedData,
     InterleavedForwardTsn,
     Sack,
     Skip,
+    encode_data,
 )
 from rtc.sctp.congestion import CongestionWindow
 from rtc.sctp.packet import COMMON_HEADER
@@ -27,6 +27,7 @@ from rtc.sctp.settings import SctpSettings
 
 __all__ = ["Outgoing", "Sender"]
 
+WHOLE = BEGIN | END
 MISSES = 3  # reports of a chunk as missing before it is repeated (RFC 9260 7.2.4)
 REMEMBERED = 256  # repeated TSNs, to know a needless repeat by
 
@@ -110,22 +111,28 @@ class Sender:
         self._repeated: deque[int] = deque(maxlen=REMEMBERED)
         self._sequences: dict[tuple[int, bool], int] = {}
         self._skips: dict[tuple[int, bool], int] = {}  # the last message given up, by stream and order
-        self._forward_at: float | None = None  # when a FORWARD TSN is due
+        self.forward_at: float | None = None  # when a FORWARD TSN is due
         self._burst = 0  # bytes of reliable messages that may leave before the next acknowledgement or timer
         self._asked_at = float("-inf")  # when a newest-wins chunk last had the I bit
-        self._interleaving = False
+        self._newest_floor = settings.newest_wins_floor * settings.max_packet
+        self._floor = settings.window_floor * settings.max_packet
         self._may_give_up = False
+        self._interleaving = False
+        self._header = DATA_HEADER
+        self._largest = settings.max_packet - COMMON_HEADER - DATA_HEADER  # payload of a chunk that fills a packet
 
     def peer_is(self, window: int, *, interleaving: bool, partial_reliability: bool) -> None:
         """What the handshake found. Without partial reliability every message is reliable (RFC 3758 3.3.1)."""
         self._peer_window = window
-        self._interleaving = interleaving
         self._may_give_up = partial_reliability
+        self._interleaving = interleaving
+        self._header = INTERLEAVED_HEADER if interleaving else DATA_HEADER
+        self._largest = self._settings.max_packet - COMMON_HEADER - self._header
 
     @property
     def idle(self) -> bool:
         """Nothing waits, and the peer has acknowledged everything, also what was given up."""
-        return not self._outstanding and self._forward_at is None and not len(self.queue)
+        return not self._outstanding and self.forward_at is None and not len(self.queue)
 
     @property
     def outstanding(self) -> int:
@@ -138,20 +145,26 @@ class Sender:
         """Packets are about to be made."""
         self._burst = self._settings.max_burst * self._settings.max_packet
 
-    def next_chunk(self, room: int, now: float) -> bytes:
-        """The next chunk that is due, when it fits into `room` bytes; otherwise nothing."""
-        chunk = self._due(now)
-        if chunk is None or chunk.size + self._header > room:
-            return b""
-        if chunk.newest_wins and chunk.sent_count == 0:
-            self._newest_waiting.popleft()
-        else:
-            heappop(self._waiting)
-        return self._send(chunk, now)
-
     @property
-    def _header(self) -> int:
-        return INTERLEAVED_HEADER if self._interleaving else DATA_HEADER
+    def is_quiet(self) -> bool:
+        """Nothing waits to leave, whether it may or not."""
+        return not (self.queue.newest or self._waiting or self.queue.turns or self._newest_waiting)
+
+    def chunks(self, room: int, now: float) -> bytes:
+        """The chunks that are due and fit into `room` bytes, those of newest-wins messages first."""
+        taken = b""
+        while not self.is_quiet:
+            chunk = self._due(now)
+            if chunk is None or chunk.size + self._header > room:
+                break
+            if chunk.newest_wins and chunk.sent_count == 0:
+                self._newest_waiting.popleft()
+            else:
+                heappop(self._waiting)
+            encoded = self._send(chunk, now)
+            room -= len(encoded)
+            taken = taken + encoded if taken else encoded
+        return taken
 
     def _due(self, now: float) -> Outgoing | None:
         """RFC 9260 6.1 C would have repeats before everything new; newest-wins messages are before those too, which
@@ -180,12 +193,11 @@ class Sender:
         return chunk if self._admits(chunk.size) else None
 
     def _admits_newest(self, message: Message) -> bool:
-        if len(self._outstanding) >= self._settings.max_outstanding:
+        if self._newest_flight >= self._newest_floor and self._flight >= self.window.size:
             return False
         if self._flight and len(message.payload) > self._peer_window:
             return False
-        floor = self._settings.newest_wins_floor * self._settings.max_packet
-        return self._newest_flight < floor or self._flight < self.window.size
+        return len(self._outstanding) < self._settings.max_outstanding
 
     def _admits(self, size: int) -> bool:
         """Whether a chunk may leave that is not newest-wins (RFC 9260 6.1 A, B and D)."""
@@ -193,37 +205,36 @@ class Sender:
             return True  # A: one chunk may always be in flight, also into a closed window
         if self._burst <= 0 or min(size, self._largest) > self._peer_window:
             return False
-        floor = self._settings.window_floor * self._settings.max_packet
-        return self._flight < self.window.size or self._flight - self._newest_flight < floor
-
-    @property
-    def _largest(self) -> int:
-        """Payload of a chunk that fills a packet."""
-        return self._settings.max_packet - COMMON_HEADER - self._header
+        return self._flight < self.window.size or self._flight - self._newest_flight < self._floor
 
     def _chunks(self, message: Message, *, whole: bool) -> list[Outgoing]:
         """The message's next chunk, or all of them. They have their TSNs from here on."""
         payload, largest, newest = message.payload, self._largest, message.newest_wins
-        if not message.taken:
+        if message.ordered or self._interleaving:
             self._number(message)
+        unordered = 0 if message.ordered else UNORDERED
+        if len(payload) <= largest:
+            chunk = Outgoing(self.next_tsn, WHOLE | unordered, message, 0, payload, newest)
+            self.next_tsn += 1
+            self._outstanding.append(chunk)
+            return [chunk]
         chunks = []
         start = message.taken
         while start < len(payload):
             end = min(start + largest, len(payload))
-            flags = (BEGIN if start == 0 else 0) | (END if end == len(payload) else 0)
-            flags |= 0 if message.ordered else UNORDERED
+            flags = (0 if start else BEGIN) | (END if end == len(payload) else 0) | unordered
             chunks.append(Outgoing(self.next_tsn, flags, message, start // largest, payload[start:end], newest))
             self.next_tsn += 1
             start = end
             if not whole:
                 break
-        if len(payload) > largest:
-            message.chunks += chunks
+        message.chunks += chunks
         self._outstanding.extend(chunks)
         return chunks
 
     def _number(self, message: Message) -> None:
-        if message.ordered or self._interleaving:
+        """Give it the next number on its stream, before its first fragment."""
+        if not message.taken:
             key = message.stream, not message.ordered
             message.sequence = self._sequences.get(key, 0)
             self._sequences[key] = message.sequence + 1
@@ -251,7 +262,9 @@ class Sender:
         """The I bit (RFC 7053): on the end of whatever is to arrive, and where the window ends."""
         if not chunk.newest_wins:
             return IMMEDIATE if chunk.flags & END or not self._admits(self._largest) else 0
-        if now - max(self._asked_at, self._round_trip.sampled_at) < self._settings.sample_interval:
+        if now - self._asked_at < self._settings.sample_interval:
+            return 0
+        if now - self._round_trip.sampled_at < self._settings.sample_interval:
             return 0
         self._asked_at = now
         return IMMEDIATE
@@ -263,14 +276,15 @@ class Sender:
             return InterleavedData(
                 tsn, chunk.flags, message.stream, sequence, chunk.fragment, message.protocol, chunk.payload
             ).encode()
-        sequence = message.sequence & MASK_16
-        return Data(tsn, chunk.flags, message.stream, sequence, message.protocol, chunk.payload).encode()
+        return encode_data(
+            tsn, chunk.flags, message.stream, message.sequence & MASK_16, message.protocol, chunk.payload
+        )
 
     def forward_tsn(self, now: float) -> ForwardTsn | InterleavedForwardTsn | None:
         """What tells the peer of messages that were given up, when it is due (RFC 3758 3.5)."""
-        if self._forward_at is None or now < self._forward_at:
+        if self.forward_at is None or now < self.forward_at:
             return None
-        self._forward_at = now + self._round_trip.timeout(1)
+        self.forward_at = now + self._round_trip.timeout(1)
         skips = [Skip(stream, last, unordered) for (stream, unordered), last in self._skips.items()]
         cumulative = self._advanced & MASK_32
         if self._interleaving:
@@ -429,7 +443,8 @@ class Sender:
         It passes single messages that the peer has, so that one FORWARD TSN tells of all holes. It stops at fragments
         of a message that is not given up: a peer would drop those.
         """
-        self._advanced = max(self._advanced, self.acknowledged)
+        if self._advanced <= self.acknowledged:
+            self._advanced = self.acknowledged
         outstanding, skips = self._outstanding, self._skips
         moved = False
         while outstanding:
@@ -447,9 +462,9 @@ class Sender:
             self._advanced = chunk.tsn
         if self.acknowledged >= self._advanced:
             skips.clear()
-            self._forward_at = None
+            self.forward_at = None
         elif moved:
-            self._forward_at = now
+            self.forward_at = now
 
     @property
     def _most_skips(self) -> int:
@@ -460,7 +475,7 @@ class Sender:
 
     def deadline(self) -> float | None:
         """When `handle_timer` is due. A FORWARD TSN that is due at once counts as due in the past."""
-        due = self._forward_at
+        due = self.forward_at
         if (sent := _first(self._sent)) is not None:
             expires = sent + self._round_trip.timeout(self._expiries)
             due = expires if due is None else min(due, expires)
@@ -505,12 +520,12 @@ class Sender:
             each.clear()
         self._waiting.clear()
         self._skips.clear()
-        self._forward_at = None
+        self.forward_at = None
 
 
 def _is_done_with(chunk: Outgoing) -> bool:
     """The peer has it, and keeps no fragment of a message because of it."""
-    is_whole = chunk.flags & (BEGIN | END) == BEGIN | END
+    is_whole = chunk.flags & WHOLE == WHOLE
     return chunk.state is _ACKNOWLEDGED and (is_whole or chunk.message.abandoned)
 
 

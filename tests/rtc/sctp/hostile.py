@@ -78,9 +78,9 @@ class Victim:
             assert len(packet) <= association.settings.max_packet, len(packet)
             decode_packet(packet)
         assert len(packets) <= 40, "more in return than a window"
-        assert association._reassembly.held <= 2 * SMALL + 4096 + 2000
-        assert sum(len(run.payloads) for run in association._reassembly._starts.values()) <= 1000
-        assert len(association._received._runs) <= association.settings.max_gaps + 1
+        assert association._receiver.reassembly.held <= 2 * SMALL + 4096 + 2000
+        assert sum(len(run.payloads) for run in association._receiver.reassembly._starts.values()) <= 1000
+        assert len(association._receiver.received._runs) <= association.settings.max_gaps + 1
         assert len(association._control) <= 100
         assert len(self.end._channels) <= 64
         events = self.end.events()

@@ -284,7 +284,7 @@ def test_what_exceeds_the_window_is_dropped_and_taken_when_it_comes_again() -> N
     victim.say(Data(victim.tsn, WHOLE, 0, 1, 51, bytes(1000)))  # 0 was the OPEN
     for index in range(1, 12):
         victim.say(Data(victim.tsn + index, WHOLE, 0, index + 1, 51, bytes(1000)))
-    assert victim.end.association._received.cumulative == victim.tsn + 11
+    assert victim.end.association._receiver.received.cumulative == victim.tsn + 11
 
 
 def test_a_full_queue_is_said_and_loses_nothing() -> None:
@@ -354,7 +354,7 @@ def test_what_is_given_up_before_all_of_it_has_left_holds_nothing_up() -> None:
     first.send(0, 51, b"next", world.now)
     world.run(world.now + 10.0)
     assert [event.payload for event in second.events() if isinstance(event, MessageReceived)][-1] == b"next"
-    assert second._reassembly.held == 0
+    assert second._receiver.reassembly.held == 0
 
 
 def test_one_forward_tsn_passes_every_other_message() -> None:
@@ -393,7 +393,7 @@ def test_holes_of_a_peer_that_gives_up_and_does_not_say_so_are_passed_after_a_wh
             victim.say(Data((tsn + index) & 0xFFFFFFFF, WHOLE | UNORDERED, 0, 0, 51, b"x"))
         victim.wait(0.05)
     assert victim.end.counts["given_up_by_peer"] > 0
-    assert len(victim.end.association._received._runs) < 60
+    assert len(victim.end.association._receiver.received._runs) < 60
     assert victim.end.association.state is State.ESTABLISHED
 
 

@@ -83,7 +83,7 @@ def test_reliable_messages_arrive_once_and_in_order(name: str, interleaving: boo
     assert_delivered(sent, received(second))
     assert first.state is second.state is State.ESTABLISHED
     assert first._sender.idle
-    assert second._reassembly.held == 0
+    assert second._receiver.reassembly.held == 0
 
 
 def test_most_newest_wins_messages_arrive_under_loss_in_one_way_time() -> None:

@@ -118,7 +118,7 @@ class TwoAssociations(RuleBasedStateMachine):
     @invariant()
     def memory_is_bounded(self) -> None:
         for end in self.ends:
-            assert end._reassembly.held <= 2 * end.settings.receive_window
+            assert end._receiver.reassembly.held <= 2 * end.settings.receive_window
             assert end._sender.outstanding <= end.settings.max_outstanding + 20
 
     @invariant()
@@ -143,7 +143,7 @@ class TwoAssociations(RuleBasedStateMachine):
         for end in self.ends:
             assert end.state is State.ESTABLISHED
             assert end._sender._flight == end._sender._newest_flight == 0
-            assert end._reassembly.held == 0
+            assert end._receiver.reassembly.held == 0
 
 
 TestTwoAssociations = TwoAssociations.TestCase
