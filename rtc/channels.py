@@ -243,14 +243,15 @@ class DataChannels:
     def shutdown(self, now: float) -> None:
         """End when everything has arrived; `Closed` follows."""
         self.association.shutdown(now)
+        self._take_events(now)
 
     def abort(self, now: float, reason: str = "aborted") -> None:
         """End at once; `Closed` with this reason is next."""
         self.association.abort(now, reason)
+        self._take_events(now)
 
     def events(self) -> list[ChannelEvent]:
         """What has happened; drained."""
-        self._take_events(self.association.now)
         events, self._events = self._events, []
         return events
 

@@ -302,7 +302,6 @@ class Association:
     # Packets out
 
     def _bundle(self) -> None:
-        self._sender.begin_burst()
         if self.state is not State.ESTABLISHED:
             self._go_on_shutting_down()
         while self._has_due() and (chunks := self._next_chunks()):
@@ -385,7 +384,6 @@ class Association:
         """COOKIE ECHO, and as many messages as fit: nothing else leaves before the answer (RFC 9260 5.1 C)."""
         self._cookie_is_due = False
         echo = CookieEcho(self._cookie).encode()
-        self._sender.begin_burst()
         self._packets.append(self._packet(echo + self._sender.chunks(self._room - len(echo), self.now)))
 
     # Packets in

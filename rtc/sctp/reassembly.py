@@ -10,7 +10,7 @@ from rtc.sctp.settings import SctpSettings
 
 __all__ = ["Reassembly"]
 
-OVERHEAD = 64  # bytes that a chunk costs beyond its payload, so that many small ones are no way around the bound
+OVERHEAD = 256  # bytes that a chunk costs beyond its payload, so that many small ones are no way around the bound
 
 # Where a fragment is, apart from its number: DATA's number is its TSN, I-DATA's counts within its message.
 _Space = tuple[int, bool, int] | None
@@ -152,34 +152,27 @@ class Reassembly:
 
     def forward(self, cumulative: int, skips: list[Skip]) -> None:
         """The peer has given up messages: nothing up to the TSN `cumulative` comes any more (RFC 3758 3.6)."""
+        latest: dict[tuple[int, bool], int] = {}
         for skip in skips:
-            stream = self._streams.setdefault(skip.stream, _Stream())
-            if skip.unordered:
-                continue
-            expected = unwrap(skip.sequence, stream.expected, self._sequence_mask) + 1
-            for sequence in sorted(each for each in stream.held if each < expected):
-                message = stream.held.pop(sequence)
-                self.held -= len(message.payload) + OVERHEAD
-                self.delivered.append(message)
-            stream.expected = max(stream.expected, expected)
-            self._release(stream)
-        given_up = [run for run in self._starts.values() if self._is_given_up(run, cumulative, skips)]
+            latest[skip.stream, skip.unordered] = skip.sequence  # one each; what a peer repeats costs nothing
+        for (number, unordered), sequence in latest.items():
+            if not unordered:
+                self._skip(self._streams.setdefault(number, _Stream()), sequence)
+        given_up = [run for run in self._starts.values() if _is_given_up(run, cumulative, latest)]
         for run in given_up:
             self._drop(run)
 
-    def _is_given_up(self, run: _Run, cumulative: int, skips: list[Skip]) -> bool:
-        if isinstance(run.chunk, InterleavedData):  # RFC 8260 2.3.1: by message
-            unordered = bool(run.chunk.flags & UNORDERED)
-            return any(
-                skip.stream == run.chunk.stream
-                and skip.unordered == unordered
-                and run.sequence <= unwrap(skip.sequence, run.sequence)
-                for skip in skips
-            )
-        if run.begins:
-            # Its next fragment is beyond `cumulative`, and comes, when nothing up to there is missing.
-            return run.last < cumulative
-        return run.first <= cumulative + 1
+    def _skip(self, stream: _Stream, sequence: int) -> None:
+        """No ordered message up to this one comes any more; those that have come are delivered."""
+        expected = unwrap(sequence, stream.expected, self._sequence_mask) + 1
+        if expected <= stream.expected:
+            return
+        for early in sorted(each for each in stream.held if each < expected):
+            message = stream.held.pop(early)
+            self.held -= len(message.payload) + OVERHEAD
+            self.delivered.append(message)
+        stream.expected = expected
+        self._release(stream)
 
     def reset(self, streams: tuple[int, ...]) -> None:
         """These streams begin anew (RFC 6525 5.2.2); all when there is none."""
@@ -187,10 +180,22 @@ class Reassembly:
             stream = self._streams.pop(number, None)
             if stream is not None:
                 self.held -= sum(len(message.payload) + OVERHEAD for message in stream.held.values())
-        for run in [run for run in self._starts.values() if not streams or run.chunk.stream in streams]:
+        chosen = set(streams)
+        for run in [run for run in self._starts.values() if not chosen or run.chunk.stream in chosen]:
             self._drop(run)
 
 
 def _same_message(one: Data | InterleavedData, other: Data | InterleavedData) -> bool:
     """RFC 9260 6.9: fragments of one message share stream, sequence and order."""
     return one.stream == other.stream and one.sequence == other.sequence and (one.flags ^ other.flags) & UNORDERED == 0
+
+
+def _is_given_up(run: _Run, cumulative: int, latest: dict[tuple[int, bool], int]) -> bool:
+    """Whether the rest of it comes no more. `latest` are the last messages given up, by stream and order."""
+    if isinstance(run.chunk, InterleavedData):  # RFC 8260 2.3.1: by message
+        last = latest.get((run.chunk.stream, bool(run.chunk.flags & UNORDERED)))
+        return last is not None and run.sequence <= unwrap(last, run.sequence)
+    if run.begins:
+        # Its next fragment is beyond `cumulative`, and comes, when nothing up to there is missing.
+        return run.last < cumulative
+    return run.first <= cumulative + 1

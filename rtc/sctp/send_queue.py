@@ -87,7 +87,7 @@ class SendQueue:
         """The message of the stream whose turn it is; without those that have expired and were never begun."""
         while self.turns:
             message = self._streams[self.turns[0]][0]
-            late = message.expires is not None and now >= message.expires and not message.taken
+            late = message.expires is not None and now > message.expires and not message.taken
             if not late and not message.abandoned:
                 return message
             self.expired += late

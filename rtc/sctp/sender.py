@@ -108,7 +108,7 @@ class Sender:
         self._peer_window = 0  # bytes that the peer still takes
         self._expiries = 0  # waits in vain since the last acknowledgement
         self._sacks = 0
-        self._repeated: deque[int] = deque(maxlen=REMEMBERED)
+        self._repeated: dict[int, None] = {}  # TSNs, the latest last
         self._sequences: dict[tuple[int, bool], int] = {}
         self._skips: dict[tuple[int, bool], int] = {}  # the last message given up, by stream and order
         self.forward_at: float | None = None  # when a FORWARD TSN is due
@@ -141,8 +141,8 @@ class Sender:
 
     # Sending
 
-    def begin_burst(self) -> None:
-        """Packets are about to be made."""
+    def _begin_burst(self) -> None:
+        """Something has happened after which reliable messages may leave in a row (RFC 9260 6.1 D)."""
         self._burst = self._settings.max_burst * self._settings.max_packet
 
     @property
@@ -153,6 +153,8 @@ class Sender:
     def chunks(self, room: int, now: float) -> bytes:
         """The chunks that are due and fit into `room` bytes, those of newest-wins messages first."""
         taken = b""
+        if not self._flight:
+            self._begin_burst()
         while not self.is_quiet:
             chunk = self._due(now)
             if chunk is None or chunk.size + self._header > room:
@@ -253,8 +255,10 @@ class Sender:
             self._burst -= chunk.size
             self._sent.append((now, chunk))
         if chunk.sent_count > 1:
-            self._repeated.append(chunk.tsn)
             self._counts["repeats"] += 1
+            self._repeated[chunk.tsn] = None
+            if len(self._repeated) > REMEMBERED:
+                del self._repeated[next(iter(self._repeated))]
         chunk.flags = chunk.flags & ~IMMEDIATE | self._immediate(chunk, now)
         return self._encode(chunk)
 
@@ -311,6 +315,7 @@ class Sender:
             self._counts["sack_of_unsent"] += 1
             return
         self._sacks += 1
+        self._begin_burst()
         was_full = self._flight >= self.window.size
         arrived: list[Outgoing] = []  # with this SACK
         outstanding = self._outstanding
@@ -375,7 +380,7 @@ class Sender:
         for duplicate in sack.duplicates:
             tsn = unwrap(duplicate, self.acknowledged)
             if tsn in self._repeated:
-                self._repeated.remove(tsn)
+                del self._repeated[tsn]
                 self._counts["needless_repeats"] += 1
                 self._round_trip.needless(now)
 
@@ -489,6 +494,7 @@ class Sender:
         return self._round_trip.timeout(0) + self._settings.peer_acknowledgement_delay
 
     def handle_timer(self, now: float) -> None:
+        self._begin_burst()
         newest_timeout = self._newest_timeout
         while (sent := _first(self._newest_sent)) is not None and sent + newest_timeout <= now:
             self._lose(self._newest_sent.popleft()[1], now)
