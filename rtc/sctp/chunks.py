@@ -11,6 +11,7 @@ from rtc.sctp.parameters import Parameter, decode_parameters, encode_parameters
 __all__ = [
     "BEGIN",
     "CHUNK_HEADER",
+    "DECODERS",
     "DATA_HEADER",
     "END",
     "IMMEDIATE",
@@ -36,7 +37,6 @@ __all__ = [
     "ShutdownComplete",
     "Skip",
     "Unknown",
-    "decode_chunk",
     "encode_data",
 ]
 
@@ -412,8 +412,9 @@ Chunk = (
     | Unknown
 )
 
-# The shortest value that each can have; a shorter one is no such chunk.
-_DECODERS: dict[int, tuple[int, Callable[[int, bytes, int, int], Chunk]]] = {
+# The shortest value that each type can have, and what decodes `data[start:end]` behind a header of four bytes. What is
+# inconsistent raises SctpParseError.
+DECODERS: dict[int, tuple[int, Callable[[int, bytes, int, int], Chunk]]] = {
     Data.kind: (12, Data.decode),
     Init.kind: (16, Init.decode),
     InitAck.kind: (16, InitAck.decode),
@@ -432,18 +433,3 @@ _DECODERS: dict[int, tuple[int, Callable[[int, bytes, int, int], Chunk]]] = {
     ForwardTsn.kind: (4, ForwardTsn.decode),
     InterleavedForwardTsn.kind: (4, InterleavedForwardTsn.decode),
 }
-
-
-def decode_chunk(kind: int, flags: int, data: bytes, start: int, end: int) -> Chunk:
-    """The chunk whose value is `data[start:end]`, after a header of four bytes.
-
-    Raises:
-        SctpParseError: it is shorter than its type says, or inconsistent.
-    """
-    known = _DECODERS.get(kind)
-    if known is None:
-        return Unknown(kind, flags, data[start:end])
-    shortest, decode = known
-    if end - start < shortest:
-        raise SctpParseError("a chunk is too short")
-    return decode(flags, data, start, end)

@@ -5,7 +5,7 @@ from struct import Struct
 
 from google_crc32c import value as crc32c
 
-from rtc.sctp.chunks import CHUNK_HEADER, Chunk, decode_chunk
+from rtc.sctp.chunks import CHUNK_HEADER, DECODERS, Chunk, Unknown
 from rtc.sctp.errors import SctpParseError
 
 __all__ = ["COMMON_HEADER", "Packet", "decode_packet", "encode_packet"]
@@ -47,7 +47,7 @@ def decode_packet(data: bytes) -> Packet:
     source, destination, tag = _ports_and_tag.unpack_from(data)
     if _checksum.unpack_from(data, 8)[0] != crc32c(data[:8] + _NO_CHECKSUM + data[12:]):
         raise SctpParseError("wrong checksum")
-    chunks = []
+    chunks: list[Chunk] = []
     start = COMMON_HEADER
     while start < size:
         if size - start < CHUNK_HEADER:
@@ -56,6 +56,12 @@ def decode_packet(data: bytes) -> Packet:
         end = start + length
         if length < CHUNK_HEADER or end > size:
             raise SctpParseError("a chunk has the wrong length")
-        chunks.append(decode_chunk(kind, flags, data, start + CHUNK_HEADER, end))
+        known = DECODERS.get(kind)
+        if known is None:
+            chunks.append(Unknown(kind, flags, data[start + CHUNK_HEADER : end]))
+        elif length - CHUNK_HEADER < known[0]:
+            raise SctpParseError("a chunk is too short")
+        else:
+            chunks.append(known[1](flags, data, start + CHUNK_HEADER, end))
         start = end + -length % 4
     return Packet(source, destination, tag, chunks)

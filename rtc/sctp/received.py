@@ -4,11 +4,12 @@ from bisect import bisect_left
 from collections import deque
 
 from rtc.sctp.chunks import Sack
-from rtc.sctp.serial import MASK_32, unwrap
+from rtc.sctp.serial import MASK_32
 from rtc.sctp.settings import SctpSettings
 
 __all__ = ["ReceivedTsns"]
 
+HALF = 1 << 31
 FURTHEST = 0xFFFF  # a gap's offset has 16 bits
 MOST_DUPLICATES = 32  # reported in one SACK
 ENOUGH_BEYOND = 64  # chunks that came beyond a hole before it can count as given up
@@ -30,7 +31,8 @@ class ReceivedTsns:
         return bool(self._runs)
 
     def unwrap(self, tsn: int) -> int:
-        return unwrap(tsn, self.cumulative)
+        near = self.cumulative  # `serial.unwrap` in place, for every chunk comes by here
+        return near - HALF + ((tsn - near + HALF) & MASK_32)
 
     def take(self, tsn: int, now: float) -> str:
         """Note one more. "" when it is new and noted, otherwise the name of why it is not to be used."""

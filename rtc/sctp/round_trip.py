@@ -35,7 +35,10 @@ class RoundTrip:
         self.sampled_at = float("-inf")
 
     def sample(self, seconds: float, now: float) -> None:
-        """A chunk that was sent once, with the I bit, was acknowledged after `seconds` (Karn's rule, RFC 9260 C5)."""
+        """A chunk that was sent once, with the I bit, was acknowledged after `seconds` (Karn's rule, RFC 9260 6.3.1
+        C5). One sample a round trip is used (C4), so that the latest samples cover some time."""
+        if self.smoothed is not None and now - self.sampled_at < self.smoothed:
+            return
         if self.smoothed is None:
             self.smoothed, self._variation = seconds, seconds / 2  # RFC 9260 6.3.1 C2
         else:

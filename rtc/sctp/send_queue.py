@@ -1,7 +1,6 @@
 """Messages that have not been sent yet, and whose turn it is."""
 
 from collections import deque
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from rtc.sctp.errors import SendQueueFull
@@ -13,24 +12,43 @@ if TYPE_CHECKING:
 __all__ = ["Message", "SendQueue"]
 
 
-@dataclass(slots=True, eq=False)
 class Message:
     """A message on its way out. It may be given up after `max_retransmits` repeats or at the time `expires`."""
 
-    stream: int
-    protocol: int  # PPID
-    payload: bytes
-    ordered: bool = True
-    max_retransmits: int | None = None
-    expires: float | None = None
-    sequence: int = 0  # on its stream; given when its first fragment leaves
-    taken: int = 0  # bytes that are in chunks already
-    abandoned: bool = False
-    newest_wins: bool = False  # nobody waits for it: it is neither repeated nor put in order
-    chunks: "list[Outgoing]" = field(default_factory=list)  # of a message of several
+    __slots__ = (
+        "abandoned",
+        "chunks",
+        "expires",
+        "max_retransmits",
+        "newest_wins",
+        "ordered",
+        "payload",
+        "protocol",
+        "sequence",
+        "stream",
+        "taken",
+    )
 
-    def __post_init__(self) -> None:
-        self.newest_wins = not self.ordered and self.max_retransmits == 0
+    def __init__(
+        self,
+        stream: int,
+        protocol: int,
+        payload: bytes,
+        ordered: bool = True,
+        max_retransmits: int | None = None,
+        expires: float | None = None,
+    ) -> None:
+        self.stream = stream
+        self.protocol = protocol  # PPID
+        self.payload = payload
+        self.ordered = ordered
+        self.max_retransmits = max_retransmits
+        self.expires = expires
+        self.newest_wins = not ordered and max_retransmits == 0  # neither repeated nor put in order
+        self.sequence = 0  # on its stream; given when its first fragment leaves
+        self.taken = 0  # bytes that are in chunks already
+        self.abandoned = False
+        self.chunks: list[Outgoing] | None = None  # of a message of several
 
 
 class SendQueue:

@@ -155,10 +155,8 @@ class Sender:
         taken = b""
         if not self._flight:
             self._begin_burst()
-        while not self.is_quiet:
-            chunk = self._due(now)
-            if chunk is None or chunk.size + self._header > room:
-                break
+        header = self._header
+        while (chunk := self._due(now)) is not None and chunk.size + header <= room:
             if chunk.newest_wins and chunk.sent_count == 0:
                 self._newest_waiting.popleft()
             else:
@@ -230,7 +228,7 @@ class Sender:
             start = end
             if not whole:
                 break
-        message.chunks += chunks
+        message.chunks = [*(message.chunks or ()), *chunks]
         self._outstanding.extend(chunks)
         return chunks
 

@@ -302,6 +302,19 @@ def test_a_full_queue_is_said_and_loses_nothing() -> None:
     assert (arrived.count(0), arrived.count(1)) == (taken, 1)
 
 
+def test_no_more_than_a_burst_leaves_before_something_comes_back() -> None:
+    settings = SctpSettings(send_queue=1_000_000)
+    world, first, _ = associated(settings)
+    for _ in range(30):
+        first.send(0, 53, bytes(16_000), world.now)
+    world.run(world.now + 10.0)
+    assert first._sender.window.size > 20 * settings.max_packet
+    for _ in range(10):
+        first.send(0, 53, bytes(16_000), world.now)
+    leaving = first.packets_to_send() + first.packets_to_send()
+    assert settings.max_burst <= len(leaving) <= settings.max_burst + 1
+
+
 def test_messages_are_refused_by_size_and_after_the_end() -> None:
     end = Association(SctpSettings(), seeded(1), peer_max_message=1000)
     with pytest.raises(MessageTooLarge):
