@@ -1,7 +1,6 @@
 """No test touches the state that a console keeps for its user; all draw off screen.
 
-Tests are `fast`, but for those of the files in slow.txt: real processes, networks and simulated robots, whose tests
-take the better part of a second or more together. `make test-fast` leaves those and the browsers out.
+What takes long runs first, files that need a browser between those that do not: these compute while the others wait.
 """
 
 import os
@@ -12,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from robot_bridge.robots.mujoco_view.graphics import choose_graphics
+from tests.needs import is_real
 
 choose_graphics()  # before a test file imports mujoco
 
@@ -19,14 +19,33 @@ settings.register_profile("any-machine", deadline=None, suppress_health_check=[H
 settings.load_profile("any-machine")  # no test asserts a time
 
 
-ROOT = Path(__file__).parents[1]
-SLOW = {ROOT / line for line in (ROOT / "tests" / "slow.txt").read_text().split()}
+SLOW = ("slow", "browser", "long")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if item.path not in SLOW and item.get_closest_marker("browser") is None:
+        if not (is_real(_module(item)) or any(item.get_closest_marker(each) for each in SLOW)):
             item.add_marker(pytest.mark.fast)
+    places = _places(items)
+    items.sort(key=lambda item: places[item.path])
+
+
+def _module(item: pytest.Item) -> str:
+    assert isinstance(item, pytest.Function)
+    name: str = item.module.__name__
+    return name
+
+
+def _places(items: list[pytest.Item]) -> dict[Path, float]:
+    """Of each file in the run: those with browsers and other slow ones evenly from 0 to 1, then the rest."""
+    kinds: dict[str, dict[Path, None]] = {"browser": {}, "slow": {}, "fast": {}}
+    for item in items:
+        kind = next((each for each in ("browser", "fast") if item.get_closest_marker(each)), "slow")
+        kinds[kind][item.path] = None
+    places = dict.fromkeys(kinds["fast"], 1.0)
+    for each in ("slow", "browser"):
+        places |= {path: (number + 0.5) / len(kinds[each]) for number, path in enumerate(kinds[each])}
+    return places
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -26,13 +26,14 @@ MUST_BE_ZERO = (
 def soak_command(
     minutes: Annotated[float, typer.Option(min=1.5, max=600, help="How long; 30 is the full soak.")] = 30,
     seed: Annotated[int, typer.Option(help="Of the plan of what goes wrong.")] = 1,
+    observers: Annotated[int, typer.Option(min=1, max=100, help="Headless ones, that come and go.")] = 20,
     json_file: Annotated[
         str | None, typer.Option("--json", help="Write the verdict here; - is standard output.")
     ] = None,
 ) -> None:
     """Drive for a while as bridge, console and network keep failing; ends with 1 when a promise was broken."""
     try:
-        verdict = uvloop.run(soak(minutes, seed, lambda text: typer.echo(text, err=True)))
+        verdict = uvloop.run(soak(minutes, seed, observers, lambda text: typer.echo(text, err=True)))
     except ProcessFailed as error:
         typer.echo(f"lockstep: {error}", err=True)
         raise typer.Exit(3) from error

@@ -23,16 +23,18 @@ from bench.soak.schedule import Action, schedule
 from bench.soak.world import World
 from bench.stack import Metrics
 
-__all__ = ["OBSERVERS", "soak"]
+__all__ = ["soak"]
 
-OBSERVERS = 20
 SAMPLE_SECONDS = 2.0
 LAST_LOOK = 45.0  # s at the end for everybody to be live again
 MAX_EVENT_AGE, HOLD = 2.0, 0.3  # of the planar robot
 
 
-async def soak(minutes: float, seed: int, say: Callable[[str], None]) -> dict[str, Any]:
+async def soak(minutes: float, seed: int, observers: int, say: Callable[[str], None]) -> dict[str, Any]:
     """What happened, by name; the first six must be 0, memory_growth small.
+
+    Args:
+        observers: headless ones, beside a page in Chromium
 
     Raises:
         ProcessFailed: the bridge or the console did not start.
@@ -43,11 +45,13 @@ async def soak(minutes: float, seed: int, say: Callable[[str], None]) -> dict[st
             network = await stack.enter_async_context(Network(load_profile("perfect"), robot=world.robot, seed=seed))
             await world.open_console(network.robot_address)
             await network.open_console(world.console_url)
-            return await _Soak(world, network, minutes, seed, say).run(stack)
+            return await _Soak(world, network, minutes, seed, observers, say).run(stack)
 
 
 class _Soak:
-    def __init__(self, world: World, network: Network, minutes: float, seed: int, say: Callable[[str], None]) -> None:
+    def __init__(
+        self, world: World, network: Network, minutes: float, seed: int, observers: int, say: Callable[[str], None]
+    ) -> None:
         self._world = world
         self._network = network
         self._minutes = minutes
@@ -55,7 +59,7 @@ class _Soak:
         self._say = say
         self._done: Counter[str] = Counter()
         self._memory: list[Sample] = []  # of the server's present life
-        self._crowd = Crowd(self._through(world.observer), OBSERVERS, seed)
+        self._crowd = Crowd(self._through(world.observer), observers, seed)
         self._intruders = [
             Intruder(self._through(world.observer), "observer that commands"),
             Intruder(self._through(world.operator), "operator without the seat"),

@@ -1,11 +1,13 @@
-"""A console with the planar robot for each test; one Chromium and one sound card for all, since they start slowly.
+"""Consoles with the planar robot; one Chromium and one sound card for all tests, since they start slowly.
 
-A test has browser contexts of its own: nothing is shared that a page can change. All run on one event loop, because the
-browser belongs to the loop that started it.
+A test that ends, freezes or floods a part of its console, records, or looks for what only a new one says, has one of
+its own. A test has browser contexts of its own: nothing is shared that a page can change. All run on one event loop,
+because the browser belongs to the loop that started it.
 """
 
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,7 @@ from playwright.async_api import Browser
 from bench.browsers.chromium import running_chromium
 from bench.browsers.firefox import Firefox, running_firefox
 from bench.browsers.sound_card import SoundCard, running_sound_card
+from tests.e2e.as_new import as_new
 from tests.support.stack import Stack, running_stack
 
 HERE = Path(__file__).parent
@@ -28,9 +31,44 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def stack(tmp_path: Path) -> AsyncIterator[Stack]:
+async def own_stack(tmp_path: Path) -> AsyncIterator[Stack]:
+    """A console of the test's own, which it may break."""
     async with running_stack(tmp_path) as running:
         yield running
+
+
+class StackKeeper:
+    """One console for many tests, as long as each leaves it as good as new."""
+
+    def __init__(self, directories: pytest.TempPathFactory) -> None:
+        self._directories = directories
+        self._running = AsyncExitStack()
+        self._stack: Stack | None = None
+
+    async def stack(self) -> Stack:
+        """Nobody is there, the robot is at rest, near where it starts and not stopped."""
+        if self._stack is None or not await as_new(self._stack):
+            await self.close()
+            started = running_stack(self._directories.mktemp("shared"))
+            self._stack = await self._running.enter_async_context(started)
+        return replace(self._stack, skipped=len(self._stack.event_log.read_text().splitlines()))
+
+    async def close(self) -> None:
+        self._stack = None
+        await self._running.aclose()
+
+
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
+async def stack_keeper(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[StackKeeper]:
+    keeper = StackKeeper(tmp_path_factory)
+    yield keeper
+    await keeper.close()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def stack(stack_keeper: StackKeeper) -> Stack:
+    """A console that other tests have used and will use."""
+    return await stack_keeper.stack()
 
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")

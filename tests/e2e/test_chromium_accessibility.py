@@ -137,8 +137,8 @@ async def test_axe_finds_nothing_on_a_page_that_drives_in_any_state(stack: Stack
         assert await _through(console, DRIVING) == []
 
 
-async def test_axe_finds_nothing_in_a_supervisors_tabs_and_dialogues(stack: Stack, chromium: Browser) -> None:
-    async with open_tampered(chromium, stack.supervisor) as console:
+async def test_axe_finds_nothing_in_a_supervisors_tabs_and_dialogues(own_stack: Stack, chromium: Browser) -> None:
+    async with open_tampered(chromium, own_stack.supervisor) as console:
         assert await _through(console, SUPERVISOR) == []
 
 

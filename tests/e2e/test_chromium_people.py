@@ -102,12 +102,12 @@ async def test_a_new_name_is_seen_by_others_and_outlives_a_reload(stack: Stack, 
 
 
 async def test_an_invited_person_comes_in_by_link_or_qr_code_and_leaves_when_it_is_revoked(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.supervisor, pad=False) as sue:
+    async with open_console(chromium, own_stack.supervisor, pad=False) as sue:
         await sue.until("s.connected")
         link = await _invite(sue, "Observer", "Guest")
-        assert link.startswith(stack.console)
+        assert link.startswith(own_stack.console)
         code = _dialogue(sue).get_by_role("img", name="QR code of the link")
         box = await code.bounding_box()
         assert box is not None
@@ -148,10 +148,10 @@ async def test_an_operator_invites_observers_and_operators_only(stack: Stack, ch
         assert await dee.page.get_by_role("button", name="Invite…").count() == 0
 
 
-async def test_a_supervisor_reads_the_audit_trail_as_it_grows(stack: Stack, chromium: Browser) -> None:
+async def test_a_supervisor_reads_the_audit_trail_as_it_grows(own_stack: Stack, chromium: Browser) -> None:
     async with (
-        open_console(chromium, stack.supervisor + "&name=Sue", pad=False) as sue,
-        open_console(chromium, stack.operator + "&name=Ann") as ann,
+        open_console(chromium, own_stack.supervisor + "&name=Sue", pad=False) as sue,
+        open_console(chromium, own_stack.operator + "&name=Ann") as ann,
     ):
         await sue.until("s.connected")
         await ann.until("s.connected && s.seat && s.seat.mine")

@@ -14,11 +14,11 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
 
 async def test_the_operator_records_and_the_observer_sees_it_and_cannot(
-    stack: Stack, chromium: Browser, tmp_path: Path
+    own_stack: Stack, chromium: Browser, tmp_path: Path
 ) -> None:
     async with (
-        open_console(chromium, stack.operator) as operator,
-        open_console(chromium, stack.observer, pad=False) as observer,
+        open_console(chromium, own_stack.operator) as operator,
+        open_console(chromium, own_stack.observer, pad=False) as observer,
     ):
         await operator.until_live()
         await observer.until_live()

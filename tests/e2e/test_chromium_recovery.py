@@ -21,23 +21,23 @@ async def _nothing_wrong(console: ConsolePage) -> None:
 
 
 async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.operator) as console:
+    async with open_console(chromium, own_stack.operator) as console:
         await console.until_live()
         await console.arm()
         await console.drive_forward()
         await console.until("s.event > 10")
         epoch = (await console.stats())["epoch"]
         await console.page.evaluate("window.notReloaded = true")
-        os.kill(stack.bridge_pid(), signal.SIGKILL)
+        os.kill(own_stack.bridge_pid(), signal.SIGKILL)
         await console.until("!s.armed")
         await console.press(RB, False)
         await console.tilt(LEFT_Y, 0)
         await console.until(f"s.connected && s.epoch !== {epoch!r} && s.streams.overview?.rendered > 3", 60)
         assert (await console.stats())["event"] < 10, "references start anew with the epoch"
         await console.until("s.stop.stopped && s.stop.reason.includes('did not end in order')")
-        async with Console(stack.supervisor, video=False, audio=False) as supervisor:
+        async with Console(own_stack.supervisor, video=False, audio=False) as supervisor:
             await supervisor.reset()
         await console.until("!s.stop.stopped && s.seat && s.seat.mine")
         await console.arm()
@@ -91,13 +91,13 @@ async def test_a_bridge_that_hangs_is_started_again_stopped_and_the_page_says_th
 
 
 async def test_a_frozen_bridge_counts_as_a_dead_link_and_resumes_in_the_same_epoch(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.operator) as console:
+    async with open_console(chromium, own_stack.operator) as console:
         await console.until_live()
         await console.arm()
         await console.drive_forward()
-        with stack.frozen_bridge():
+        with own_stack.frozen_bridge():
             await console.until("!s.armed")
             await console.page.get_by_text("Robot unreachable").first.wait_for()
         await console.press(RB, False)

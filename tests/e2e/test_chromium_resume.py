@@ -34,16 +34,16 @@ async def _drives_again(console: ConsolePage, stack: Stack) -> None:
 
 
 async def test_a_silent_console_is_called_silent_and_what_it_measured_last_is_shown_as_old(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.operator) as console:
+    async with open_console(chromium, own_stack.operator) as console:
         page = console.page
         await console.until_live()
         await page.evaluate("window.notReloaded = true")
         await console.arm()
         await console.drive_forward()
         peer = (await console.stats())["peer"]
-        with stack.frozen_console():
+        with own_stack.frozen_console():
             await expect(page.locator(".bar .chip", has_text="Console")).to_contain_text("silent")
             await expect(page.locator(".plate-title", has_text="Console silent")).to_be_visible()
             await expect(page.locator(".console")).to_have_attribute("data-stale", "true")

@@ -141,28 +141,28 @@ async def test_a_stop_is_one_stop_on_all_ways_and_does_not_come_again_after_its_
 
 
 async def test_a_stop_while_the_bridge_is_away_is_kept_and_confirmed_when_it_is_back(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.observer, pad=False) as observer:
+    async with open_console(chromium, own_stack.observer, pad=False) as observer:
         await observer.until("s.connected && s.event !== null")
-        with stack.frozen_bridge():
+        with own_stack.frozen_bridge():
             await observer.page.get_by_text("Robot unreachable").first.wait_for()
             await observer.page.keyboard.press("Escape")
             await observer.until("s.stop_press === 'waiting'")
             await observer.page.locator(".alarm").get_by_text("has not reached the robot").wait_for()
-            os.kill(stack.bridge_pid(), signal.SIGKILL)
+            os.kill(own_stack.bridge_pid(), signal.SIGKILL)
         await observer.until("s.stop.stopped && s.stop_press === 'confirmed'", 60)
         await observer.page.locator(".alarm").wait_for(state="hidden")
-    assert _stops(stack)
+    assert _stops(own_stack)
 
 
 async def test_before_the_robot_shows_a_stop_the_page_says_that_it_was_pressed_and_not_that_the_robot_is_stopped(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.operator) as console:
+    async with open_console(chromium, own_stack.operator) as console:
         await console.until("s.seat && s.seat.mine && s.event !== null")
         await console.page.evaluate(LISTEN)
-        with stack.frozen_bridge():
+        with own_stack.frozen_bridge():
             await console.page.keyboard.press("Escape")
             await console.until("s.stop_press === 'waiting'")
             said = await console.page.evaluate(SAID)

@@ -38,9 +38,9 @@ HIDE = """(hidden) => {
 
 
 async def test_a_contact_is_felt_no_later_than_it_is_seen_and_rumble_ends_with_everything_that_ends_driving(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.operator) as console:
+    async with open_console(chromium, own_stack.operator) as console:
         page = console.page
         await console.until_live()
         await page.evaluate(
@@ -81,7 +81,7 @@ async def test_a_contact_is_felt_no_later_than_it_is_seen_and_rumble_ends_with_e
         await page.get_by_role("button", name="Request control").click()
         # the console is silent
         await _feel_a_contact(console)
-        with stack.frozen_console():
+        with own_stack.frozen_console():
             await _is_still(console)
         await _let_go(console)
         await console.until("s.connected && s.seat && s.seat.mine", 40)

@@ -19,7 +19,7 @@ async def _says(page: Page, title: str, hint: str) -> None:
     await expect(plate).to_contain_text(hint)
 
 
-async def test_each_way_not_to_get_through_has_its_own_words(stack: Stack, chromium: Browser) -> None:
+async def test_each_way_not_to_get_through_has_its_own_words(own_stack: Stack, chromium: Browser) -> None:
     async def full(route: Route) -> None:
         body = {"error": "too_many_peers", "detail": "200 peers are connected"}
         await route.fulfill(status=503, json=body, headers={"Retry-After": "5"})
@@ -30,7 +30,7 @@ async def test_each_way_not_to_get_through_has_its_own_words(stack: Stack, chrom
     async with open_console(chromium, "about:blank") as console:
         page = console.page
         await page.route("**/whep", full)
-        await page.goto(stack.operator)
+        await page.goto(own_stack.operator)
         await _says(page, "The console is full", "Somebody has to leave first")
         await page.unroute("**/whep")
         await page.route("**/whep", no_robot)
@@ -44,10 +44,10 @@ async def test_each_way_not_to_get_through_has_its_own_words(stack: Stack, chrom
         await page.get_by_role("button", name="Try now").click()
         await console.until_live()
         await page.goto("about:blank")
-        await page.goto(re.sub("token=.*", "token=not-a-token", stack.operator))
+        await page.goto(re.sub("token=.*", "token=not-a-token", own_stack.operator))
         await _says(page, "This link is not valid", "Open the newest link")
         await page.goto("about:blank")
-        await page.goto(stack.console)
+        await page.goto(own_stack.console)
         await _says(page, "Open the link", "lockstep up printed")
 
 

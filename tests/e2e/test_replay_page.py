@@ -72,15 +72,15 @@ def _newest(records: list[Record], topic: str, event: int) -> list[Record]:
 
 
 async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_feedback(
-    stack: Stack, chromium: Browser, tmp_path: Path
+    own_stack: Stack, chromium: Browser, tmp_path: Path
 ) -> None:
-    recording, first, last = await _record_a_drive(stack, chromium)
-    executed = {each["event"]: each for each in stack.events("executed")}
-    measured = {(each["event"], each["issue"]): each for each in stack.events("feedback")}
-    captured = {(each["stream"], each["event"]) for each in stack.events("media")}
+    recording, first, last = await _record_a_drive(own_stack, chromium)
+    executed = {each["event"]: each for each in own_stack.events("executed")}
+    measured = {(each["event"], each["issue"]): each for each in own_stack.events("feedback")}
+    captured = {(each["stream"], each["event"]) for each in own_stack.events("media")}
     with RecordingReader(tmp_path / "state" / "recordings" / f"{recording}.mcap") as reader:
         records = list(reader.records())
-    async with open_page(chromium, _replay_link(stack, stack.observer, recording, first)) as page:
+    async with open_page(chromium, _replay_link(own_stack, own_stack.observer, recording, first)) as page:
         replay = ConsolePage(page)
         await replay.until("s.ready")
         for event in random.Random(1).sample(range(first, last), SEEKS):
@@ -111,11 +111,11 @@ async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_
 
 
 async def test_a_recording_is_watched_while_it_is_made_then_listed_and_deleted_by_role(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    await _ask(stack, "POST", "/api/recordings")
-    lists = f"{stack.console}/recordings#token="
-    async with open_page(chromium, lists + _token(stack.observer)) as page:
+    await _ask(own_stack, "POST", "/api/recordings")
+    lists = f"{own_stack.console}/recordings#token="
+    async with open_page(chromium, lists + _token(own_stack.observer)) as page:
         row = page.get_by_role("listitem")
         await row.get_by_text("Recording now").wait_for()
         assert await row.get_by_role("button").count() == 1  # only to open it
@@ -124,9 +124,9 @@ async def test_a_recording_is_watched_while_it_is_made_then_listed_and_deleted_b
         await replay.until("s.ready && s.running && s.pictures.front !== undefined")
         known = (await replay.stats())["ended"]
         await replay.until(f"s.ended > {known} && s.ready")
-        await _ask(stack, "POST", "/api/recordings/stop")
+        await _ask(own_stack, "POST", "/api/recordings/stop")
         await replay.until("!s.running")
-    async with open_page(chromium, lists + _token(stack.supervisor)) as page:
+    async with open_page(chromium, lists + _token(own_stack.supervisor)) as page:
         async with page.expect_download() as download:
             await page.get_by_role("button", name="Download").click()
         assert (await download.value).suggested_filename.endswith(".mcap")

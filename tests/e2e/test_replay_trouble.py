@@ -79,15 +79,15 @@ async def _fits(page: Page) -> None:
 
 
 async def test_vp8_and_pcmu_are_played_and_damage_and_deletion_are_said_and_leave_the_rest(
-    stack: Stack, chromium: Browser, tmp_path: Path
+    own_stack: Stack, chromium: Browser, tmp_path: Path
 ) -> None:
-    recording = await _record_a_drive_in_vp8_and_pcmu(stack)
+    recording = await _record_a_drive_in_vp8_and_pcmu(own_stack)
     path = tmp_path / "state" / "recordings" / f"{recording}.mcap"
     await asyncio.to_thread(_damage_the_last_chunk, path)
     with RecordingReader(path) as reader:
         chunks = reader.index.chunks
         whole, later, damaged = chunks[0].last_event - 2, chunks[-1].first_event - 1, chunks[-1].last_event
-    link = f"{stack.console}/recordings#token={_token(stack.observer)}&recording={recording}&event={whole}"
+    link = f"{own_stack.console}/recordings#token={_token(own_stack.observer)}&recording={recording}&event={whole}"
     async with open_page(chromium, link) as page:
         replay = ConsolePage(page)
         await replay.until(f"s.ready && s.event === {whole}")
@@ -106,17 +106,17 @@ async def test_vp8_and_pcmu_are_played_and_damage_and_deletion_are_said_and_leav
         await expect(page.get_by_text("1 damaged part", exact=True)).to_be_visible()
         await expect(page.locator("figure").get_by_text("This part of the recording is damaged")).to_have_count(3)
         await _fits(page)
-        await _ask(stack, "DELETE", f"/api/recordings/{recording}")
+        await _ask(own_stack, "DELETE", f"/api/recordings/{recording}")
         await _seek(page, whole)  # it is loaded
         await replay.until(f"s.ready && s.event === {whole}")
         assert (await page.evaluate(READ_STRIP, "front"))["event"] <= whole
 
 
 async def test_a_player_of_a_running_recording_outlives_the_loss_of_its_console_and_then_of_its_file(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    await _ask(stack, "POST", "/api/recordings")
-    async with open_page(chromium, f"{stack.console}/recordings#token={_token(stack.observer)}") as page:
+    await _ask(own_stack, "POST", "/api/recordings")
+    async with open_page(chromium, f"{own_stack.console}/recordings#token={_token(own_stack.observer)}") as page:
         replay = ConsolePage(page)
         await page.get_by_role("listitem").get_by_role("button").click()
         await replay.until("s.ready && s.running && s.pictures.front !== undefined")
@@ -129,9 +129,9 @@ async def test_a_player_of_a_running_recording_outlives_the_loss_of_its_console_
         await page.context.set_offline(False)
         await replay.until(f"s.ended > {known} && s.ready")
         await expect(alert).to_be_hidden()
-        (recording,) = (await _ask(stack, "GET", "/api/recordings"))["recordings"]
-        await _ask(stack, "POST", "/api/recordings/stop")
-        await _ask(stack, "DELETE", f"/api/recordings/{recording['id']}")
+        (recording,) = (await _ask(own_stack, "GET", "/api/recordings"))["recordings"]
+        await _ask(own_stack, "POST", "/api/recordings/stop")
+        await _ask(own_stack, "DELETE", f"/api/recordings/{recording['id']}")
         await replay.until("s.deleted && !s.running")
         await expect(alert).to_contain_text("This recording was deleted")
         await _fits(page)

@@ -20,8 +20,8 @@ from tests.support.redis_server import free_port
 pytestmark = pytest.mark.timeout(120)
 
 CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
-PLACES = 40  # connections that the console takes
-HELD = 120  # that the flood opens; an operating system would take thousands
+PLACES = 16  # connections that the console takes
+HELD = 48  # that the flood opens; an operating system would take thousands
 POST = b"POST /api/stop HTTP/1.1\r\nHost: localhost\r\n"
 STOPS = 5
 

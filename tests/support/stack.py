@@ -33,6 +33,7 @@ class Stack:
         robot: "tcp://127.0.0.1:PORT"; "" in a fleet
         robots: of a fleet, the same by name
         event_log: the bridge's own record, JSON lines
+        skipped: how many of them were there before this test began
     """
 
     process: asyncio.subprocess.Process
@@ -43,6 +44,7 @@ class Stack:
     robot: str = ""
     robots: dict[str, str] = field(default_factory=dict)
     event_log: Path
+    skipped: int = 0
     output: list[str] = field(default_factory=list)  # its last lines on standard error
 
     def bridge_pid(self, robot: str = "") -> int:
@@ -67,8 +69,8 @@ class Stack:
             yield
 
     def records(self, robot: str = "") -> Iterator[dict[str, Any]]:
-        """The bridge's records so far."""
-        for line in own_event_log(self.event_log, robot).read_text().splitlines():
+        """The bridge's records since the test began."""
+        for line in own_event_log(self.event_log, robot).read_text().splitlines()[self.skipped :]:
             yield json.loads(line)
 
     def events(self, kind: str, robot: str = "") -> Iterator[dict[str, Any]]:

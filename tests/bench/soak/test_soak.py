@@ -1,4 +1,4 @@
-"""A minute and a half of the soak, as its user runs it; five with `make test-long`."""
+"""A minute and a half of the soak with a few observers, as its user runs it; five with all in `make test-long`."""
 
 import asyncio
 import json
@@ -10,11 +10,11 @@ import pytest
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
 
-@pytest.mark.parametrize("minutes", ["1.5", pytest.param("5", marks=pytest.mark.long)])
-async def test_minutes_of_trouble_break_no_promise(minutes: str) -> None:
+@pytest.mark.parametrize(("minutes", "observers"), [("1.5", "4"), pytest.param("5", "20", marks=pytest.mark.long)])
+async def test_minutes_of_trouble_break_no_promise(minutes: str, observers: str) -> None:
     command = (
         *(str(Path(sys.executable).with_name("lockstep")), "soak"),
-        *("--minutes", minutes, "--seed", "1", "--json", "-"),
+        *("--minutes", minutes, "--seed", "1", "--observers", observers, "--json", "-"),
     )
     process = await asyncio.create_subprocess_exec(
         *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE

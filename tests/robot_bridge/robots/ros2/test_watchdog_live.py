@@ -74,17 +74,18 @@ async def bridge_that_hangs(how: str, directory: Path, node: RosRobot) -> AsyncI
             await process.kill()
 
 
-async def drive_until(condition: Callable[[], bool], bridge: RunningBridge) -> None:
-    """Forward; returns also when the link ends."""
+async def drive(bridge: RunningBridge, before: Callable[[], None]) -> None:
+    """Forward until cancelled or until the link ends; `before` each command."""
     with contextlib.suppress(LinkError, AssertionError, TimeoutError):
         async with RobotLink(*bridge.address, "operator", name="test") as link:
             driver = Operator(link)
             await driver.next(Feedback)
             async with asyncio.timeout(PATIENCE):
                 await driver.heard(lambda feedback: feedback.faults == [] and feedback.unknown == [])
-                await driver.arm()
-                while not condition():
-                    await driver.drive(GO)
+            await driver.arm()
+            while True:
+                before()
+                await driver.drive(GO)
 
 
 async def noted(node: RosRobot, condition: Callable[[list[Any]], bool]) -> list[Any]:
@@ -98,22 +99,25 @@ async def noted(node: RosRobot, condition: Callable[[list[Any]], bool]) -> list[
 async def test_a_base_that_is_driven_gets_a_zero_whatever_hangs(how: str, tmp_path: Path) -> None:
     """`tick`: by the thread; `executor`: by the tick, which misses odometry; the others: by the watchdog's process."""
     async with running_ros_robot(tmp_path) as node, bridge_that_hangs(how, tmp_path, node) as bridge:
-        hung = False
+        hung = asyncio.Event()
 
-        def moves_then_hangs() -> bool:
-            nonlocal hung
-            if not hung and any(note["values"] == GO for note in node.notes("twist")):
-                hung = True
+        def hangs_once_it_moves() -> None:
+            if not hung.is_set() and any(note["values"] == GO for note in node.notes("twist")):
                 (tmp_path / "hang").touch()
-                if how == "frozen":
-                    bridge.process.pause()
-            return hung and how == "killed"
+                hung.set()
 
-        await drive_until(moves_then_hangs, bridge)
-        if how == "killed":
-            await bridge.process.kill()
-        twists = await noted(node, lambda twists: GO in twists and twists[-1] == STAY)
-        for _ in range(10):
-            await node.tell("tick")
+        driving = asyncio.create_task(drive(bridge, hangs_once_it_moves))
+        try:
+            async with asyncio.timeout(2 * PATIENCE):
+                await hung.wait()
+            if how == "frozen":
+                bridge.process.pause()
+            elif how == "killed":
+                await bridge.process.kill()
+            twists = await noted(node, lambda twists: GO in twists and twists[-1] == STAY)
+            for _ in range(10):
+                await node.tell("tick")
+        finally:
+            driving.cancel()
+            await asyncio.wait([driving])
         assert [note["values"] for note in node.notes("twist")][len(twists) - 1 :].count(GO) == 0, "it drives on"
-        assert hung

@@ -1,0 +1,41 @@
+"""Whether the next test may use a console that others have used: HTTP alone tells, which costs next to nothing."""
+
+import asyncio
+from math import hypot
+from typing import Any
+
+import httpx
+
+from tests.support.stack import Stack
+
+__all__ = ["as_new"]
+
+NEAR = 1.5  # m from where the robot starts; a test drives no further than the 2 m to the wall that are left
+PATIENCE = 10.0  # s for pages that were closed to be gone, and for a new stop to be old enough for its reset
+AGAIN = 0.1  # s
+
+
+async def as_new(stack: Stack) -> bool:
+    """Release a stop and wait until everybody has left; false when a new console is needed."""
+    if stack.process.returncode is not None:
+        return False
+    headers = {"Authorization": f"Bearer {stack.supervisor.partition('#token=')[2]}"}
+    try:
+        async with (
+            asyncio.timeout(PATIENCE),
+            httpx.AsyncClient(base_url=stack.console, headers=headers, trust_env=False) as http,
+        ):
+            while not _is_left(session := (await http.get("/api/session")).json()):
+                if session["stop"]["stopped"]:
+                    await http.post("/api/reset", json={"number": session["stop"]["number"]})
+                await asyncio.sleep(AGAIN)
+    except (TimeoutError, httpx.TransportError):
+        return False
+    x, y, _ = session["feedback"]["joints"]
+    return hypot(x, y) < NEAR
+
+
+def _is_left(session: dict[str, Any]) -> bool:
+    empty = session["participants"] == [] and session["seat"]["holder"] == ""
+    rests = session["link"]["up"] and session["feedback"] is not None and session["feedback"]["at_rest"]
+    return bool(empty and rests and not session["stop"]["stopped"])

@@ -1,0 +1,68 @@
+"""What the tests of a file need, told from what the file imports.
+
+A test is `fast` when its file imports nothing that starts a process, opens a connection or runs a physics engine,
+itself or through a helper in `tests/`. One that computes for long says so: `pytest.mark.slow`.
+"""
+
+import sys
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+__all__ = ["is_real"]
+
+# Modules that start such a thing, each with all that is below it.
+REAL = (
+    "aioice",
+    "aiortc",
+    "bench.emulator.namespaces",
+    "bench.emulator.network",
+    "bench.emulator.network_process",
+    "bench.emulator.own_delay",
+    "bench.experiment.headless",
+    "bench.experiment.stage",
+    "bench.fleet_soak.run",
+    "bench.processes",
+    "bench.quality.stage",
+    "bench.relay.stage",
+    "bench.stack",
+    "client.console",
+    "client.peer",
+    "httpx",
+    "mujoco",
+    "robot_bridge.bridge",
+    "robot_bridge.link_client",
+    "robot_bridge.robots.micromanipulator",
+    "robot_bridge.robots.mjcf",
+    "robot_bridge.robots.mobile_manipulator",
+    "server.cli",
+    "server.media.sources.reader",
+    "server.serve",
+    "subprocess",
+    "tests.support",
+    "typer.testing",
+)
+CALLS = ("create_subprocess_exec", "open_connection", "start_server")  # of asyncio, which everybody imports
+
+
+@cache
+def is_real(name: str) -> bool:
+    """Whether the module of this name, which is imported, starts something."""
+    if any(name == each or name.startswith(f"{each}.") for each in REAL):
+        return True
+    if not name.startswith("tests."):
+        return False
+    module = sys.modules[name]
+    return _calls(module) or any(is_real(origin) for origin in _origins(module) - {name})
+
+
+def _calls(module: ModuleType) -> bool:
+    source = "" if module.__file__ is None else Path(module.__file__).read_text()
+    return any(call in source for call in CALLS)
+
+
+def _origins(module: ModuleType) -> set[str]:
+    """Where the names of a module come from. Of a value without a module, as a number, nobody can tell."""
+    values = vars(module).values()
+    found = {each.__name__ if isinstance(each, ModuleType) else getattr(each, "__module__", None) for each in values}
+    return {each for each in found if isinstance(each, str) and each in sys.modules}
