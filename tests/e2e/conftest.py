@@ -38,7 +38,7 @@ async def own_stack(tmp_path: Path) -> AsyncIterator[Stack]:
 
 
 class StackKeeper:
-    """One console for many tests, as long as each leaves it as good as new."""
+    """One console for the tests of a file, as long as each leaves it as good as new. One more that idles costs time."""
 
     def __init__(self, directories: pytest.TempPathFactory) -> None:
         self._directories = directories
@@ -58,7 +58,7 @@ class StackKeeper:
         await self._running.aclose()
 
 
-@pytest_asyncio.fixture(scope="session", loop_scope="session")
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def stack_keeper(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[StackKeeper]:
     keeper = StackKeeper(tmp_path_factory)
     yield keeper
@@ -67,7 +67,7 @@ async def stack_keeper(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterato
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def stack(stack_keeper: StackKeeper) -> Stack:
-    """A console that other tests have used and will use."""
+    """A console that other tests of the file have used and will use."""
     return await stack_keeper.stack()
 
 
