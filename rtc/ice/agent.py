@@ -24,6 +24,7 @@ class Agent:
     Signalling carries `local_credentials` and `local_candidates` to the peer, and the peer's to `set_remote`. Then the
     agent lives by `receive_datagram` and `handle_timer`; drain `datagrams_to_send` and `events` after each. `path` is
     where to send. A restart is `restart` and then `set_remote`; the path stays until the new session has nominated one.
+    An agent that has not heard of its peer waits without end: whoever made it bounds that.
 
     Args:
         local_candidates: Where the peer may reach us, and the addresses that datagrams leave from.
@@ -96,11 +97,12 @@ class Agent:
         else:
             session.add_remote_candidate(candidate)
 
-    def restart(self) -> Credentials:
+    def restart(self, now: float) -> Credentials:
         """Begin another session (RFC 8445 9), in place of one that has not finished. Returns what to signal."""
         if self._next is not None:
             self._next.end()
         self._next = self._new_session()
+        self._next.wait_for_remote(now)
         return self._next.local_credentials
 
     def cancel_restart(self) -> None:
@@ -157,6 +159,7 @@ class Agent:
         return min((each for each in times if each is not None), default=None)
 
     def handle_timer(self, now: float) -> None:
+        """Hand over first what the sockets hold: after a pause of the whole process, answers count before the clock."""
         if self._retired is not None and now >= self._retired[1]:
             self._retired[0].end()
             self._retired = None

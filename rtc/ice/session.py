@@ -29,8 +29,8 @@ ROLE_CONFLICT = 487
 class Session:
     """What RFC 8445 calls an ICE session; a restart begins another one. `Agent` owns it and passes datagrams on.
 
-    `path` is where to send; it is set as soon as one pair works and changes with nomination. `counts` has what was
-    dropped, by reason, and is shared with the agent.
+    `selected` is the pair to send on; it is set as soon as one works, and changes with nomination. `counts` has what
+    was dropped, by reason, and is shared with the agent.
     """
 
     def __init__(
@@ -65,6 +65,7 @@ class Session:
         self._transactions: dict[bytes, Transaction] = {}
         self._seen: dict[bytes, None] = {}  # transactions of the peer's checks, the newest last
         self._answers = TokenBuckets(settings.max_checks_per_second, settings.check_burst)
+        self._answers_again = TokenBuckets(settings.max_checks_per_second, settings.check_burst)  # to known checks
         self._out: list[Datagram] = []
         self._next_check_at = 0.0
         self._fails_at: float | None = None
@@ -74,9 +75,13 @@ class Session:
 
     # What the user does
 
+    def wait_for_remote(self, now: float) -> None:
+        """Fail if there is no path `connect_seconds` from now."""
+        self._fails_at = now + self._settings.connect_seconds
+
     def set_remote(self, credentials: Credentials, now: float) -> None:
         self.remote_credentials = credentials
-        self._fails_at = now + self._settings.connect_seconds
+        self.wait_for_remote(now)
         self._next_check_at = now
 
     def add_remote_candidate(self, candidate: Candidate) -> None:
@@ -130,7 +135,9 @@ class Session:
         request = self._authentic(data, self.local_credentials.password)
         if request is None:
             return
-        if not self._answers.take(now):
+        # Recorded checks that somebody sends again and again do not use up what the peer may ask.
+        is_new = request.transaction not in self._seen
+        if not (self._answers if is_new else self._answers_again).take(now):
             self._counts["checks_over_rate"] += 1
             return
         if request.not_understood:  # RFC 8489 6.3.1
@@ -140,12 +147,12 @@ class Session:
         elif self._role.conflicts(request) and self._role.keeps_against(request):
             self._answer_error(request, path, StunErrorCode(ROLE_CONFLICT, "Role Conflict"))
         else:
-            if self._role.conflicts(request):
+            if self._role.conflicts(request) and is_new and not self._retired:
                 self._role.switch()
                 self._repeat_checks_with_new_role()
             success = Message(Kind.SUCCESS, request.transaction, mapped=path.remote)
             self._out.append(Datagram(serialize(success, self.local_credentials.password), path))
-            self._learn_from_check(request, path, now)
+            self._learn_from_check(request, path, is_new, now)
 
     def has_asked(self, transaction: bytes) -> bool:
         return transaction in self._transactions
@@ -234,11 +241,12 @@ class Session:
         answer = Message(Kind.ERROR, request.transaction, request.method, error=error, unknown_attributes=unknown)
         self._out.append(Datagram(serialize(answer, self.local_credentials.password), path))
 
-    def _learn_from_check(self, request: Message, path: Path, now: float) -> None:
+    def _learn_from_check(self, request: Message, path: Path, is_new: bool, now: float) -> None:
         """RFC 8445 7.3.1.3 to 7.3.1.5.
 
-        A recorded check that comes again may be the peer's own repetition, by another port of its NAT. It shows an
-        address, which counts for nothing until it has answered, and is no sign of consent.
+        A known check that comes again may be the peer's own repetition, by another port of its NAT, or somebody's who
+        has recorded it. It may show a path, which counts for nothing until the peer has answered there; it is no sign
+        of consent, and does not choose among paths that work.
         """
         pair = self._list.pairs.get(path) or self._pair_shown_by(request, path)
         if pair is None:
@@ -247,23 +255,21 @@ class Session:
         self._directory.hint(path, self._agent)
         if self._retired:
             return
-        if self._is_new(request.transaction) and pair is self.selected and self.consent is not None:
-            self.consent.given(now)
-        works = pair.state is PairState.SUCCEEDED and self._is_fresh(pair, now)
-        if request.use_candidate and not self._role.controlling:
-            pair.nominated_by_peer = True
-            if works:
-                self._nominated(pair, now)
-        if not works:
+        if is_new:
+            self._remember(request.transaction)
+            if pair is self.selected and self.consent is not None:
+                self.consent.given(now)
+        nominates = request.use_candidate and not self._role.controlling
+        if pair.state is not PairState.SUCCEEDED or not self._is_fresh(pair, now):
+            pair.nominated_by_peer |= nominates
             self._trigger(pair, now)
+        elif nominates and is_new:
+            self._nominated(pair, now)
 
-    def _is_new(self, transaction: bytes) -> bool:
-        if transaction in self._seen:
-            return False
+    def _remember(self, transaction: bytes) -> None:
         self._seen[transaction] = None
         if len(self._seen) > self._settings.remembered_checks:
             del self._seen[next(iter(self._seen))]
-        return True
 
     def _pair_shown_by(self, request: Message, path: Path) -> Pair | None:
         """A pair that is not in the check list. Its address may be new: a peer-reflexive candidate (7.3.1.3)."""
@@ -400,6 +406,7 @@ class Session:
                 self._nominated(pair, now)
         elif pair.nominated_by_peer:
             self._nominated(pair, now)
+        pair.nominated_by_peer = False
         if not self.is_nominated:
             self._select(self._best(now) or pair, now)
             self._plan_nomination(now)
@@ -485,7 +492,7 @@ class Session:
         self._rival = None
         current = self.selected
         answered = current is not None and current.answered_at is not None and current.answered_at >= since
-        if not answered and pair.path in self._list.pairs:
+        if not answered and self._list.pairs.get(pair.path) is pair:
             if current is not None:
                 current.nominated = False
             pair.nominated = True

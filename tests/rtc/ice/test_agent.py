@@ -309,8 +309,8 @@ def test_an_answer_from_elsewhere_is_none() -> None:
 
 
 def restart(network: Network, here: Agent, there: Agent) -> None:
-    here.restart()
-    there.restart()
+    here.restart(network.now)
+    there.restart(network.now)
     for one, other in ((here, there), (there, here)):
         one.set_remote(other.local_credentials, candidates_of(other), network.now)
         network.drain(one)
@@ -354,7 +354,7 @@ def test_the_old_path_carries_until_the_new_one_is_nominated_and_is_heard_for_a_
 
 def test_a_restart_that_finds_no_path_changes_nothing() -> None:
     network, here, there = connected()
-    here.restart()
+    here.restart(network.now)
     here.set_remote(new_credentials(), [], network.now)
     network.run(45)
     assert RestartFailed() in network.events[here]
@@ -366,7 +366,7 @@ def test_a_restart_that_finds_no_path_changes_nothing() -> None:
 def test_a_restart_that_is_cancelled_changes_nothing() -> None:
     network, here, there = connected()
     before = here.local_credentials
-    here.restart()
+    here.restart(network.now)
     here.cancel_restart()
     assert here.local_credentials == before
     network.run(120)
@@ -377,8 +377,8 @@ def test_a_restart_after_the_path_is_lost_finds_another() -> None:
     network, here, there = connected()
     network.conditions.cut = True
     network.run(20)
-    here.restart()
-    there.restart()
+    here.restart(network.now)
+    there.restart(network.now)
     network.run(15)
     assert here.path is None, "consent has expired"
     assert not ends(network, here), "a restart is under way"
@@ -388,6 +388,15 @@ def test_a_restart_after_the_path_is_lost_finds_another() -> None:
     assert network.run(5, lambda: here.path is not None and there.path is not None)
     network.run(120)
     assert not ends(network, here)
+
+
+def test_a_restart_that_is_never_answered_keeps_no_agent_alive() -> None:
+    network, here, there = connected()
+    here.restart(network.now)
+    network.conditions.cut = True
+    network.run(45)
+    assert network.events[here][-1] == Ended("consent_expired")
+    assert here.timer() is None
 
 
 def test_other_credentials_without_a_restart_are_refused() -> None:
@@ -427,6 +436,43 @@ def test_a_worse_path_that_is_nominated_is_used_only_when_the_better_one_is_dead
     network.translate = lambda path: None if THERE in path else path
     nominate(network, here, there, worse)
     assert network.run(3, lambda: here.path == Path(HERE, worse))
+
+
+def recorded_checks(network: Network) -> list[bytes]:
+    return [each.data for _, each in network.sent if each.remote == HERE and parse(each.data).kind is Kind.REQUEST]
+
+
+def test_a_recorded_nomination_does_not_move_a_path_back() -> None:
+    network = Network()
+    there, here = agent_at("10.0.0.9", controlling=True), agent_at(HERE[0])
+    network.translate = nat("10.0.0.9", "203.0.113.50", 61000)
+    connect(network, there, here)
+    assert network.run(5, lambda: settled(network, here))
+    network.translate = nat("10.0.0.9", "203.0.113.50", 62000)
+    assert network.run(12, lambda: here.path == Path(HERE, ("203.0.113.50", 62000)))
+    for data in recorded_checks(network):
+        network.inject(data, Path(HERE, ("203.0.113.50", 61000)))
+        assert here.path == Path(HERE, ("203.0.113.50", 62000))
+
+
+def test_recorded_checks_that_flood_an_agent_do_not_keep_it_from_answering_its_peer() -> None:
+    network = Network()
+    few = IceSettings(max_checks_per_second=2, check_burst=4)
+    here, there = agent_at(HERE[0], controlling=True, settings=few), agent_at(THERE[0])
+    connect(network, here, there)
+    assert network.run(10, lambda: settled(network, here) and settled(network, there))
+    network.run(60)
+    recorded = recorded_checks(network)
+    for turn in range(6000):  # for a minute, 100 a second
+        network.inject(recorded[turn % len(recorded)], Path(HERE, THERE))
+        network.run(0.01)
+    assert here.counts["checks_over_rate"] > 5000
+    recent = [datagram for at, datagram in network.sent if at > network.now - 50]
+    answered = {parse(each.data).transaction for each in recent if parse(each.data).kind is Kind.SUCCESS}
+    asked = [parse(each.data) for each in recent[: len(recent) // 2] if each.local == THERE]
+    asked = [each for each in asked if each.kind is Kind.REQUEST]
+    assert len(asked) >= 3
+    assert all(each.transaction in answered for each in asked)
 
 
 # What peers with the password may do

@@ -51,8 +51,8 @@ def test_restarts_over_bad_paths_never_leave_an_agent_without_one(name: str, see
     connect(network, here, there)
     assert network.run(40, lambda: together(network, here, there))
     for _ in range(5):
-        here.restart()
-        there.restart()
+        here.restart(network.now)
+        there.restart(network.now)
         for one, other in ((here, there), (there, here)):
             one.set_remote(other.local_credentials, candidates_of(other), network.now)
             network.drain(one)

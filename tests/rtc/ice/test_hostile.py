@@ -70,7 +70,7 @@ class HostileNetwork(RuleBasedStateMachine):
     def they_restart(self) -> None:
         here, there = self.agents
         for agent in self.agents:
-            agent.restart()
+            agent.restart(self.network.now)
         for one, other in ((here, there), (there, here)):
             one.set_remote(other.local_credentials, candidates_of(other), self.network.now)
             self.network.drain(one)

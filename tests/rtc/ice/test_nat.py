@@ -162,7 +162,7 @@ async def test_a_restart_behind_a_router_that_has_forgotten_ends_on_its_new_port
         inner_port = console.agent.local_candidates[0].base[1]
         await console.until(lambda: has_nominated(console, Path((INNER, inner_port), (ROUTER, nat.router_port))))
         nat.rebind()
-        console.agent.restart()
-        peer.agent.restart()
+        console.agent.restart(console.now)
+        peer.agent.restart(peer.now)
         signal(console, peer)
         await console.until(lambda: has_nominated(console, Path((INNER, inner_port), (ROUTER, nat.router_port))))

@@ -127,8 +127,8 @@ def test_the_peer_of_a_restarted_agent_is_known_by_its_new_name() -> None:
     network = PortNetwork()
     ours, theirs = network.peer("192.0.2.1")
     assert network.run(10, lambda: ours.path is not None)
-    ours.restart()
-    theirs.restart()
+    ours.restart(network.now)
+    theirs.restart(network.now)
     ours.set_remote(theirs.local_credentials, [], network.now)
     theirs.set_remote(ours.local_credentials, candidates_of(ours), network.now)
     assert network.run(
@@ -143,7 +143,7 @@ def test_agents_that_end_leave_nothing_behind() -> None:
     peers = [network.peer(f"192.0.2.{number + 1}") for number in range(20)]
     network.run(10)
     for ours, _ in peers:
-        ours.restart()
+        ours.restart(network.now)
     network.run(1)
     assert network.port.directory.size > 0
     for ours, _ in peers:

@@ -114,7 +114,7 @@ async def test_a_restart_moves_to_another_connection_of_theirs(we_control: bool)
         await asyncio.wait_for(first.connect(), 20)
         await shell.until(lambda: nominated(shell))
         before = shell.agent.path
-        shell.agent.restart()
+        shell.agent.restart(shell.now)
         await tell_theirs(second, shell)
         assert shell.agent.path == before
         await exchange(shell, first)
@@ -136,4 +136,4 @@ async def test_two_of_ours_connect_over_real_sockets_and_restart() -> None:
             for each in (here, there):
                 await each.until(lambda each=each: nominated(each) and each.agent._next is None)  # type: ignore[misc]
             for each in (here, there):
-                each.agent.restart()
+                each.agent.restart(each.now)
