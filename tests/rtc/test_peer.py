@@ -188,7 +188,7 @@ def test_a_peer_that_never_comes_ends_it_by_name() -> None:
 def test_a_restart_of_ice_changes_nothing_else() -> None:
     pair = connected()
     channel = pair.peers[0].open_channel("x", pair.now)
-    credentials = [peer.ice.restart() for peer in pair.peers]
+    credentials = [peer.ice.restart(pair.now) for peer in pair.peers]
     candidates = [[each.candidate for each in peer.ice.local_candidates] for peer in pair.peers]
     for side in (0, 1):
         pair.peers[side].ice.set_remote(credentials[1 - side], candidates[1 - side], pair.now)
