@@ -21,7 +21,7 @@ from robot_bridge.protocol.description import (
 )
 from robot_bridge.protocol.messages import MAX_AXES, MAX_RAYS
 
-__all__ = ["check_description"]
+__all__ = ["check_bounds", "check_description"]
 
 MAX_STREAMS = 32  # cameras and microphones
 MAX_BODIES = 1024
@@ -43,8 +43,7 @@ def check_description(description: RobotDescription) -> None:
     """
     if not description.axes:
         raise DescriptionError("a robot needs at least one axis")
-    _check_counts(description)
-    _check_texts(description)
+    check_bounds(description)
     if not 0 < description.hold <= 5:
         raise DescriptionError(f"hold must be in (0, 5] s, not {description.hold}")
     if description.watchdog is not None and not 0 < description.watchdog < description.hold:
@@ -74,6 +73,18 @@ def check_description(description: RobotDescription) -> None:
     if description.start_warning is not None:
         _check_warning(description, description.start_warning)
     check_limits(description)
+
+
+def check_bounds(description: RobotDescription) -> None:
+    """Whether it can be shown: how much there is of everything, and what names hold.
+
+    Enough for one that drives nothing any more, as of a recording; an older one may contradict what is asked for now.
+
+    Raises:
+        DescriptionError: with the first that is too many, too long or cannot be printed.
+    """
+    _check_counts(description)
+    _check_texts(description)
 
 
 def _check_axis(axis: Axis, hold: float) -> None:

@@ -11,6 +11,8 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Chunk, Footer, Message, Metadata
 from mcap.stream_reader import CRCValidationError
 
+from robot_bridge.check_description import check_bounds
+from robot_bridge.errors import DescriptionError
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.serial import is_newer
 from server.recording.errors import RecordingDamaged, RecordingTampered
@@ -114,7 +116,7 @@ class RecordingReader:
         """Of the robot. Raises RecordingDamaged when the file has none."""
         for number in range(min(2, len(self.index.chunks))):
             for record in self.chunk(number, {OWN_TOPICS[RobotRecord]}):
-                return own_record(RobotRecord, record.data).description
+                return _shown(own_record(RobotRecord, record.data).description)
         raise RecordingDamaged("it does not say which robot it is of")
 
     def records(
@@ -250,3 +252,12 @@ class RecordingReader:
     def _scan(self) -> EventIndex:
         self.interrupted = True
         return scan_file(self.path, self.info).index
+
+
+def _shown(description: RobotDescription) -> RobotDescription:
+    """Whoever made the file may have written anything. Raises RecordingDamaged."""
+    try:
+        check_bounds(description)
+    except DescriptionError as error:
+        raise RecordingDamaged(f"the robot's description: {error}") from error
+    return description

@@ -18,7 +18,7 @@ from server.recording.event_index import EventIndex, decode_index
 from server.recording.info import RecordingInfo
 from server.recording.raw_records import MAGIC, MAX_RECORD, chunk_records
 from server.recording.reader import RecordingReader
-from server.recording.records import ReportRecord
+from server.recording.records import ReportRecord, RobotRecord
 from server.recording.topics import CAMERA
 from server.recording.writer import Entry, RecordingWriter
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story, own_entry, rewritten
@@ -130,3 +130,23 @@ def test_a_summary_that_is_said_to_be_nowhere_is_damage_and_no_other_error(offse
     path.write_bytes(whole)
     with pytest.raises(RecordingDamaged):
         RecordingReader(path)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"label": "x" * 100_000},
+        {"name": ESCAPE},
+        {"axes": DESCRIPTION.axes * 10_000},
+    ],
+)
+def test_a_description_that_nobody_could_show_counts_as_damage(changed: dict[str, object], tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    writer = RecordingWriter(path, INFO, DESCRIPTION, CODECS)
+    entries = Story(events=10).entries()
+    told = RobotRecord(epoch=EPOCH, event=1, link="up", description=msgspec.structs.replace(DESCRIPTION, **changed))
+    for entry in [own_entry(told, entries[0].arrived), *entries]:
+        writer.write(entry)
+    writer.close()
+    with RecordingReader(path) as reader, pytest.raises(RecordingDamaged, match="description"):
+        reader.description()
