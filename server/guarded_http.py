@@ -101,7 +101,13 @@ def guarded_http(
 
         def send_400_response(self, msg: str) -> None:
             places.on_refused("bad_request")
-            super().send_400_response(msg)
+            if self.cycle is not None and not self.cycle.response_complete:
+                self.cycle.disconnected = True  # what the app still answers goes nowhere; a stop is one all the same
+                self.cycle.message_event.set()
+            if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+                super().send_400_response(msg)
+            else:  # it has been answered already
+                self.transport.abort()
 
         def resume_writing(self) -> None:
             self._read = True

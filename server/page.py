@@ -83,8 +83,12 @@ def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_rob
 
     @router.get("/{path:path}")
     async def asset(request: Request, path: str) -> Response:
-        found = (root / path).resolve()
-        if not found.is_relative_to(root) or not found.is_file():
+        try:
+            found = (root / path).resolve()
+            is_page = found.is_relative_to(root) and found.is_file()
+        except (OSError, ValueError):  # no name of a file: too long, or with a null character
+            is_page = False
+        if not is_page:
             raise NotFound("no such page")
         hashed = path.startswith("assets/")
         caching = "public, max-age=31536000, immutable" if hashed else "no-cache"

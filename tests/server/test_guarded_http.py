@@ -95,6 +95,42 @@ async def test_a_head_that_is_too_large_is_refused() -> None:
         writer.close()
 
 
+BROKEN_CHUNK = b"Transfer-Encoding: chunked\r\n\r\nzz\r\n"
+
+
+async def test_a_body_in_broken_chunks_is_refused_and_is_no_fault_of_the_console() -> None:
+    async with guarded_console() as (rig, port):
+        for path in (b"/whep", b"/api/stop", b"/api/reset", b"/nothing"):
+            head = HEAD.replace(b"GET /healthz", b"POST " + path)
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.write(head + BROKEN_CHUNK)
+            assert (await _said(reader)).startswith(b"HTTP/1.1 4")
+            writer.close()
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.write(head + BROKEN_CHUNK[:-4])
+            await writer.drain()
+            async with asyncio.timeout(PATIENCE):
+                await reader.readuntil(b"}")  # it has no token: that is said before the body has come
+            writer.write(BROKEN_CHUNK[-4:])
+            assert await _said(reader) == b""
+            writer.close()
+        await eventually(lambda: _refused(rig, "bad_request") == 8)
+        assert not any(rig.count("lockstep_internal_errors_total", where=where) for where in ("http", "loop"))
+
+
+async def test_a_stop_with_a_body_in_broken_chunks_is_a_stop_all_the_same() -> None:
+    async with guarded_console() as (rig, port):
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        head = HEAD.replace(b"GET /healthz", b"POST /api/stop")
+        writer.write(
+            head + b"Authorization: " + rig.token("observer")["Authorization"].encode() + b"\r\n" + BROKEN_CHUNK
+        )
+        assert (await _said(reader)).startswith(b"HTTP/1.1 400")
+        writer.close()
+        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        assert not any(rig.count("lockstep_internal_errors_total", where=where) for where in ("http", "loop"))
+
+
 def _refused(rig: Rig, reason: str) -> float:
     return rig.count("lockstep_bad_input_total", where="http", reason=reason)
 

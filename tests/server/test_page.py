@@ -71,7 +71,10 @@ async def test_a_file_that_was_built_again_is_not_the_old_one(built: Path) -> No
             assert (await http.get("/assets/big-1a2b.js", headers={"Accept-Encoding": "gzip"})).text == file.read_text()
 
 
-@pytest.mark.parametrize("path", ["/nothing", "/assets", "/..%2fsecret", "/%2e%2e/secret", "/assets/..%2f..%2fsecret"])
+@pytest.mark.parametrize(
+    "path",
+    ["/nothing", "/assets", "/..%2fsecret", "/%2e%2e/secret", "/assets/..%2f..%2fsecret", "/%00", "/" + "x" * 5000],
+)
 async def test_nothing_else_is_served(built: Path, path: str) -> None:
     with pytest.raises(NotFound):
         await _get(built, path)
