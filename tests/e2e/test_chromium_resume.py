@@ -1,6 +1,12 @@
 """A connection that falls silent is shown as silent, and resumes without a reload; nothing is executed twice."""
 
+import asyncio
+import os
 import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from playwright.async_api import Browser, expect
@@ -57,6 +63,55 @@ async def test_a_silent_console_is_called_silent_and_what_it_measured_last_is_sh
         await console.until("s.seat && s.seat.mine && s.at_rest === true")
         assert (await console.stats())["peer"] == peer, "the same connection goes on"
         await expect(page.locator(".seat")).to_contain_text("You have control")
+
+
+@contextmanager
+def _suspended_pages() -> Iterator[None]:
+    """All pages of the browsers that this test has started stand still, as in a suspended machine."""
+    pids = [pid for pid in _descendants(os.getpid()) if b"--type=renderer" in _command_line(pid)]
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
+
+
+def _descendants(pid: int) -> Iterator[int]:
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        for child in map(int, task.read_text().split()):
+            yield child
+            yield from _descendants(child)
+
+
+def _command_line(pid: int) -> bytes:
+    return Path(f"/proc/{pid}/cmdline").read_bytes()
+
+
+SUSPENDED = 2.0  # s: longer than the console may be silent for a page, shorter than a page for the console's seat
+TIMES = 3  # a tick or a message may come first
+
+
+async def test_a_page_that_was_suspended_while_the_deadman_is_held_moves_nothing_when_it_goes_on(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        for _ in range(TIMES):
+            await console.arm()
+            await console.drive_forward()
+            with _suspended_pages():
+                await asyncio.sleep(SUSPENDED)
+                before = _moved(stack)
+            await console.until("!s.armed && s.connected && s.at_rest === true && s.seat && s.seat.mine")
+            assert _moved(stack) == before, "the robot moved on when the page woke up"
+            await _let_go(console)
+
+
+def _moved(stack: Stack) -> int:
+    """The last event that moved something."""
+    return max(int(record["event"]) for record in stack.events("executed") if any(record["values"]))
 
 
 async def test_a_dead_path_is_left_by_an_ice_restart_and_the_same_connection_goes_on(

@@ -256,6 +256,7 @@ export class ConsoleApp {
       note(this.state, "warning", `Unreadable message on ${channel}: ${detail}`, Date.now());
       return;
     }
+    this.ticker.catchUp(performance.now());
     this.heardMs = performance.now();
     const { feedback, handOver } = this.state;
     const standing = standingOf(this.state);
