@@ -111,6 +111,13 @@ class ConsolePage:
         await self.tilt(LEFT_Y, -1)
         await self.until("s.driving && s.at_rest === false")
 
+    async def open_full_scene(self) -> None:
+        """The 3D scene as the large view: where it is not shown, it is asked for first."""
+        shown = self.page.get_by_role("button", name="3D scene", exact=True)
+        if await shown.get_attribute("aria-pressed") == "false":
+            await shown.click()
+        await self.page.get_by_role("button", name="Show 3D scene large").click()
+
     async def reset(self) -> None:
         """Hold the button until the robot says that it is no longer stopped."""
         await self.page.locator(".banner").wait_for(state="hidden")  # its row goes, and the button moves up

@@ -10,7 +10,7 @@ from playwright.async_api import Browser
 from bench.browsers.chromium import PAD
 from bench.browsers.console_page import ConsolePage
 
-__all__ = ["alter", "open_tampered", "say"]
+__all__ = ["TAMPER", "alter", "open_tampered", "say"]
 
 TAMPER = Path(__file__).with_name("tamper.js")
 ALTER = """(change) => {

@@ -86,6 +86,11 @@ async def _notes(console: ConsolePage) -> None:
     await _tab(console, "Notes")
 
 
+async def _scene(console: ConsolePage) -> None:
+    await console.page.get_by_role("button", name="3D scene", exact=True).click()
+    await console.until("window.lockstep.scene().state === 'drawn'", 30)
+
+
 async def _charts(console: ConsolePage) -> None:
     await console.page.keyboard.press("c")
 
@@ -117,7 +122,17 @@ async def _audit(console: ConsolePage) -> None:
     await console.page.get_by_role("dialog").get_by_text("start").first.wait_for()
 
 
-SUPERVISOR: tuple[State, ...] = (_ready, _notes, _people_and_silencing, _charts, _keys, _pads, _inviting, _audit)
+SUPERVISOR: tuple[State, ...] = (
+    _ready,
+    _scene,
+    _notes,
+    _people_and_silencing,
+    _charts,
+    _keys,
+    _pads,
+    _inviting,
+    _audit,
+)
 DRIVING: tuple[State, ...] = (_ready, _armed, _warns, _stopped, _not_kept_and_refused, _locked, _unconfirmed, _silenced)
 
 

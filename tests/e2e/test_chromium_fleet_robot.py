@@ -31,7 +31,7 @@ async def test_a_robots_page_drives_shows_the_scene_invites_records_and_replays_
             await expect(record).to_have_text("Record", timeout=20_000)
 
             async with page.expect_event("websocket", timeout=60_000) as viewer:  # its drawing is tested elsewhere
-                await page.get_by_role("button", name="Show 3D scene large").click()
+                await console.open_full_scene()
             assert (await viewer.value).url.startswith(f"{base.replace('http', 'ws')}/robots/left/scene/ws/")
 
             await page.get_by_role("tab", name="People").click()

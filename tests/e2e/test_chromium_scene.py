@@ -61,8 +61,8 @@ WATCH = """() => {
 async def _open_scene(console: ConsolePage) -> None:
     await console.page.route("**/scene/**", lambda route: route.fulfill(body=SCENE, content_type="text/html"))
     await console.page.evaluate(FEED)
-    await console.page.get_by_role("button", name="Show 3D scene large").click()
-    await console.until("window.lockstep.scene().event !== null", 60)
+    await console.open_full_scene()
+    await console.until("window.lockstep.scene().state === 'full'", 60)
 
 
 async def _watched(console: ConsolePage) -> list[dict[str, Any]]:
@@ -126,7 +126,7 @@ async def test_whatever_runs_in_the_3d_scene_reaches_neither_the_page_nor_the_to
 ) -> None:
     async with open_console(chromium, stack.operator, pad=False) as console:
         await console.until_live()
-        await console.page.get_by_role("button", name="Show 3D scene large").click()
+        await console.open_full_scene()
         await console.page.frame_locator("iframe").locator("canvas").first.wait_for(state="attached", timeout=60_000)
         frame = next(each for each in console.page.frames if "/scene/" in each.url)
         found = await frame.evaluate(TRY)

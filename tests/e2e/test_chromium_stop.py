@@ -185,7 +185,7 @@ async def test_a_stop_key_works_inside_the_3d_scene(stack: Stack, chromium: Brow
         # Drawing the real scene takes so long on a busy machine that the page gives it up.
         await observer.page.route("**/scene/**", lambda route: route.fulfill(body=SCENE, content_type="text/html"))
         await observer.until_live()
-        await observer.page.get_by_role("button", name="Show 3D scene large").click()
+        await observer.open_full_scene()
         await observer.page.frame_locator("iframe").locator("input").click()
         assert await observer.page.evaluate("document.activeElement.tagName") == "IFRAME"
         await observer.page.keyboard.press("Escape")

@@ -44,7 +44,7 @@ async def test_the_default_robot_is_seen_heard_and_driven(manipulator: Stack, ch
 async def test_the_3d_scene_is_one_of_the_views_and_shows_the_robot(manipulator: Stack, chromium: Browser) -> None:
     async with open_console(chromium, manipulator.operator) as console:
         await console.until_live()
-        await console.page.get_by_role("button", name="Show 3D scene large").click()
+        await console.open_full_scene()
         frame = console.page.frame_locator("iframe")
         await frame.locator("canvas").first.wait_for(timeout=60_000)
         assert await console.page.evaluate("document.querySelector('iframe').src.includes('/scene/')")

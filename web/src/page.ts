@@ -131,6 +131,10 @@ export class Page {
       charts: () => this.act("charts"),
       keys: () => this.act("keys"),
       pads: () => this.act("pads"),
+      scene: () => {
+        board.sceneSwitch.toggle();
+        this.draw(performance.now());
+      },
     });
     const record = createRecordButton(app, sessionApi);
     bar.element.append(record.element, tools.bar);
@@ -146,8 +150,8 @@ export class Page {
     const axes = createAxisPanel(app);
     const stop = createStopPanel(app);
     const announcer = createAnnouncer(app);
+    board.gauges.append(places.element, force.element, radar.element);
     board.element.append(
-      h("div", "gauges", {}, places.element, force.element, radar.element),
       h("div", "stage", {}, scale.element, contact.element, limits.element, overlay.element),
     );
     const rail = h("aside", "rail", {}, event.element, tabs.element);
@@ -165,6 +169,7 @@ export class Page {
     const { charts } = this;
     return [
       bar,
+      { element: tools.bar, update: () => tools.update(app, board.sceneSwitch.isOn) },
       record,
       seat,
       alarm,

@@ -76,7 +76,7 @@ export function sceneDue(context: GateContext, picture: number | null): number |
 }
 
 /** Why the scene must not be trusted; null when it may. */
-export function sceneStaleness(gate: SceneGate, context: GateContext): string | null {
+export function sceneStaleness(gate: Pick<SceneGate, "shown">, context: GateContext): string | null {
   if (gate.shown === null) return "Waiting for the robot's state";
   if (context.gate !== "event" || context.feedback === null) return null;
   const gap = eventGap(context.feedback, gate.shown);

@@ -1,7 +1,7 @@
 import type { ReplayFeedback } from "../core/replay_chunk";
 import type { RobotDescription } from "../wire";
 import { grouped, h, setHidden, setText } from "../ui/dom";
-import type { SceneStage } from "./scene/scene_stage";
+import type { SceneStage } from "../scene/scene_stage";
 
 export type SceneCardState = "waiting" | "loading" | "on" | "failed";
 
@@ -56,7 +56,7 @@ export class SceneCard {
   private async load(): Promise<void> {
     this.state = "loading";
     try {
-      const { SceneStage } = await import("./scene/scene_stage");
+      const { SceneStage } = await import("../scene/scene_stage");
       if (this.closed) return;
       this.stage = new SceneStage(this.canvas, this.description);
       this.state = "on";

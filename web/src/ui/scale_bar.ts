@@ -34,5 +34,6 @@ function pictureBox(canvas: HTMLCanvasElement): { width: number; right: number; 
   if (wide === 0 || high === 0 || canvas.width === 0 || canvas.height === 0) return null;
   const share = Math.min(wide / canvas.width, high / canvas.height);
   const [width, height] = [canvas.width * share, canvas.height * share];
-  return { width, right: (wide - width) / 2, bottom: (high - height) / 2 };
+  const left = parseFloat(getComputedStyle(canvas).objectPosition) / 100; // "50% 50%": in the middle
+  return { width, right: (wide - width) * (1 - left), bottom: (high - height) / 2 };
 }

@@ -2,10 +2,14 @@ import { createSceneGate, resetSceneGate, sceneStaleness, settleScene } from "..
 import { eventGap } from "../core/serial";
 import type { GateContext } from "../core/medium_counts";
 import type { ConsoleApi } from "../rtc/console_api";
-import { button, h, setHidden, setText } from "./dom";
+import type { Feedback, RobotDescription } from "../wire";
+import { h, setData, setText } from "./dom";
+import { SceneDrawing } from "./scene_drawing";
 import { gateScene, type ForeignKey } from "./scene_frame";
 
-type SceneState = "off" | "loading" | "on" | "failed" | "empty";
+type FrameState = "off" | "loading" | "on" | "failed";
+/** What is to be seen. `full`: viser's, in its frame. `drawn`: the page's own. */
+type SceneState = "away" | "loading" | "drawn" | "full" | "failed";
 
 /** What the page knows that the scene has to keep to. */
 export interface SceneSurroundings {
@@ -21,109 +25,162 @@ export interface SceneStatistics {
   readonly state: SceneState;
   readonly event: number | null; // shown
   readonly gap: number | null; // feedback's event minus the shown one
-  readonly held: number; // updates that wait for their event
+  readonly held: number; // updates of the full scene that wait for their event
   readonly forced: number; // updates that could not wait
 }
 
-const IDLE_WORDS = "The robot, posed from its feedback";
-const EMPTY_WORDS = "This robot does not describe its shape, so there is no 3D scene of it";
+const NO_WEBGL = "This browser cannot draw the 3D scene: it has no WebGL";
+const FRAME_WORDS: Readonly<Record<FrameState, string>> = {
+  off: "",
+  loading: "Opening the full 3D scene…",
+  on: "Opening the full 3D scene…",
+  failed: "The full 3D scene is not available now",
+};
 const SETTLE_MS = 5000;
 
-/** The 3D scene in a frame of its own. It runs only while it is the large view: drawing it takes from the pictures. */
+/**
+ * The 3D scene: drawn by the page itself, and while it is the large view by viser, with trail and ghost, in a frame of
+ * its own. Until the frame shows an event, the page's own drawing stays in sight.
+ */
 export class SceneView {
   readonly element = h("div", "scene");
   readonly gate = createSceneGate();
+  private readonly drawing: SceneDrawing;
   private readonly words = h("p", "scene-words");
-  private readonly open = button("wide-button", "Open the 3D scene", () => this.load());
   private frame: HTMLIFrameElement | null = null;
-  private state: SceneState = "off";
+  private frameState: FrameState = "off";
+  private feedback: Feedback | null = null; // newest that was taken
   private openedMs = 0;
 
   constructor(
     private readonly api: ConsoleApi,
     private readonly page: SceneSurroundings,
   ) {
-    this.element.append(h("div", "scene-idle", {}, this.words, this.open));
-    this.show("off", IDLE_WORDS);
+    this.drawing = new SceneDrawing(() => page.due());
+    this.element.append(this.drawing.element, this.words);
     gateScene(this.gate, () => this.frame?.contentWindow ?? null, page);
   }
 
-  /** Opens the scene unless it is open, or there is nothing to show. */
+  /** Begins to draw the robot. */
+  open(description: RobotDescription): void {
+    if (this.drawing.state !== "off") return;
+    this.openedMs = performance.now();
+    this.drawing.open(description);
+  }
+
+  /** Ends it; what it drew is gone with it. */
+  close(): void {
+    this.unload();
+    this.drawing.close();
+  }
+
+  /** Opens the full scene unless it is open. */
   load(): void {
-    if (this.state === "on" || this.state === "loading" || this.state === "empty") return;
-    this.show("loading", "Opening the 3D scene…");
+    if (this.frameState === "on" || this.frameState === "loading") return;
+    this.frameState = "loading";
     this.api.scene().then(
       (path) => this.embed(path),
       () => {
-        if (this.state === "loading") this.show("failed", "The 3D scene is not available");
+        if (this.frameState === "loading") this.frameState = "failed";
       },
     );
   }
 
-  /** Ends it; what it drew is gone with it. */
-  unload(words = IDLE_WORDS): void {
-    if (this.state === "off" || this.state === "empty") return;
-    this.discard();
-    this.show("off", words);
+  /** Ends the full scene. */
+  unload(): void {
+    this.frame?.remove();
+    this.frame = null;
+    this.frameState = "off";
+    resetSceneGate(this.gate);
   }
 
-  /** Whether the robot has a shape to show. */
-  setPossible(possible: boolean): void {
-    if (possible === (this.state !== "empty")) return;
-    this.discard();
-    this.show(possible ? "off" : "empty", possible ? IDLE_WORDS : EMPTY_WORDS);
+  /** Another bridge, whose robot may have another shape. */
+  renew(): void {
+    const wasLoaded = this.isFull;
+    this.close();
+    this.drawing.forget();
+    if (wasLoaded) this.load();
+  }
+
+  /** Whether the full scene is open, or opening. */
+  get isFull(): boolean {
+    return this.frameState === "on" || this.frameState === "loading";
   }
 
   /** Whether it has run long enough that its loading no longer holds the page up. */
   hasSettled(now: number): boolean {
-    return this.state === "on" && now - this.openedMs > SETTLE_MS;
+    const runs = this.frameState === "on" || this.drawing.state === "on";
+    return runs && now - this.openedMs > SETTLE_MS;
   }
 
-  /** Opens it anew if it is open. */
-  reload(): void {
-    if (this.state === "off" || this.state === "empty") return;
-    this.unload();
-    this.load();
+  /** Takes the newest feedback, and goes on to the event of the picture that is now on screen. */
+  take(feedback: Feedback | null): void {
+    if (feedback !== null && feedback !== this.feedback) this.drawing.take(feedback);
+    this.feedback = feedback;
+    this.settle();
   }
 
-  /** Lets the scene go on to the event of the picture that is now on screen. */
   settle(): void {
-    if (this.state === "on") settleScene(this.gate, this.page.due());
+    if (this.frameState === "on") settleScene(this.gate, this.page.due());
+    if (!this.showsFull) this.drawing.settle();
   }
 
-  /** Why it must not be trusted; null when it may, or is not there. */
+  /** Writes what stands in it. */
+  update(): void {
+    const state = this.state();
+    setData(this.element, "state", state);
+    setText(this.words, this.drawing.state === "failed" && !this.isFull ? NO_WEBGL : this.frameWords());
+  }
+
+  /** Why it must not be trusted; null when it may, or shows nothing. */
   staleness(): string | null {
-    return this.state === "on" ? sceneStaleness(this.gate, this.page.context()) : null;
+    const { shown } = this;
+    const showsNothing = this.frameState !== "on" && this.drawing.state !== "on";
+    return showsNothing ? null : sceneStaleness({ shown }, this.page.context());
+  }
+
+  /** Whether joints of what is shown were not measured. */
+  get lacksJoints(): boolean {
+    return !this.showsFull && this.drawing.lacksJoints;
   }
 
   statistics(): SceneStatistics {
-    const { shown, held, forced } = this.gate;
+    const { held, forced } = this.gate;
     const { feedback } = this.page.context();
+    const { shown } = this;
     const gap = shown === null || feedback === null ? null : eventGap(feedback, shown);
-    return { state: this.state, event: shown, gap, held: held.length, forced };
+    return { state: this.state(), event: shown, gap, held: held.length, forced };
+  }
+
+  private state(): SceneState {
+    if (this.showsFull) return "full";
+    if (this.drawing.state === "on") return this.drawing.shown === null ? "loading" : "drawn";
+    if (this.drawing.state === "failed") return this.isFull ? "loading" : "failed";
+    return this.drawing.state === "loading" || this.isFull ? "loading" : "away";
+  }
+
+  /** Whether what is to be seen is the frame's. */
+  private get showsFull(): boolean {
+    return this.frameState === "on" && this.gate.shown !== null;
+  }
+
+  private get shown(): number | null {
+    return this.showsFull ? this.gate.shown : this.drawing.shown;
+  }
+
+  private frameWords(): string {
+    if (this.showsFull) return "";
+    return this.drawing.state === "loading" ? "Opening the 3D scene…" : FRAME_WORDS[this.frameState];
   }
 
   private embed(path: string): void {
-    if (this.state !== "loading") return;
+    if (this.frameState !== "loading") return;
     resetSceneGate(this.gate);
     // Whatever runs in there has an origin that is nobody's; the console says the same of it (server/security.py).
     const attributes = { src: path, title: "3D scene of the robot", sandbox: "allow-scripts" };
     this.frame = h("iframe", "scene-frame", attributes);
     this.element.append(this.frame);
     this.openedMs = performance.now();
-    this.show("on", "");
-  }
-
-  private discard(): void {
-    this.frame?.remove();
-    this.frame = null;
-    resetSceneGate(this.gate);
-  }
-
-  private show(state: SceneState, words: string): void {
-    this.state = state;
-    this.element.dataset["state"] = state;
-    setHidden(this.open, state === "empty");
-    setText(this.words, words);
+    this.frameState = "on";
   }
 }

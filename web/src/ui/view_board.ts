@@ -1,9 +1,11 @@
 import type { ConsoleApp } from "../console_app";
-import { robotIsUp } from "../core/console_state";
+import { note, robotIsUp } from "../core/console_state";
 import { sourceWords } from "../core/source_words";
+import { planViews, smallShape } from "../core/view_room";
 import { stalenessOf } from "../statistics";
 import type { StreamInfo } from "../wire";
 import { h, setData, setHidden, setText } from "./dom";
+import { SceneSwitch } from "./scene_switch";
 import type { SceneView } from "./scene_view";
 
 interface View {
@@ -18,16 +20,26 @@ interface View {
 }
 
 const SCENE = "3D scene";
+const SCENE_SHAPE = 4 / 3;
+const TOO_SLOW = "The 3D scene was closed: this machine draws it too slowly";
 
 /** One view large, the others small; a click on a small one swaps it in. */
 export class ViewBoard {
   readonly element = h("main", "views", { "aria-label": "Views" });
-  private readonly views = new Map<string, View>();
+  readonly gauges = h("div", "gauges");
+  readonly sceneSwitch = new SceneSwitch();
+  private readonly views = new Map<string, View>(); // cameras in their order, then the scene while it is there
+  private readonly sceneView: View;
   private main: string | null = null;
   private epoch: string | null = null;
+  private shapes = ""; // of the pictures, as they were last laid out
 
   constructor(readonly scene: SceneView) {
-    this.addView(SCENE, "3D scene", null, scene.element);
+    this.sceneView = this.createView(SCENE, SCENE, null, scene.element);
+    this.element.append(this.gauges);
+    const sizes = new ResizeObserver(() => this.fit());
+    sizes.observe(this.element);
+    sizes.observe(this.gauges);
   }
 
   /** The canvas of a stream; the same one again after a reconnect. */
@@ -35,7 +47,9 @@ export class ViewBoard {
     const known = this.views.get(info.stream)?.canvas;
     if (known) return known;
     const canvas = h("canvas", "picture", { "data-stream": info.stream, width: "640", height: "480" });
-    this.addView(info.stream, info.label, canvas, canvas);
+    const hadScene = this.views.delete(SCENE);
+    this.addView(this.createView(info.stream, info.label, canvas, canvas));
+    if (hadScene) this.views.set(SCENE, this.sceneView);
     if (this.main === null) this.swapIn(info.stream);
     return canvas;
   }
@@ -54,42 +68,75 @@ export class ViewBoard {
   update(app: ConsoleApp, now: number): void {
     this.element.classList.toggle("is-locked", app.isArmed());
     this.followEpoch(app.state.robot?.epoch ?? null);
-    if (this.scene.hasSettled(now) && app.ticker.isHeldUp(now)) this.dropScene();
-    const { robot } = app.state;
-    if (robot !== null) this.scene.setPossible(robot.description.bodies.length > 0);
-    this.scene.settle();
+    if (this.scene.hasSettled(now) && app.ticker.isHeldUp(now)) this.dropScene(app);
+    this.sceneSwitch.update(app, now);
+    this.showScene(app);
+    this.scene.take(app.state.feedback);
+    this.scene.update();
     for (const view of this.views.values())
       if (view.canvas !== null) showVeil(app, view, now);
       else this.showSceneVeil(app, view);
+    if (this.shapes !== this.shapesNow()) this.fit();
+  }
+
+  /** The scene stands on the page or it does not: nothing is kept free for one that is not there. */
+  private showScene(app: ConsoleApp): void {
+    const { isOn } = this.sceneSwitch;
+    const description = app.state.robot?.description;
+    if (isOn && description !== undefined) this.scene.open(description);
+    if (isOn === this.views.has(SCENE)) return;
+    if (isOn) this.addView(this.sceneView);
+    else this.removeScene();
+  }
+
+  private removeScene(): void {
+    this.scene.close();
+    this.views.delete(SCENE);
+    this.sceneView.element.remove();
+    if (this.main === SCENE) this.main = this.mainStream();
+    this.arrange();
   }
 
   /** The scene is judged like a picture: by how far its event is from the feedback. */
   private showSceneVeil(app: ConsoleApp, view: View): void {
-    const { state, event, gap } = this.scene.statistics();
-    const words = state === "on" ? (unreachableWords(app) ?? this.scene.staleness()) : null;
+    const { event, gap } = this.scene.statistics();
+    const staleness = this.scene.staleness();
+    const words = event === null && staleness === null ? null : (unreachableWords(app) ?? staleness);
     setHidden(view.veil, words === null);
     view.element.classList.toggle("is-stale", words !== null);
     if (words !== null) setText(view.veilWords, words);
     const { video } = app.state.settings.tolerance;
-    setText(view.detail, event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}`);
+    const unknown = this.scene.lacksJoints ? " · not all joints measured" : "";
+    setText(
+      view.detail,
+      event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}${unknown}`,
+    );
     setData(view.element, "gap", words === null ? "good" : "bad");
+    setHidden(view.swap, this.isLarge(view) && this.scene.isFull);
   }
 
   /** Nothing may keep STOP waiting, so a scene that this machine cannot draw fast enough goes. */
-  private dropScene(): void {
+  private dropScene(app: ConsoleApp): void {
+    if (this.scene.isFull) this.scene.unload();
+    else this.sceneSwitch.giveUp();
     const camera = [...this.views.keys()].find((name) => name !== SCENE);
-    this.scene.unload("Closed: this machine draws it too slowly");
-    if (camera !== undefined) this.swapIn(camera);
+    if (camera !== undefined && this.main === SCENE) this.swapIn(camera);
+    note(app.state, "warning", TOO_SLOW, Date.now());
   }
 
   /** The scene lives as long as the bridge whose robot it shows. */
   private followEpoch(epoch: string | null): void {
     if (epoch === null || epoch === this.epoch) return;
-    if (this.epoch !== null) this.scene.reload();
+    if (this.epoch !== null) this.scene.renew();
     this.epoch = epoch;
   }
 
-  private addView(name: string, label: string, canvas: HTMLCanvasElement | null, content: HTMLElement): void {
+  private createView(
+    name: string,
+    label: string,
+    canvas: HTMLCanvasElement | null,
+    content: HTMLElement,
+  ): View {
     const caption = h("span", "view-label", {}, label);
     const detail = h("span", "view-detail");
     const veilWords = h("strong", "veil-words");
@@ -100,8 +147,12 @@ export class ViewBoard {
     const bar = h("figcaption", "view-caption", {}, caption, detail);
     const element = h("figure", "view", { "data-view": name }, content, veil, bar, swap);
     setHidden(veil, true);
-    this.views.set(name, { name, element, caption, detail, veil, veilWords, swap, canvas });
-    this.element.append(element);
+    return { name, element, caption, detail, veil, veilWords, swap, canvas };
+  }
+
+  private addView(view: View): void {
+    this.views.set(view.name, view);
+    this.element.append(view.element);
     this.arrange();
   }
 
@@ -112,21 +163,58 @@ export class ViewBoard {
     this.arrange();
   }
 
-  private arrange(): void {
-    let place = 1;
-    for (const view of this.views.values()) {
-      const isMain = view.name === this.main;
-      setData(view.element, "place", isMain ? "main" : "small");
-      view.element.style.order = String(isMain ? 0 : view.name === SCENE ? 99 : place);
-      view.element.style.setProperty(
-        "--slot",
-        String(isMain ? 0 : view.name === SCENE ? this.views.size - 2 : place - 1),
-      );
-      if (!isMain && view.name !== SCENE) place += 1;
-      setHidden(view.swap, isMain);
-    }
-    this.element.style.setProperty("--small", String(Math.max(1, this.views.size - 1)));
+  /** Whether it has the large place: where there is no camera, the scene has. */
+  private isLarge(view: View): boolean {
+    return view.name === (this.main ?? SCENE);
   }
+
+  private arrange(): void {
+    let place = 0;
+    for (const view of this.views.values()) {
+      const isLarge = this.isLarge(view);
+      setData(view.element, "place", isLarge ? "main" : "small");
+      view.element.style.order = String(isLarge ? 0 : place + 1);
+      view.element.style.setProperty("--slot", String(place));
+      if (!isLarge) place += 1;
+      setHidden(view.swap, isLarge);
+    }
+    this.element.style.setProperty("--small", String(Math.max(1, place)));
+    this.fit();
+  }
+
+  /** Gives the others the room that the large picture leaves. */
+  private fit(): void {
+    this.shapes = this.shapesNow();
+    const style = getComputedStyle(this.element);
+    const padding = 2 * parseFloat(style.paddingTop);
+    let large = SCENE_SHAPE;
+    const small: number[] = [];
+    for (const view of this.views.values()) {
+      const shape = shapeOf(view);
+      view.element.style.setProperty("--shape", String(smallShape(shape)));
+      if (this.isLarge(view)) large = shape;
+      else small.push(shape);
+    }
+    const { run, size, tight } = planViews({
+      width: this.element.clientWidth - padding,
+      height: this.element.clientHeight - padding,
+      gap: parseFloat(style.columnGap),
+      large,
+      small,
+      gauges: [...this.gauges.children].map((gauge) => gauge.clientHeight).filter((height) => height > 0),
+    });
+    setData(this.element, "run", run);
+    setData(this.element, "tight", String(tight));
+    this.element.style.setProperty("--size", `${size}px`);
+  }
+
+  private shapesNow(): string {
+    return [...this.views.values()].map((view) => shapeOf(view).toFixed(3)).join(" ");
+  }
+}
+
+function shapeOf({ canvas }: View): number {
+  return canvas === null || canvas.height === 0 ? SCENE_SHAPE : canvas.width / canvas.height;
 }
 
 function showVeil(app: ConsoleApp, view: View, now: number): void {

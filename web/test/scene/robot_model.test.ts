@@ -1,7 +1,7 @@
 import { ArrowHelper, type BufferGeometry, LineSegments } from "three";
 import { describe, expect, test } from "vitest";
-import { addSigns, type SceneState } from "../../src/replay/scene/robot_signs";
-import { RobotModel } from "../../src/replay/scene/robot_model";
+import { addSigns, type SceneState } from "../../src/scene/robot_signs";
+import { RobotModel } from "../../src/scene/robot_model";
 import type { Body, RobotDescription } from "../../src/wire";
 import { readVectors } from "../vectors";
 

@@ -10,7 +10,7 @@ import {
   PointsMaterial,
   Vector3,
 } from "three";
-import type { Geofence, RangeRing, RobotDescription, WrenchSensor } from "../../wire";
+import type { Geofence, RangeRing, RobotDescription, WrenchSensor } from "../wire";
 import type { RobotModel } from "./robot_model";
 
 const FORCE = 0xffb020;

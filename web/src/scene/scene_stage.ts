@@ -10,8 +10,8 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { lengthWords, roundLength } from "../../core/units";
-import type { RobotDescription } from "../../wire";
+import { lengthWords, roundLength } from "../core/units";
+import type { RobotDescription } from "../wire";
 import { RobotModel } from "./robot_model";
 import { addSigns, type SceneState } from "./robot_signs";
 
@@ -20,7 +20,6 @@ const GRID = 0x4d5a6b;
 const GRID_MIDDLE = 0x66768a;
 const CELLS = 40;
 const CELL_SHARE = 0.5; // of the robot's radius, at most
-const DISTANCE = 4.2; // of the first look, in the robot's radii
 const LIFT = 0.012; // of the robot's radius: the squares show on a floor of the robot's own
 const SHARPEST = 2; // device pixels to a CSS pixel
 
@@ -40,10 +39,11 @@ export class SceneStage {
   private seen = new Vector3(); // where the robot was in the last picture
   private frame = 0;
 
-  /** Raises where the browser has no WebGL. */
+  /** `distance`: of the first look, in the robot's radii. Raises where the browser has no WebGL. */
   constructor(
     private readonly canvas: HTMLCanvasElement,
     description: RobotDescription,
+    private readonly distance = 4.2,
   ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true });
     this.model = new RobotModel(description);
@@ -77,6 +77,11 @@ export class SceneStage {
     this.draw();
   }
 
+  /** Whether the browser has taken its WebGL away, for now or for good. */
+  get isLost(): boolean {
+    return this.renderer.getContext().isContextLost();
+  }
+
   close(): void {
     cancelAnimationFrame(this.frame);
     this.resizes.disconnect();
@@ -87,7 +92,7 @@ export class SceneStage {
 
   private look(center: Vector3): void {
     this.controls.target.copy(center);
-    this.camera.position.copy(center).add(new Vector3(-0.62, -0.62, 0.55).multiplyScalar(DISTANCE));
+    this.camera.position.copy(center).add(new Vector3(-0.62, -0.62, 0.55).multiplyScalar(this.distance));
     this.seen = this.model.focus().multiplyScalar(this.world.scale.x);
     this.controls.update();
   }

@@ -1,0 +1,125 @@
+"""Where the views stand: pictures have the room that is there, nothing lies over another, and no box is empty."""
+
+from typing import Any
+
+import pytest
+from playwright.async_api import Browser
+
+from bench.browsers.console_page import ConsolePage
+from tests.e2e.machine import open_on_machine
+from tests.support.stack import Stack
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+
+LAPTOP, FULL_HD, NARROW, UPRIGHT = (1366, 768), (1920, 1080), (1024, 640), (1024, 1366)
+PHONE, TURNED, ZOOMED = (390, 844), (844, 390), (683, 384)
+
+# After the next layout: every box, and how large the picture in it is drawn.
+LOOK = """() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => {
+  const box = (element) => {
+    const { x, y, width, height } = element.getBoundingClientRect();
+    return { x, y, width, height };
+  };
+  const views = [...document.querySelectorAll(".view")].map((view) => {
+    const canvas = view.querySelector("canvas");
+    const share = canvas && Math.min(canvas.clientWidth / canvas.width, canvas.clientHeight / canvas.height);
+    const empty = canvas === null || canvas.clientWidth < 40 || canvas.clientHeight < 30;
+    const { view: name, place } = view.dataset;
+    return { name, place, empty, picture: canvas && canvas.width * share, ...box(view) };
+  });
+  const gauges = [...document.querySelectorAll(".gauges > *")].filter((each) => each.checkVisibility());
+  const room = document.querySelector(".views");
+  resolve({ views, gauges: gauges.map((each) => ({ name: "a gauge", ...box(each) })), room: box(room) });
+})))"""
+
+
+async def _look(console: ConsolePage, size: tuple[int, int]) -> dict[str, Any]:
+    await console.page.set_viewport_size({"width": size[0], "height": size[1]})
+    looked: dict[str, Any] = await console.page.evaluate(LOOK)
+    return looked
+
+
+def _overlaps(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    apart = [
+        one[at] + one[length] <= other[at] + 0.5 or other[at] + other[length] <= one[at] + 0.5
+        for at, length in (("x", "width"), ("y", "height"))
+    ]
+    return not any(apart)
+
+
+def _check(looked: dict[str, Any], what: str) -> None:
+    boxes = looked["views"] + looked["gauges"]
+    room = looked["room"]
+    for at, box in enumerate(boxes):
+        for other in boxes[at + 1 :]:
+            assert not _overlaps(box, other), f"{what}: {box['name']} and {other['name']}"
+        assert box["x"] >= room["x"] - 0.5, f"{what}: {box['name']}"
+        assert box["x"] + box["width"] <= room["x"] + room["width"] + 0.5, f"{what}: {box['name']}"
+        assert box["y"] + box["height"] <= room["y"] + room["height"] + 0.5, f"{what}: {box['name']}"
+    for view in looked["views"]:
+        assert not view["empty"], f"{what}: {view['name']} is an empty box"
+
+
+def _in_a_fixed_column(room: dict[str, Any]) -> tuple[float, float]:
+    """How wide the large and a small picture, both 4 by 3, are where the column beside has 17 % of the width."""
+    width, height = room["width"] - 24, room["height"] - 24
+    column = min(216.0, max(150.0, 0.17 * width))
+    return min(width - 12 - column, height * 4 / 3), column
+
+
+@pytest.mark.parametrize("scene", [False, True], ids=["without scene", "with scene"])
+async def test_on_large_screens_pictures_take_the_room_and_nothing_lies_over_another(
+    stack: Stack, chromium: Browser, scene: bool
+) -> None:
+    async with open_on_machine(chromium, stack.operator, renderer=None) as console:
+        await console.until_live()
+        if scene:
+            await console.page.get_by_role("button", name="3D scene", exact=True).click()
+            await console.until("window.lockstep.scene().state === 'drawn'", 30)
+        for charts in ("without charts", "with charts"):
+            for size in (LAPTOP, FULL_HD, NARROW, UPRIGHT):
+                what = f"{size} {charts}"
+                looked = await _look(console, size)
+                _check(looked, what)
+                large, small = _in_a_fixed_column(looked["room"])
+                pictures = {view["name"]: view["picture"] for view in looked["views"]}
+                assert pictures["overview"] >= large - 1, what
+                # On the smallest the scene, which somebody asked for, leaves the camera less than all of the column.
+                assert pictures["front"] >= small - 1 or (scene and size == NARROW), what
+            await console.page.keyboard.press("c")
+        full_hd = await _look(console, FULL_HD)
+        by_name = {view["name"]: view for view in full_hd["views"]}
+        assert by_name["overview"]["width"] - by_name["overview"]["picture"] < 60, "its box is hardly wider than it"
+
+
+async def test_on_small_screens_no_box_is_empty_and_the_large_picture_has_its_room(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_on_machine(chromium, stack.operator, touch=True, width=390, height=844) as console:
+        await console.until_live()
+        phone = await _look(console, PHONE)
+        _check(phone, "phone")
+        assert [view["name"] for view in phone["views"]] == ["overview", "front"]
+        for size in (TURNED, ZOOMED):
+            looked = await _look(console, size)
+            large, small = looked["views"]
+            assert not large["empty"]
+            assert not small["empty"]
+            if size == TURNED:
+                assert small["x"] >= large["x"] + large["picture"] - 1, "it lies beside the picture, not over it"
+
+
+async def test_a_view_taken_large_changes_places_with_the_large_one(stack: Stack, chromium: Browser) -> None:
+    async with open_on_machine(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.until("window.lockstep.scene().state === 'drawn'", 30)
+        await console.page.get_by_role("button", name="Show Front large").click()
+        looked = await _look(console, LAPTOP)
+        _check(looked, "front large")
+        places = {view["name"]: view["place"] for view in looked["views"]}
+        assert places == {"overview": "small", "front": "main", "3D scene": "small"}
+        await console.page.get_by_role("button", name="Show Overview large").click()
+        await console.page.get_by_role("button", name="3D scene", exact=True).click()
+        looked = await _look(console, LAPTOP)
+        _check(looked, "the scene is hidden")
+        assert {view["name"]: view["place"] for view in looked["views"]} == {"overview": "main", "front": "small"}

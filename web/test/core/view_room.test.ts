@@ -1,0 +1,144 @@
+import { describe, expect, it } from "vitest";
+import { planViews, smallShape, type ViewPlan, type ViewRoom } from "../../src/core/view_room";
+
+const GAP = 12;
+const CAMERA = 4 / 3;
+/** The views of a page on screens that are usual, without and with charts. */
+const ROOMS = [
+  [1006, 470],
+  [1524, 778],
+  [2164, 1154],
+  [600, 470],
+  [880, 830],
+  [640, 400],
+  [664, 1130],
+] as const;
+const GAUGES = [[], [130], [130, 86], [130, 86, 120]];
+
+function* rooms(): Generator<ViewRoom> {
+  for (const [width, height] of ROOMS)
+    for (const large of [1, CAMERA, 16 / 9])
+      for (const gauges of GAUGES)
+        for (let count = 0; count < 6; count += 1)
+          for (const shape of [1, CAMERA, 16 / 9])
+            yield { width, height, gap: GAP, large, small: Array<number>(count).fill(shape), gauges };
+}
+
+/** How wide pictures of these shapes are drawn in such a plan. */
+function drawn(room: ViewRoom, { run, size }: ViewPlan): { large: number; small: number } {
+  const width = room.width - (run === "column" ? size + GAP : 0);
+  const height = room.height - (run === "row" ? size + GAP : 0);
+  const [shape = CAMERA] = room.small;
+  const box = run === "row" ? size * smallShape(shape) : size;
+  const small = Math.min(box, (box / smallShape(shape)) * shape);
+  return { large: Math.min(width, height * room.large), small };
+}
+
+/** A column of fixed width, whatever stands in it, with views of one shape. */
+function fixed(room: ViewRoom): { large: number; small: number } {
+  const column = Math.min(216, Math.max(150, 0.17 * room.width));
+  const [shape = CAMERA] = room.small;
+  return {
+    large: Math.min(room.width - column - GAP, room.height * room.large),
+    small: Math.min(column, (column / CAMERA) * shape),
+  };
+}
+
+describe("the room of the views", () => {
+  it("is all the large view's where nothing else is there", () => {
+    for (const [width, height] of ROOMS)
+      expect(planViews({ width, height, gap: GAP, large: CAMERA, small: [], gauges: [] })).toEqual({
+        run: "alone",
+        size: 0,
+        tight: false,
+      });
+  });
+
+  it("makes no picture smaller than a column of fixed width does, at any size, shape and number", () => {
+    for (const room of rooms()) {
+      const plan = planViews(room);
+      const now = drawn(room, plan);
+      const before = fixed(room);
+      expect(now.large).toBeGreaterThanOrEqual(before.large - 1);
+      if (room.small.length > 0 && !plan.tight) expect(now.small).toBeGreaterThanOrEqual(before.small - 1);
+    }
+  });
+
+  it("has a row only where all of it fits", () => {
+    let rows = 0;
+    for (const room of rooms()) {
+      const { run, size } = planViews(room);
+      if (run !== "row") continue;
+      rows += 1;
+      const widths = [...room.small.map((shape) => size * smallShape(shape)), ...room.gauges.map(() => 150)];
+      expect(widths.reduce((sum, each) => sum + each + GAP, -GAP)).toBeLessThanOrEqual(room.width);
+      expect(Math.max(0, ...room.gauges)).toBeLessThanOrEqual(size);
+    }
+    expect(rows).toBeGreaterThan(10);
+  });
+
+  it("is shared by the small views of a column only where they do not fit in it one below the other", () => {
+    for (const room of rooms()) {
+      const { run, size, tight } = planViews(room);
+      if (run !== "column") continue;
+      const stacked = room.small.reduce((sum, shape) => sum + size / smallShape(shape) + GAP, -GAP);
+      if (!tight) expect(stacked).toBeLessThanOrEqual(room.height);
+      else
+        expect(stacked + room.gauges.reduce((sum, each) => sum + each + GAP, 0)).toBeGreaterThan(room.height);
+    }
+    const crowd = {
+      width: 1006,
+      height: 470,
+      gap: GAP,
+      large: CAMERA,
+      small: Array<number>(5).fill(1),
+      gauges: [130],
+    };
+    expect(planViews(crowd).tight).toBe(true);
+  });
+
+  it("beside a picture as high as the room is the column's", () => {
+    const room = { width: 1524, height: 778, gap: GAP, large: CAMERA, small: [CAMERA], gauges: [] };
+    const plan = planViews(room);
+    expect(plan).toEqual({ run: "column", size: Math.floor(1524 - GAP - 778 * CAMERA), tight: false });
+    expect(drawn(room, plan).large).toBeCloseTo(778 * CAMERA);
+  });
+
+  it("below a picture as wide as the room is the row's", () => {
+    const room = { width: 880, height: 830, gap: GAP, large: CAMERA, small: [CAMERA, CAMERA], gauges: [130] };
+    const plan = planViews(room);
+    expect(plan).toEqual({ run: "row", size: 830 - GAP - 660, tight: false });
+    expect(drawn(room, plan).large).toBe(880);
+  });
+
+  it("has no wider column than its views fill above the gauges", () => {
+    const room = { width: 1524, height: 778, gap: GAP, large: 1, small: [1, CAMERA, 16 / 9], gauges: [130] };
+    const { run, size } = planViews(room);
+    expect(run).toBe("column");
+    expect(size).toBeGreaterThan(216);
+    const heights = room.small.reduce((sum, shape) => sum + size / smallShape(shape) + GAP, 130);
+    expect(heights).toBeLessThanOrEqual(room.height);
+    expect(heights).toBeGreaterThan(room.height - 3);
+  });
+
+  it("counts two gauges side by side once where the column has the width", () => {
+    const room = {
+      width: 1524,
+      height: 778,
+      gap: GAP,
+      large: CAMERA,
+      small: [CAMERA, CAMERA],
+      gauges: [130, 130],
+    };
+    const { size } = planViews(room);
+    expect(size).toBeGreaterThanOrEqual(312);
+    expect(2 * (size / CAMERA + GAP) + 130).toBeLessThanOrEqual(room.height);
+  });
+
+  it("is the pictures' by half at most, and gauges alone have no more than they need", () => {
+    const wide = { width: 1400, height: 300, gap: GAP, large: 1, small: [4], gauges: [] };
+    expect(planViews(wide)).toEqual({ run: "column", size: 700, tight: false });
+    const gauges = { width: 1524, height: 778, gap: GAP, large: 1, small: [], gauges: [130] };
+    expect(planViews(gauges)).toEqual({ run: "column", size: 216, tight: false });
+  });
+});
