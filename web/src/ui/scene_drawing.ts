@@ -88,7 +88,7 @@ export class SceneDrawing {
     }
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault(); // it may come back; until then nothing is shown
-      this.blank();
+      if (this.canvas === canvas) this.blank();
     });
     this.settle();
   }

@@ -17,7 +17,12 @@ export class SceneSwitch {
   private choice = keptChoice();
   private renderer: string | null | undefined = undefined;
   private streamsMs: number | null = null; // since when there are streams; null: there are none
-  private gaveUp = false; // this machine was too slow: not again before the page is loaded anew
+  private gaveUp = false; // not again before the page is loaded anew, or somebody asks
+
+  /** Whether the person has asked for it. */
+  get isWanted(): boolean {
+    return this.choice === "shown";
+  }
 
   /** The person's own decision, which is kept. */
   toggle(): void {
@@ -31,7 +36,7 @@ export class SceneSwitch {
     }
   }
 
-  /** This machine draws it too slowly. */
+  /** This machine draws it too slowly, or not at all. */
   giveUp(): void {
     this.isOn = false;
     this.gaveUp = true;

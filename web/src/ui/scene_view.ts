@@ -29,7 +29,7 @@ export interface SceneStatistics {
   readonly forced: number; // updates that could not wait
 }
 
-const NO_WEBGL = "This browser cannot draw the 3D scene: it has no WebGL";
+const FAILED = "This browser cannot draw the 3D scene";
 const FRAME_WORDS: Readonly<Record<FrameState, string>> = {
   off: "",
   loading: "Opening the full 3D scene…",
@@ -91,6 +91,7 @@ export class SceneView {
     this.frame?.remove();
     this.frame = null;
     this.frameState = "off";
+    this.openedMs = performance.now();
     resetSceneGate(this.gate);
   }
 
@@ -105,6 +106,11 @@ export class SceneView {
   /** Whether the full scene is open, or opening. */
   get isFull(): boolean {
     return this.frameState === "on" || this.frameState === "loading";
+  }
+
+  /** Whether there is nothing to be seen, and will not be. */
+  get hasFailed(): boolean {
+    return this.state() === "failed";
   }
 
   /** Whether it has run long enough that its loading no longer holds the page up. */
@@ -129,7 +135,7 @@ export class SceneView {
   update(): void {
     const state = this.state();
     setData(this.element, "state", state);
-    setText(this.words, this.drawing.state === "failed" && !this.isFull ? NO_WEBGL : this.frameWords());
+    setText(this.words, this.drawing.state === "failed" && !this.isFull ? FAILED : this.frameWords());
   }
 
   /** Why it must not be trusted; null when it may, or shows nothing. */

@@ -47,9 +47,7 @@ export class ViewBoard {
     const known = this.views.get(info.stream)?.canvas;
     if (known) return known;
     const canvas = h("canvas", "picture", { "data-stream": info.stream, width: "640", height: "480" });
-    const hadScene = this.views.delete(SCENE);
     this.addView(this.createView(info.stream, info.label, canvas, canvas));
-    if (hadScene) this.views.set(SCENE, this.sceneView);
     if (this.main === null) this.swapIn(info.stream);
     return canvas;
   }
@@ -69,6 +67,7 @@ export class ViewBoard {
     this.element.classList.toggle("is-locked", app.isArmed());
     this.followEpoch(app.state.robot?.epoch ?? null);
     if (this.scene.hasSettled(now) && app.ticker.isHeldUp(now)) this.dropScene(app);
+    if (this.scene.hasFailed && !this.sceneSwitch.isWanted) this.sceneSwitch.giveUp();
     this.sceneSwitch.update(app, now);
     this.showScene(app);
     this.scene.take(app.state.feedback);
@@ -151,7 +150,9 @@ export class ViewBoard {
   }
 
   private addView(view: View): void {
+    const hasScene = this.views.delete(SCENE);
     this.views.set(view.name, view);
+    if (hasScene) this.views.set(SCENE, this.sceneView);
     this.element.append(view.element);
     this.arrange();
   }
