@@ -1,7 +1,7 @@
 """The shell around the cores: one UDP port for many peers, on asyncio.
 
     async with Endpoint(["192.0.2.7"], 40000) as endpoint:
-        connection = endpoint.connect(offerer=False)
+        connection = endpoint.connect(controlling=False)
         answer = connection.answer(parse_description(offer), {"0": LocalMedia(...)})
         ... signalling brings write_description(answer) to the peer
         async for event in connection:
@@ -216,8 +216,8 @@ class Endpoint:
         self._number = found.address[1]
         self._loop.add_reader(found.fileno(), self._readable, found)
 
-    def connect(self, *, offerer: bool, settings: PeerSettings | None = None) -> Connection:
-        """A connection that is to be negotiated. Raises TooManyPeers."""
+    def connect(self, *, controlling: bool, settings: PeerSettings | None = None) -> Connection:
+        """A connection that is to be negotiated; `controlling` is as of `Peer`. Raises TooManyPeers."""
         if len(self._connections) >= self.settings.peers:
             raise TooManyPeers(f"{len(self._connections)} peers")
         epoch = time.time() - self._loop.time()
@@ -225,7 +225,7 @@ class Endpoint:
             self._context,
             self.certificate.fingerprint,
             gather(self._hosts, self._number, advertised=self._advertised),
-            offerer=offerer,
+            controlling=controlling,
             settings=replace(settings or self.settings.peer, epoch=epoch),
             directory=self.port.directory,
         )

@@ -93,7 +93,7 @@ class Peer:
         fingerprint: Fingerprint,
         candidates: Iterable[LocalCandidate],
         *,
-        offerer: bool,
+        controlling: bool,
         settings: PeerSettings | None = None,
         directory: Directory | None = None,
         random: Random | None = None,
@@ -102,7 +102,7 @@ class Peer:
         Args:
             context: from `rtc.dtls.dtls_context`; `fingerprint` is of its certificate.
             candidates: where the peer may reach us.
-            offerer: whether we make the offer; then we decide on the path (RFC 8445 6.1.1).
+            controlling: whether we decide on the path: who offers does, and who answers a lite agent (RFC 8445 6.1.1).
             directory: of the `rtc.ice.port.Port` whose sockets it shares.
             random: nobody may foresee it: a SystemRandom except in tests.
         """
@@ -110,7 +110,7 @@ class Peer:
         self.counts: Counter[str] = Counter()
         self._random = random or SystemRandom()
         self.ice = Agent(
-            candidates, controlling=offerer, settings=self.settings.ice, directory=directory, rng=self._random
+            candidates, controlling=controlling, settings=self.settings.ice, directory=directory, rng=self._random
         )
         self._context = context
         self._fingerprint = fingerprint
@@ -132,7 +132,13 @@ class Peer:
     # Negotiation
 
     def answer(self, offer: SessionDescription, media: Mapping[str, LocalMedia], now: float) -> SessionDescription:
-        """Our answer to a peer's offer. `media`: what we can do, by the offer's mid. Raises SdpError."""
+        """Our answer to a peer's offer. `media`: what we can do, by the offer's mid.
+
+        Raises:
+            SdpError: it cannot be answered; nothing has changed.
+            RuntimeError: this session was negotiated before.
+        """
+        self._check_new()
         answer = answer_to(
             offer,
             self._own_transport(),
@@ -144,7 +150,8 @@ class Peer:
         return answer
 
     def offer(self, media: Sequence[OfferedMedia], *, data: bool = True) -> SessionDescription:
-        """Our offer, with channels if `data`. The peer's answer goes to `accept`."""
+        """Our offer, with channels if `data`. The peer's answer goes to `accept`. Raises RuntimeError as `answer`."""
+        self._check_new()
         uris = dict.fromkeys(uri for each in media for uri in each.media.extensions)
         ids = dict(zip(uris, EXTENSION_IDS, strict=False))
         sections = [media_section(x.mid, x.kind, self._with_sources(x.mid, x.media), ids) for x in media]
@@ -168,6 +175,10 @@ class Peer:
             self.ice.add_remote_candidate(parse_candidate(line))
         except CandidateError:
             self.counts["candidate_malformed"] += 1
+
+    def _check_new(self) -> None:
+        if self._dtls is not None:
+            raise RuntimeError("this session is negotiated; another one is another peer")
 
     def _own_transport(self) -> Transport:
         credentials = self.ice.local_credentials
@@ -430,7 +441,8 @@ class Peer:
             return
         if self.channels is not None and dtls.state is DtlsState.CONNECTED:
             for packet in self.channels.packets_to_send():
-                dtls.send(packet, self._now)
+                if dtls.state is DtlsState.CONNECTED:  # it may end with any of them
+                    dtls.send(packet, self._now)
         sent = dtls.datagrams_to_send()
         if self.streams is not None and self._protect is not None:
             sent += self._protected(self._protect.protect_rtcp, self.streams.rtcp_to_send())

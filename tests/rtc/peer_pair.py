@@ -38,7 +38,7 @@ class PeerPair:
                 CONTEXTS[side],
                 CERTIFICATES[side].fingerprint,
                 gather([f"192.0.2.{side + 1}"], 4000),
-                offerer=side == 0,
+                controlling=side == 0,
                 settings=settings,
                 random=Random(random.random()),
             )

@@ -45,7 +45,7 @@ async def test_many_peers_share_one_port(endpoint: Endpoint) -> None:
         pairs = []
         for _ in range(5):
             other = await stack.enter_async_context(Endpoint([HOST]))
-            offerer, answerer = endpoint.connect(offerer=True), other.connect(offerer=False)
+            offerer, answerer = endpoint.connect(controlling=True), other.connect(controlling=False)
             offerer.accept(answerer.answer(offerer.offer(), {}))
             pairs.append((offerer, answerer))
         for number, (offerer, answerer) in enumerate(pairs):
@@ -67,12 +67,12 @@ async def until_ended(connection: Connection) -> PeerEvent:
 
 async def test_the_number_of_peers_is_bounded() -> None:
     async with Endpoint([HOST], settings=EndpointSettings(peers=1)) as endpoint:
-        connection = endpoint.connect(offerer=True)
+        connection = endpoint.connect(controlling=True)
         with pytest.raises(TooManyPeers):
-            endpoint.connect(offerer=True)
+            endpoint.connect(controlling=True)
         connection.close()
         assert await until_ended(connection) == PeerEnded("closed")
-        endpoint.connect(offerer=True)
+        endpoint.connect(controlling=True)
 
 
 class Strip(VideoStreamTrack):
@@ -111,7 +111,7 @@ async def test_aiortc_answers_and_gets_messages_and_pictures_with_header_extensi
         channel.on("message", received.put_nowait)
         channel.send("from aiortc")
 
-    connection = endpoint.connect(offerer=True)
+    connection = endpoint.connect(controlling=True)
     camera = LocalMedia((VP8, RTX), "sendonly", (MID_URI,), msid="camera track")
     try:
         offer = connection.offer([OfferedMedia("camera", "video", camera)])
@@ -143,7 +143,7 @@ async def test_aiortc_offers_and_sends_pictures_and_messages(endpoint: Endpoint)
     received: asyncio.Queue[str] = asyncio.Queue()
     theirs.on("open", lambda: theirs.send("from aiortc"))
     theirs.on("message", received.put_nowait)
-    connection = endpoint.connect(offerer=False)
+    connection = endpoint.connect(controlling=False)
     try:
         await pc.setLocalDescription(await pc.createOffer())
         offer = parse_description(pc.localDescription.sdp)

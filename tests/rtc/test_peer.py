@@ -199,6 +199,14 @@ def test_a_restart_of_ice_changes_nothing_else() -> None:
     assert not pair.of(0, PeerEnded)
 
 
+def test_a_session_is_negotiated_once() -> None:
+    pair = connected()
+    with pytest.raises(RuntimeError, match="negotiated"):
+        pair.peers[0].offer(SECTIONS)
+    with pytest.raises(RuntimeError, match="negotiated"):
+        pair.peers[1].answer(PeerPair().peers[0].offer(SECTIONS), {}, pair.now)
+
+
 def test_candidates_that_nobody_understands_are_counted() -> None:
     peer = PeerPair().peers[0]
     peer.add_candidate("candidate:nonsense")
