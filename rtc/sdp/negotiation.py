@@ -96,6 +96,7 @@ def _answered(
         return rejection_of(offered.kind, offered.mid, offered.protocol, offered.formats)
     direction = both(reverse(offered.direction), own.direction)
     sends = direction in ("sendrecv", "sendonly")
+    own = own if any(codec.repairs is not None for codec in codecs) else _without_repair(own)
     return MediaSection(
         kind=offered.kind,
         mid=offered.mid,
@@ -107,6 +108,17 @@ def _answered(
         source_groups=own.source_groups if sends else (),
         msid=own.msid if sends else "",
         reduced_size=offered.reduced_size,
+    )
+
+
+def _without_repair(own: LocalMedia) -> LocalMedia:
+    """RFC 4588 is not in use: its streams are not announced."""
+    groups = [group for group in own.source_groups if group.semantics == "FID"]
+    repairs = {ssrc for group in groups for ssrc in group.ssrcs[1:]}
+    return replace(
+        own,
+        sources=tuple(source for source in own.sources if source.ssrc not in repairs),
+        source_groups=tuple(group for group in own.source_groups if group not in groups),
     )
 
 

@@ -34,6 +34,7 @@ TARGETS = {
         ),
     ),
     "sdp": Target("tests.fuzz.sdp", ("server.offer", "server.whep", "aiortc.sdp")),
+    "rtc_dtls": Target("tests.fuzz.rtc_dtls", ("rtc.dtls",)),
     "rtc_sdp": Target("tests.fuzz.rtc_sdp", ("rtc.sdp",)),
     "ice": Target("tests.fuzz.ice", ("rtc.stun", "rtc.ice", "rtc.demux")),
     "sctp": Target("tests.fuzz.sctp", ("rtc.sctp", "rtc.channels", "rtc.dcep")),

@@ -120,8 +120,11 @@ async def test_chromium_offers_pictures_sound_and_a_channel(endpoint: Endpoint, 
             return pc.localDescription.sdp;
         }""")
     )
-    both = LocalMedia((VP8, RTX, OPUS), "sendrecv", URIS, msid="ours track")
-    answer = connection.answer(offer, {section.mid: both for section in offer.sections})
+    media = {
+        section.mid: LocalMedia((VP8, RTX, OPUS), "sendrecv", URIS, msid=f"ours {section.kind}")
+        for section in offer.sections
+    }
+    answer = connection.answer(offer, media)
     assert [section.rejected for section in answer.sections] == [False, False, False]
     await page.evaluate("sdp => pc.setRemoteDescription({type: 'answer', sdp})", write_description(answer))
     [_, opened] = await until(connection, is_a(Connected), is_a(ChannelOpened))

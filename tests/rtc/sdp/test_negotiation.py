@@ -59,6 +59,15 @@ def test_without_our_retransmission_there_is_none() -> None:
     assert [codec.name for codec in video.codecs] == ["VP8"]
 
 
+def test_streams_of_retransmissions_are_announced_where_there_are_any() -> None:
+    offer = parse_description(text_of("chromium").replace("a=recvonly", "a=sendrecv"))
+    streams = Source(7, {"cname": "x"}), Source(8, {"cname": "x"})
+    own = LocalMedia((VP8, OPUS, RTX), sources=streams, source_groups=(SourceGroup("FID", (7, 8)),))
+    video, audio, _ = answer_to(offer, TRANSPORT, {"0": own, "1": own}).sections
+    assert (video.sources, video.repair_source(7)) == (streams, 8)
+    assert (audio.sources, audio.source_groups) == (streams[:1], ())
+
+
 def test_a_section_without_a_codec_in_common_is_inactive_and_the_others_are_answered() -> None:
     offer = parsed("chromium")
     answer = answer_to(offer, TRANSPORT, {"0": LocalMedia((Codec(96, "VP10", 90_000), RTX)), "1": LocalMedia((OPUS,))})
