@@ -147,14 +147,14 @@ class Connection:
         if isinstance(event, PacketReceived) and waiting >= self._settings.waiting_packets:
             self.counts["packet_not_read"] += 1
             return
+        if waiting >= self._settings.waiting_events and not isinstance(event, PeerEnded):
+            self.counts["event_not_read"] += 1
+            self.peer.close(self._loop.time())
+            self._loop.call_soon(self.flush)
+            return
+        self._ended = isinstance(event, PeerEnded)
         self._waiting.append(event)
         self._arrived.set()
-        if isinstance(event, PeerEnded):
-            self._ended = True
-        elif waiting >= self._settings.waiting_events:
-            self.counts["events_not_read"] += 1
-            self.peer.close(self._loop.time())  # flushed with the next turn of the loop
-            self._loop.call_soon(self.flush)
 
     def _set_timer(self) -> None:
         if self._timer is not None:

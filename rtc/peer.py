@@ -36,6 +36,7 @@ from rtc.sdp import (
     LocalMedia,
     MediaSection,
     SessionDescription,
+    Setup,
     Source,
     SourceGroup,
     Transport,
@@ -65,6 +66,9 @@ class PeerSettings:
     ice: IceSettings = field(default_factory=IceSettings)
     dtls: DtlsSettings = field(default_factory=DtlsSettings)
     sctp: SctpSettings = field(default_factory=SctpSettings)
+    # Whether an answer of ours opens DTLS, where the offer leaves the choice (RFC 8842 5.3). The peer knows first that
+    # ICE has found a path, when it is the one that asks for one.
+    setup: Setup = "passive"
     epoch: float = 0.0  # s since 1970 at which the clock of `now` was 0; for sender reports
     held: int = 32  # datagrams of DTLS that overtake the description they need; a handshake has fewer
 
@@ -186,7 +190,7 @@ class Peer:
             ufrag=credentials.ufrag,
             password=credentials.password,
             fingerprints=(self._fingerprint,),
-            setup="passive",  # the peer knows first that ICE has found a path, if it is the one that asks
+            setup=self.settings.setup,
             candidates=tuple(local.candidate.line() for local in self.ice.local_candidates),
             end_of_candidates=True,
             ice_options=("trickle",),

@@ -10,7 +10,7 @@ from aiortc import RTCDataChannel, RTCPeerConnection, RTCSessionDescription, Vid
 from av import VideoFrame
 from av.frame import Frame
 
-from rtc.channels import ChannelMessage, ChannelOpened
+from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
 from rtc.endpoint import Connection, Endpoint, EndpointSettings, TooManyPeers
 from rtc.peer import OfferedMedia
 from rtc.peer_events import Connected, PacketReceived, PeerEnded, PeerEvent
@@ -73,6 +73,50 @@ async def test_the_number_of_peers_is_bounded() -> None:
         connection.close()
         assert await until_ended(connection) == PeerEnded("closed")
         endpoint.connect(controlling=True)
+
+
+async def test_what_an_application_does_not_read_is_bounded() -> None:
+    few = EndpointSettings(waiting_packets=10, waiting_events=40)
+    sound = LocalMedia((Codec(111, "opus", 48_000, 2),), extensions=(MID_URI,))
+    async with Endpoint([HOST]) as ours, Endpoint([HOST], settings=few) as theirs:
+        sender, lazy = ours.connect(controlling=True), theirs.connect(controlling=False)
+        lazy.urgent = True
+        answer = lazy.answer(sender.offer([OfferedMedia("sound", "audio", sound)]), {"sound": sound})
+        sender.accept(answer)
+        sender.add_candidate("candidate:1 1 udp 1 127.0.0.1 9 typ host")
+        await until(sender, of(Connected))
+        for number in range(50):
+            sender.send_frame("sound", [b"x"], number * 960, marker=False)
+        channel = sender.open_channel("x")
+        await until(sender, of(ChannelOpened))
+        assert lazy.counts["packet_not_read"] >= 40
+        for number in range(100):
+            sender.send(channel, str(number))
+        assert await until_ended(sender) == PeerEnded("peer_closed")
+        read = [event async for event in lazy]
+        assert read[-1] == PeerEnded("closed")
+        assert len(read) == 41
+        assert lazy.counts["event_not_read"] > 0
+
+
+async def test_a_channel_closes_at_both_ends(endpoint: Endpoint) -> None:
+    async with Endpoint([HOST]) as other:
+        offerer, answerer = endpoint.connect(controlling=True), other.connect(controlling=False)
+        offerer.accept(answerer.answer(offerer.offer(), {}))
+        await until(offerer, of(Connected))
+        channel = offerer.open_channel("x")
+        await until(answerer, of(ChannelOpened))
+        offerer.close_channel(channel)
+        assert await until(answerer, of(ChannelClosed)) == ChannelClosed(channel)
+        assert await until(offerer, of(ChannelClosed)) == ChannelClosed(channel)
+
+
+async def test_a_port_that_is_taken_is_an_error_and_leaves_nothing_open(endpoint: Endpoint) -> None:
+    [address] = endpoint._sockets
+    with pytest.raises(OSError, match="in use"):
+        Endpoint(["127.0.0.2", HOST], address[1])
+    async with Endpoint(["127.0.0.2"], address[1]):
+        pass
 
 
 class Strip(VideoStreamTrack):

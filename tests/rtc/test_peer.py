@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rtc.addresses import Path
 from rtc.certificate import Certificate
 from rtc.channels import ChannelMessage, ChannelOpened
-from rtc.peer import OfferedMedia, PeerNotReady
+from rtc.peer import OfferedMedia, PeerNotReady, PeerSettings
 from rtc.peer_events import Connected, MediaEvent, PacketReceived, PathFound, PeerEnded
 from rtc.rtp.stage import KeyframeRequested, Reception
 from rtc.sdp import MID_URI, Codec, LocalMedia, SdpError
@@ -205,6 +205,72 @@ def test_a_session_is_negotiated_once() -> None:
         pair.peers[0].offer(SECTIONS)
     with pytest.raises(RuntimeError, match="negotiated"):
         pair.peers[1].answer(PeerPair().peers[0].offer(SECTIONS), {}, pair.now)
+
+
+def test_a_handshake_that_overtakes_the_answer_is_kept_for_it() -> None:
+    pair = PeerPair(PeerSettings(setup="active"))
+    offerer, answerer = pair.peers
+    answer = answerer.answer(through_text(offerer.offer(SECTIONS)), {"camera": SCREEN}, pair.now)
+    assert answer.transport.setup == "active"
+    pair.run(0.5)
+    assert offerer.counts == {"dtls_early": 1}
+    offerer.accept(through_text(answer), pair.now)
+    pair.run(0.5)  # of this clock: nothing is repeated, as OpenSSL's own stands nearly still
+    assert pair.of(0, Connected)
+    assert pair.of(1, Connected)
+
+
+def test_what_comes_before_it_can_be_read_is_counted_and_bounded() -> None:
+    pair = PeerPair(PeerSettings(setup="active"))
+    offerer, answerer = pair.peers
+    answerer.answer(through_text(offerer.offer(SECTIONS)), {"camera": SCREEN}, pair.now)
+    pair.run(0.5)
+    path = Path(("192.0.2.1", 4000), ("192.0.2.2", 4000))
+    for _ in range(100):
+        offerer.receive_datagram(b"\x16" + bytes(20), path, pair.now)
+    offerer.receive_datagram(b"\x80" + bytes(20), path, pair.now)
+    offerer.receive_datagram(b"\x80" + bytes(20), Path(path.local, ("192.0.2.3", 4000)), pair.now)
+    assert offerer.counts == {"dtls_early": 101, "media_early": 1, "unknown_path": 1}
+    assert len(offerer._held) == 32
+
+
+def test_what_the_peer_sends_that_is_nothing_is_counted() -> None:
+    pair = connected()
+    sender, receiver = pair.peers
+    assert sender._protect is not None
+    path = receiver.ice.path
+    assert path is not None
+    protect, protect_rtcp = sender._protect.protect, sender._protect.protect_rtcp
+    malformed = b"\xb0" + bytes(3) + bytes(4) + b"\x00\x00\x00\x09" + b"\xbe\xde\x00\x01\x1f\x00\x00\x00" + b"\xff"
+    for data in (
+        protect(b"\x80\x21" + bytes(10)),
+        protect(malformed),
+        protect_rtcp(b"\x81\xc9\x00\x01\x00\x00\x00\x09"),
+        b"\x50zrtp",
+        b"\x80\x60" + bytes(30),
+    ):
+        receiver.receive_datagram(data, path, pair.now)
+    assert receiver.counts == {"unknown_protocol": 1}
+    assert receiver.streams is not None
+    assert receiver.streams.counts == {"rtp_unknown": 1, "rtp_malformed": 1, "rtcp_malformed": 1}
+    assert not pair.of(1, PeerEnded)
+
+
+def test_data_without_channels_and_packets_that_are_too_long_are_counted() -> None:
+    pair = PeerPair()
+    offerer, answerer = pair.peers
+    camera = replace(CAMERA, extensions=(*CAMERA.extensions, "urn:long"))
+    offer = offerer.offer([OfferedMedia("camera", "video", camera)], data=False)
+    answer = answerer.answer(through_text(offer), {"camera": replace(SCREEN, extensions=camera.extensions)}, pair.now)
+    offerer.accept(through_text(answer), pair.now)
+    pair.run(2)
+    offerer.send_frame("camera", [bytes(1200)], 0, pair.now, values={"urn:long": bytes(200)})
+    pair.run(0.1)
+    assert offerer.counts == {"packet_too_long": 1}
+    assert offerer._dtls is not None
+    offerer._dtls.send(b"data", pair.now)
+    pair.run(0.1)
+    assert answerer.counts == {"data_without_channels": 1}
 
 
 def test_candidates_that_nobody_understands_are_counted() -> None:

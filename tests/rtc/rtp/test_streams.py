@@ -4,12 +4,15 @@ from collections.abc import Callable
 from random import Random
 
 from rtc.rtp.extensions import ABS_SEND_TIME_URI
+from rtc.rtp.feedback import PictureLoss
 from rtc.rtp.history import RepairStream
 from rtc.rtp.incoming import IncomingParameters, IncomingStream
 from rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
 from rtc.rtp.packet import RtpPacket
-from rtc.rtp.rtcp import pack_rtcp, parse_rtcp
+from rtc.rtp.rtcp import ReceiverReport, SenderReport, SourceDescription, pack_rtcp, parse_rtcp
 from rtc.rtp.stage import KeyframeRequested, PacketsGone, RoundTrip
+from rtc.rtp.streams import Identity, NegotiatedMedia, Streams
+from rtc.sdp import Codec, MediaSection
 
 STAMP = "urn:stamp"
 IDS = {STAMP: 1, ABS_SEND_TIME_URI: 2}
@@ -156,3 +159,31 @@ def test_a_stream_without_repeats_keeps_nothing_and_still_reports_and_ends() -> 
         stream.rtp(RtpPacket(111, number, 0, 7), 0)
     stream.handle_timer(0.5)
     assert stream.controls_to_send() == []
+
+
+def test_reports_that_fill_more_than_a_datagram_go_in_several_that_each_begin_with_one() -> None:
+    codec = Codec(96, "VP8", 90_000, feedback=("nack",))
+    media = [
+        NegotiatedMedia(MediaSection("video", f"m{number}", codecs=(codec,)), "sendonly", 100 + number, 200 + number)
+        for number in range(40)
+    ]
+    streams = Streams(media, Identity("c" * 24, 1), PathShare(0.0), Random(1))
+    for number in range(40):
+        streams.outgoing[f"m{number}"].send([b"x"], 0, 0.0)
+    compounds = streams.rtcp_to_send()
+    assert len(compounds) > 1
+    assert max(map(len, compounds)) <= 1200
+    parsed = [parse_rtcp(each) for each in compounds]
+    assert all(isinstance(each[0], SenderReport | ReceiverReport) for each in parsed)
+    assert sum(isinstance(x, SenderReport) for each in parsed for x in each) == 40
+
+
+def test_feedback_alone_goes_behind_an_empty_report_and_a_name() -> None:
+    codec = Codec(96, "VP8", 90_000, feedback=("nack",))
+    media = [NegotiatedMedia(MediaSection("video", "m", codecs=(codec,)), "recvonly", 100, 200)]
+    streams = Streams(media, Identity("name", 1), PathShare(0.0), Random(1))
+    streams.receive_rtp(RtpPacket(96, 1, 0, 7).pack(), 0.0)
+    streams.incoming["m"].request_keyframe(0.0)
+    [compound] = streams.rtcp_to_send()
+    assert parse_rtcp(compound) == [ReceiverReport(1), SourceDescription(((1, "name"),)), PictureLoss(1, 7)]
+    assert [mid for mid, _ in streams.packets()] == ["m"]
