@@ -13,6 +13,7 @@ from rtc.ice.events import Ended, Event, PathChanged, RestartFailed
 from rtc.ice.role import Role
 from rtc.ice.session import Session
 from rtc.ice.settings import IceSettings
+from rtc.ice.token_bucket import TokenBuckets
 from rtc.stun import Kind, transaction_of, username_of
 
 __all__ = ["Agent"]
@@ -46,6 +47,8 @@ class Agent:
         self._settings = settings or IceSettings()
         self.local_candidates = tuple(local_candidates)[: self._settings.max_local_candidates]
         self.counts: Counter[str] = Counter()  # what was dropped, by reason
+        # Requests from paths that it has not claimed; `Port` asks before it passes one on.
+        self.unclaimed = TokenBuckets(self._settings.max_checks_per_second, self._settings.check_burst)
         self._directory = directory or Directory()
         self._rng = rng or SystemRandom()
         self._role = Role(controlling, self._rng.getrandbits(64))

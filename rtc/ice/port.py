@@ -5,7 +5,8 @@ size. The checks of that run from the cheap to the dear:
 
 1. A response must name a transaction that an agent has begun; a request must name a user that exists. Both are one look
    into a dictionary, and whoever has not seen our signalling cannot guess either.
-2. From a path that nobody has claimed, requests pass a rate limit for their source and one for all together.
+2. From a path that the agent has not claimed, requests pass a rate limit for their source, one for the agent, and one
+   for all together: whoever has a user's name, a peer of ours or somebody who listens, uses up that user's rate alone.
 3. The agent checks the integrity, and only then remembers anything.
 """
 
@@ -25,12 +26,12 @@ __all__ = ["Port", "PortSettings"]
 
 @dataclass(frozen=True, slots=True)
 class PortSettings:
-    """Bounds of what comes from paths that no agent has claimed."""
+    """Bounds of what comes from paths that its agent has not claimed."""
 
-    source_rate: float = 20.0  # requests a second of one address (IPv6: network): several browsers that connect
-    source_burst: float = 40.0
-    total_rate: float = 500.0  # requests a second of all together: 2 % of a core
-    total_burst: float = 500.0
+    source_rate: float = 100.0  # requests a second of one address (IPv6: network): several browsers that connect
+    source_burst: float = 200.0
+    total_rate: float = 1000.0  # requests a second of all together: 1.5 % of a core for their integrity
+    total_burst: float = 1000.0
     source_slots: int = 4096  # sources that share a slot share its rate
 
 
@@ -69,14 +70,14 @@ class Port:
         agent = self.directory.ufrags.get((username_of(data) or "").partition(":")[0])
         if agent is None:
             self.counts["unknown_username"] += 1
-        elif self.directory.claims.get(path) is not agent and not self._limit.take(path.remote[0], now):
+        elif self.directory.claims.get(path) is not agent and not self._limit.take(path.remote[0], agent, now):
             self.counts["requests_over_rate"] += 1
             agent = None
         return agent
 
 
 class SourceLimit:
-    """A rate for each source and one for all, in memory of a fixed size."""
+    """A rate for each source, each agent and all together, in memory of a fixed size."""
 
     def __init__(self, settings: PortSettings) -> None:
         # A dictionary of sources would grow with forged ones, or forget honest ones. Python seeds the hash of texts
@@ -84,8 +85,9 @@ class SourceLimit:
         self._sources = TokenBuckets(settings.source_rate, settings.source_burst, settings.source_slots)
         self._total = TokenBuckets(settings.total_rate, settings.total_burst)
 
-    def take(self, host: str, now: float) -> bool:
-        return self._sources.take(now, hash(source_of(host)) % len(self._sources)) and self._total.take(now)
+    def take(self, host: str, agent: Agent, now: float) -> bool:
+        slot = hash(source_of(host)) % len(self._sources)
+        return self._sources.take(now, slot) and agent.unclaimed.take(now) and self._total.take(now)
 
 
 def source_of(host: str) -> str:

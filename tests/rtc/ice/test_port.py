@@ -211,19 +211,40 @@ def footprint(network: PortNetwork, agent: Agent) -> tuple[int, int, int]:
     return len(seen), network.port.directory.size, sum(map(sys.getsizeof, seen.values()))
 
 
+def heard(network: PortNetwork, agent: Agent, requests: list[bytes], hosts: list[str]) -> int:
+    """How many of them are passed on, which come at once from these hosts in turn."""
+    paths = [Path(CONSOLE, (host, 9)) for host in hosts]
+    return sum(
+        network.port.route(data, paths[number % len(paths)], network.now) is agent
+        for number, data in enumerate(requests)
+    )
+
+
 def test_requests_from_paths_that_nobody_has_claimed_are_bounded_for_each_source_and_for_all() -> None:
     network = PortNetwork()
+    peers = [network.peer(f"192.0.2.{number + 1}") for number in range(30)]
+    forged = [[check(*peer, network.rng, "guessed") for _ in range(50)] for peer in peers]
+    one_source = sum(heard(network, peers[place][0], forged[place], ["203.0.113.9"]) for place in range(10))
+    assert one_source == 200
+    many = [f"203.0.{number % 250}.{number // 250}" for number in range(1000)]
+    rest = sum(heard(network, peers[place][0], forged[place], many[place * 30 :]) for place in range(10, 30))
+    assert one_source + rest == 1000
+    assert network.port.counts["requests_over_rate"] == 30 * 50 - 1000
+    network.now += 1
+    assert heard(network, peers[0][0], forged[0], ["203.0.113.9"]) == 50, "the rate comes back"
+
+
+def test_a_peer_that_forges_sources_for_its_own_name_keeps_nobody_from_connecting() -> None:
+    network = PortNetwork()
+    intruder = network.peer("192.0.2.66")
+    many = [f"203.0.{number % 250}.{number // 250}" for number in range(5000)]
+    assert heard(network, intruder[0], [check(*intruder, network.rng, "guessed")] * 5000, many) <= 100
     ours, theirs = network.peer("192.0.2.1")
-    forged = [check(ours, theirs, network.rng, "guessed") for _ in range(2000)]
-    heard = sum(network.port.route(data, Path(CONSOLE, ("203.0.113.9", 9)), network.now) is ours for data in forged)
-    assert heard == 40
-    heard += sum(
-        network.port.route(data, Path(CONSOLE, (f"203.0.{number % 256}.{number // 256}", 9)), network.now) is ours
-        for number, data in enumerate(forged)
-    )
-    assert heard <= 500
-    assert network.port.counts["requests_over_rate"] == 4000 - heard
-    assert network.port.route(forged[0], Path(CONSOLE, ("203.0.113.9", 9)), network.now + 1) is ours
+    for _ in range(100):
+        heard(network, intruder[0], [check(*intruder, network.rng)] * 50, many)
+        network.run(0.01)
+    assert ours.path is not None
+    assert theirs.path is not None
 
 
 def test_a_peer_that_has_its_path_is_heard_while_strangers_use_up_the_rate() -> None:
