@@ -390,6 +390,12 @@ class Peer:
                 self._end(event.reason)
         if self._dtls is not None:
             self._settle_dtls(self._dtls, now)
+        self._tell()
+
+    def _tell(self) -> None:
+        """What channels and streams have for the application; nothing after the end."""
+        if self._ended:
+            return
         if self.channels is not None:
             self._events += self.channels.events()
         if self.streams is not None:
@@ -427,10 +433,9 @@ class Peer:
         if self._ended:
             return
         self._collect()  # an alert or a close_notify may still go out
+        self._tell()
         self._ended = True
         self.ice.close()
-        if self.channels is not None:
-            self._events += self.channels.events()
         self._events.append(PeerEnded(reason, detail))
 
     # Inside: the way out

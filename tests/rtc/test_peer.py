@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 
 from rtc.addresses import Path
 from rtc.certificate import Certificate
-from rtc.channels import ChannelMessage, ChannelOpened
+from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
 from rtc.peer import OfferedMedia, PeerNotReady, PeerSettings
 from rtc.peer_events import Connected, MediaEvent, PacketReceived, PathFound, PeerEnded
 from rtc.rtp.stage import KeyframeRequested, Reception
+from rtc.sctp import Closed
 from rtc.sdp import MID_URI, Codec, LocalMedia, SdpError
 from tests.rtc.peer_pair import PeerPair, through_text
 
@@ -153,6 +154,20 @@ def test_who_closes_says_so_and_the_other_ends_as_well() -> None:
         peer.handle_timer(pair.now)
         assert peer.events() == []
         assert peer.datagrams_to_send() == []
+
+
+def test_what_came_before_the_end_is_told_before_it_and_nothing_after() -> None:
+    pair = connected()
+    sender, receiver = pair.peers
+    sender.send_frame("camera", [b"x"], 0, pair.now)
+    for data, path in sender.datagrams_to_send():
+        back = Path(path.remote, path.local)
+        receiver.receive_datagram(data, back, pair.now)
+    receiver.close(pair.now)
+    told = receiver.events()
+    assert [type(each) for each in told if not isinstance(each, ChannelClosed | Closed)] == [PacketReceived, PeerEnded]
+    assert isinstance(told[-1], PeerEnded)
+    assert receiver.events() == []
 
 
 def test_another_certificate_than_the_announced_one_ends_it_by_name() -> None:
