@@ -170,6 +170,7 @@ class Publisher:
             log.warning("publisher did not close in time", peer=self.id)
 
     async def _decode(self) -> None:
+        await self._connected.wait()  # who never connects costs no process
         why = await self._decoder.run(msgspec.json.encode(self.camera.spec) + b"\n")
         self.end(f"decoder {why}")
 

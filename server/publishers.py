@@ -9,7 +9,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge
 
 from server.access import Identity
 from server.audit_trail import AuditTrail
-from server.errors import AlreadyPublishing, CameraTaken, NotFound, ShuttingDown
+from server.errors import AlreadyPublishing, CameraTaken, NotFound, ShuttingDown, TooManyRequests
 from server.faults import Faults
 from server.media.published.published_camera import PublishedCamera
 from server.publisher import PacketOutcome, Publisher
@@ -18,7 +18,7 @@ __all__ = ["Publishers"]
 
 log = structlog.get_logger(__name__)
 
-LINK_ENDED = "the link has ended"
+MOST_CLOSING = 4  # publications that have ended, and whose connections and processes have not yet
 WORDS = {
     "deleted": "its publisher has left",
     "link ended": "its publisher's link has ended",
@@ -83,6 +83,7 @@ class Publishers:
             NotFound: no such camera.
             CameraTaken: somebody else publishes it.
             AlreadyPublishing: this link publishes.
+            TooManyRequests: publications end faster than they can be closed.
             ShuttingDown: the console ends.
         """
         if self._closing:
@@ -90,6 +91,8 @@ class Publishers:
         if wanted and wanted not in self._cameras:
             raise NotFound(f"no camera of that name; there are {', '.join(self._cameras)}")
         link = identity.token_id
+        if len(self._here) >= MOST_CLOSING + len(self._cameras):
+            raise TooManyRequests("publications that have ended are still being closed")
         before = next((each for each in self._here if each.identity.token_id == link and not each.ended), None)
         if link in self._reserved.values() or (before is not None and not before.stalled):
             raise AlreadyPublishing("this link publishes a camera already; DELETE its session first")

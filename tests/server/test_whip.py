@@ -11,6 +11,7 @@ import pytest
 from robot_bridge.protocol.console import Sources
 from server.offer import parse_fragment
 from server.publisher import Publisher
+from server.publishers import MOST_CLOSING
 from tests.server.media.published.publishing import TestPublisher
 from tests.server.offers import offer, section
 from tests.server.rig import Rig, TestPeer, eventually, running_console, running_rig
@@ -181,6 +182,21 @@ async def test_offers_at_once_for_one_camera_make_one_publisher() -> None:
         same = rig.token("operator")
         answers = await asyncio.gather(*(post(rig, same) for _ in range(4)))
         assert sorted(each.status_code for each in answers) == [201, 409, 409, 409]
+
+
+async def test_who_publishes_and_leaves_without_end_keeps_no_more_than_a_few_connections_open() -> None:
+    async with running_rig(whip="phone") as rig:
+        token = rig.token("operator")
+        statuses = set()
+        for _ in range(40):
+            answer = await post(rig, token)
+            statuses.add(answer.status_code)
+            assert len(publishers(rig)) <= MOST_CLOSING + 1
+            if answer.status_code == 201:
+                await rig.http.delete(answer.headers["location"], headers=token)
+        assert statuses <= {201, 429}
+        await eventually(lambda: publishers(rig) == [])
+        assert (await post(rig, token)).status_code == 201
 
 
 async def test_offers_of_one_link_are_limited_together_with_those_of_watching() -> None:

@@ -28,6 +28,7 @@ __all__ = ["PublishedPictures", "main"]
 MAX_PIXELS = 1920 * 1088
 MAX_RATE = 30.0  # Hz, of pictures that go on
 MIN_SIDE = 16  # pixels
+NICENESS = 10  # what a publisher sends may cost the console and its encoders nothing
 REMEMBERED = 64  # capture times of pictures that a decoder holds back
 DECODERS = {"H264": "h264", "VP8": "vp8"}
 
@@ -102,6 +103,7 @@ def decode_all(pictures: Iterable[Encoded], spec: SourceSpec, say: Callable[[Sai
 
 
 def main() -> None:
+    os.nice(NICENESS)
     source = sys.stdin.buffer
     spec = msgspec.json.Decoder(SourceSpec).decode(source.readline())
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
