@@ -242,14 +242,15 @@ function takeSeat(state: ConsoleState, seat: Seat, wallMs: number): void {
   note(state, "info", change.words, wallMs);
 }
 
-/** A camera that fails, one that works again, and who publishes one: each a line; not the first that is heard of it. */
+/** A camera that fails, one that works again, and who publishes one: each a line. The first state is none by itself. */
 function takeSources(state: ConsoleState, sources: readonly SourceStatus[], wallMs: number): void {
   for (const source of sources) {
     const before = state.sources.find((each) => each.stream === source.stream)?.state;
-    if (before === undefined || before === source.state || source.state === "connecting") continue;
+    if (before === source.state || source.state === "connecting") continue;
     const failed = sourceWords(source);
-    if (failed !== null) note(state, "warning", `${source.label}: ${failed}`, wallMs);
-    else if (before === "reconnecting") note(state, "info", `${source.label} is back`, wallMs);
+    if (failed !== null) {
+      if (before !== undefined) note(state, "warning", `${source.label}: ${failed}`, wallMs);
+    } else if (before === "reconnecting") note(state, "info", `${source.label} is back`, wallMs);
     else if (source.detail !== "") note(state, "info", `${source.label} is ${source.detail}`, wallMs);
   }
   state.sources = sources;

@@ -35,6 +35,12 @@ test("the log says who publishes a camera, and that they do no more", () => {
   ]);
 });
 
+test("who comes later is told by whom a camera is published", () => {
+  const state = createConsoleState();
+  applyMessage(state, { type: "sources", sources: [front("live", "published by Ann"), front("waiting")] }, 0);
+  expect(state.log.map((line) => line.text)).toEqual(["Front is published by Ann"]);
+});
+
 test("a source that fails and comes back is logged once each; one that connects at first is not", () => {
   const state = createConsoleState();
   const say = (...sources: SourceStatus[]): void => applyMessage(state, { type: "sources", sources }, 0);
