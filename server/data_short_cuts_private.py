@@ -5,8 +5,8 @@ aiortc does both right, in a dozen coroutines each; with two hundred observers t
 Whatever is not the plain case goes the long way: an association that is not up, a message of several chunks, anything
 that waits, was lost, or is to be repeated.
 
-What is used of aiortc, pinned by tests: what `RTCSctpTransport._send`, `._transmit`, `._receive_sack_chunk` and
-`._handle_data` do, and the state that they keep; `RTCDtlsTransport._send_data`.
+What is used of aiortc, pinned by tests: what `RTCSctpTransport._send`, `._transmit`, `._receive_sack_chunk`,
+`._update_rto` and `._handle_data` do, and the state that they keep; `RTCDtlsTransport._send_data`.
 """
 
 import time
@@ -49,6 +49,8 @@ class ShortCuts:
     def __init__(self, sctp: Any, acknowledgement: Callable[[], bytes]) -> None:
         self._sctp = sctp
         self._acknowledgement = acknowledgement
+        self._take_round_trip: Callable[[float], None] = sctp._update_rto
+        sctp._update_rto = self._round_trip
 
     def send(self, channel: RTCDataChannel, text: str) -> bool:
         """Send a message as `RTCSctpTransport._send` does. False, and nothing done, when it is not the plain case.
@@ -137,6 +139,14 @@ class ShortCuts:
         chunk._sent_time = time.time()
         sctp._flight_size += chunk._book_size
         return chunk
+
+    def _round_trip(self, seconds: float) -> None:
+        """A round trip as aiortc measures it, by the wall clock: one that was set meanwhile has measured nothing.
+
+        What takes longer than the timeout is sent again, and then it is no sample.
+        """
+        if 0 <= seconds <= 2 * self._sctp._rto:
+            self._take_round_trip(seconds)
 
     def _packet(self, chunks: bytes) -> bytes:
         sctp = self._sctp

@@ -64,11 +64,12 @@ class SentHistory:
     def on_its_way(self, number: int, now: float, round_trip: float) -> bool:
         """Whether packet `number` was sent again less than a round trip ago: the peer cannot have it yet."""
         again = self._repeated.get(number)
-        return again is not None and now - again < round_trip
+        return again is not None and 0 <= now - again < round_trip
 
     def spend(self, number: int, now: float) -> bool:
         """Whether one more packet may be retransmitted now; if so, that `number` is."""
-        self._budget = min(RETRANSMIT_BURST, self._budget + (now - self._budget_at) * RETRANSMIT_RATE)
+        passed = max(0.0, now - self._budget_at)  # a wall clock may be set back
+        self._budget = min(RETRANSMIT_BURST, self._budget + passed * RETRANSMIT_RATE)
         self._budget_at = now
         if self._budget < 1:
             return False

@@ -3,6 +3,7 @@
 import asyncio
 import inspect
 import random
+import time
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
@@ -98,6 +99,21 @@ async def test_everything_arrives_once_and_in_order_whatever_is_lost(ends: Ends)
         for text in expected:
             ends.server.send(text)
         assert [await ends.at_client.get() for _ in expected] == expected
+
+
+@pytest.mark.parametrize("jump", [3600.0, -3600.0, 20.0])
+async def test_a_wall_clock_that_is_set_does_not_make_repeats_come_later(
+    ends: Ends, jump: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await ends.exchange()
+    sctp: Any = ends.server.transport
+    before, wall = sctp._rto, time.time
+    ends.server.send("under way")
+    monkeypatch.setattr(time, "time", lambda: wall() + jump)
+    assert await ends.at_client.get() == "under way"
+    await ends.exchange()
+    assert not sctp._sent_queue
+    assert sctp._rto <= before
 
 
 async def test_an_acknowledgement_that_is_not_the_peers_is_not_believed(ends: Ends) -> None:

@@ -95,3 +95,13 @@ def test_the_memory_of_retransmissions_is_bounded() -> None:
         past.spend(i, float(i))
     assert not past.on_its_way(0, float(REPEATED), 1e9)
     assert past.on_its_way(1, float(REPEATED), 1e9)
+
+
+def test_a_wall_clock_that_is_set_back_does_not_end_repairs() -> None:
+    past = history([1] * 40)
+    for number in range(int(RETRANSMIT_BURST)):
+        assert past.spend(number, 10_000.0)
+    assert not past.spend(39, 10_000.0)
+    assert not past.on_its_way(0, 6400.0, 0.1), "it was sent again an hour from now"
+    past.spend(39, 6400.0)
+    assert past.spend(39, 6401.0)
