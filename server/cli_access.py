@@ -63,7 +63,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         """Make a link that ends after a while, and print it."""
         settings = make_settings(state_dir=state_dir)
         with_state = _state(settings)
-        now = time.time()
+        now = with_state.invitations.now()
         try:
             wanted = msgspec.convert(role, Role)
             seconds = parse_duration(expires)
@@ -87,8 +87,8 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
     @app.command()
     def invitations(state_dir: StateDirOption = None, as_json: Json = False) -> None:
         """List the links that were given."""
-        now = time.time()
-        found = _state(make_settings(state_dir=state_dir)).invitations.known.visible(None)
+        store = _state(make_settings(state_dir=state_dir)).invitations
+        now, found = store.now(), store.known.visible(None)
         if as_json:
             _print_json([_described(each, now) for each in found])
             return
@@ -103,8 +103,8 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         state_dir: StateDirOption = None,
     ) -> None:
         """End a link, those that were invited with it, and everything that is connected with them."""
-        now = time.time()
         state = _state(make_settings(state_dir=state_dir))
+        now = state.invitations.now()
         try:
             ended = state.invitations.update(lambda known: known.revoke(None, invitation_id, now))
         except ConsoleError as error:

@@ -1,7 +1,6 @@
 """The links that open the console."""
 
 import socket
-import time
 from collections.abc import Mapping
 from typing import NamedTuple, get_args
 
@@ -69,7 +68,7 @@ def listening_url(settings: Settings, listener: socket.socket) -> str:
 
 def console_links(settings: Settings, console: str, state: ConsoleState) -> ConsoleLinks:
     """One link for each role: the same as at the last start, while they are good for long enough."""
-    now = time.time()
+    now = state.invitations.now()
 
     def for_start(known: Invitations) -> dict[Role, Invitation]:
         return {role: known.for_start(role, settings.token_seconds, now) for role in get_args(Role)}

@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -125,6 +126,19 @@ def test_a_state_directory_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     result = _lockstep(tmp_path / "file", "invite")
     assert result.exit_code == 2
     assert "LOCKSTEP_STATE_DIR" in result.stderr
+
+
+def test_after_a_clock_that_was_years_ahead_an_invitation_is_good(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    true = time.time
+    _lockstep(tmp_path, "invite")
+    with monkeypatch.context() as wrong:
+        wrong.setattr(time, "time", lambda: true() + 20 * 365 * 86_400)
+        open_state(Settings(state_dir=tmp_path)).invitations.keep_time()
+    link = _lockstep(tmp_path, "invite", "--role", "operator").stdout.split()[-1]
+    access = open_state(Settings(state_dir=tmp_path)).access
+    assert access.verify(link.partition("=")[2]).role == "operator"
 
 
 def test_revoking_twice_is_no_error(tmp_path: Path) -> None:

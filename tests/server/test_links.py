@@ -51,6 +51,20 @@ def test_the_next_start_prints_the_same_links_until_one_is_revoked(state: Consol
     assert again.operator == links.operator
 
 
+def test_after_a_clock_that_was_years_ahead_the_links_that_are_printed_are_good(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    true = time.time
+    console_links(Settings(), "http://here", open_state(Settings(state_dir=tmp_path)))
+    with monkeypatch.context() as wrong:
+        wrong.setattr(time, "time", lambda: true() + 20 * 365 * 86_400)
+        open_state(Settings(state_dir=tmp_path)).invitations.keep_time()
+    state = open_state(Settings(state_dir=tmp_path))
+    links = console_links(Settings(), "http://here", state)
+    for role in ("operator", "observer", "supervisor"):
+        assert state.access.verify(getattr(links, role).partition("=")[2]).role == role
+
+
 def test_a_full_disk_does_not_keep_the_links_from_being_printed(
     state: ConsoleState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
