@@ -4,8 +4,7 @@ import asyncio
 
 from robot_bridge.bridge import Bridge
 from robot_bridge.protocol.console import Report, Seat, SeatRequest, SpeedCapState, Welcome
-from robot_bridge.protocol.messages import Command, Feedback
-from robot_bridge.protocol.serial import event_after
+from robot_bridge.protocol.messages import Feedback
 from robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
 from robot_bridge.settings import BridgeSettings
 from tests.server.rig import PATIENCE, TestPeer, running_console, running_rig
@@ -27,10 +26,7 @@ async def take_seat(peer: TestPeer) -> str:
 async def drive(peer: TestPeer, values: list[float], count: int = 1) -> Feedback:
     """Events one after the other, as fast as they are answered."""
     for _ in range(count):
-        known = peer.newest_feedback()
-        following = event_after(known.event)
-        peer.send("control", Command(event=following, issue=known.issue, nonce=known.nonce, values=values))
-        await peer.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
+        await peer.drive(values)
     return peer.newest_feedback()
 
 

@@ -15,7 +15,8 @@ from fastapi import FastAPI
 from robot_bridge.bridge import Bridge
 from robot_bridge.protocol.console import ClientMessage, Role, ServerMessage, decode_server_message
 from robot_bridge.protocol.console import encode_console_message as encode
-from robot_bridge.protocol.messages import Feedback, StopState
+from robot_bridge.protocol.messages import Command, Feedback, Refusal, StopState
+from robot_bridge.protocol.serial import event_after
 from robot_bridge.robots.registry import create_robot
 from robot_bridge.settings import BridgeSettings
 from server.access import Access
@@ -41,6 +42,7 @@ __all__ = [
 ]
 
 PATIENCE = 30.0  # s; a busy machine, never waited for in full
+HELD_UP = ("late", "not_neutral", "unseen")  # refusals that follow when a busy machine held the robot or us up
 
 
 @dataclass
@@ -150,6 +152,29 @@ class TestPeer:
 
     def newest_feedback(self) -> Feedback:
         return next(each for each in reversed(self.heard) if isinstance(each, Feedback))
+
+    async def drive(self, values: list[float]) -> Feedback:
+        """The next event, with these values. A robot that was held up gets the neutral command first that it wants."""
+        while (executed := await self._executed(values)) is None:
+            await self._executed([0.0] * len(values))
+        return executed
+
+    async def _executed(self, values: list[float]) -> Feedback | None:
+        """None: it was refused, because somebody was held up."""
+        now = self.newest_feedback()
+        event = event_after(now.event)
+        old = {id(each) for each in self.heard if isinstance(each, Refusal)}
+        self.send("control", Command(event=event, issue=now.issue, nonce=now.nonce, values=values))
+
+        def answers(each: ServerMessage) -> bool:
+            return isinstance(each, Feedback | Refusal) and each.event == event and id(each) not in old
+
+        answer = await self.until(answers)
+        if isinstance(answer, Refusal):
+            assert answer.reason in HELD_UP, answer
+            return None
+        assert isinstance(answer, Feedback)
+        return answer
 
     async def close(self) -> None:
         await self.pc.close()

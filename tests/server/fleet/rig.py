@@ -11,8 +11,6 @@ import httpx
 from aiortc import RTCPeerConnection
 
 from robot_bridge.protocol.console import Role, Seat, SeatRequest
-from robot_bridge.protocol.messages import Command
-from robot_bridge.protocol.serial import event_after
 from server.fleet.fleet import Fleet
 from server.fleet.fleet_app import create_fleet_app
 from server.fleet.robots import robot_settings
@@ -122,7 +120,4 @@ async def drive_once(peer: TestPeer) -> int:
     peer.send("session", SeatRequest())
     await peer.until(lambda each: isinstance(each, Seat) and each.holder != "")
     now = await peer.feedback()
-    following = event_after(now.event)
-    peer.send("control", Command(event=following, issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes)))
-    await peer.feedback(lambda each: each.event == following)
-    return following
+    return (await peer.drive([0.0] * len(now.axes))).event

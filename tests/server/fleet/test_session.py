@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from robot_bridge.protocol.console import Notice, SilenceStops
-from robot_bridge.protocol.messages import Command
 from robot_bridge.protocol.serial import event_after
 from server.audit import Actor
 from server.fleet import session
@@ -95,11 +94,7 @@ async def test_a_session_that_fails_is_started_again_and_no_other_notices(faults
         assert 'lockstep_fleet_session_failures_total{robot="left"} 1.0' in text
         assert rig.session("right") is untouched
         assert not peer.closed.is_set()
-        now = peer.newest_feedback()
-        peer.send(
-            "control", Command(event=event_after(event), issue=now.issue, nonce=now.nonce, values=[0.0] * len(now.axes))
-        )
-        await peer.feedback(lambda each: each.event == event_after(event))
+        assert (await peer.drive([0.0, 0.0, 0.0])).event == event_after(event)
 
 
 async def test_a_stop_at_a_robot_whose_session_has_failed_is_kept_and_done_first_by_the_next(faults: Faults) -> None:
