@@ -248,7 +248,7 @@ class Session:
         has recorded it. It may show a path, which counts for nothing until the peer has answered there; it is no sign
         of consent, and does not choose among paths that work.
         """
-        pair = self._list.pairs.get(path) or self._pair_shown_by(request, path)
+        pair = self._list.pairs.get(path) or self._pair_shown_by(request, path, now)
         if pair is None:
             return
         pair.heard = True
@@ -271,11 +271,11 @@ class Session:
         if len(self._seen) > self._settings.remembered_checks:
             del self._seen[next(iter(self._seen))]
 
-    def _pair_shown_by(self, request: Message, path: Path) -> Pair | None:
+    def _pair_shown_by(self, request: Message, path: Path, now: float) -> Pair | None:
         """A pair that is not in the check list. Its address may be new: a peer-reflexive candidate (7.3.1.3)."""
         remote = self._remotes.at(path)
         if remote is None:
-            if not self._make_place_for_reflexive():
+            if not self._make_place_for_reflexive(now):
                 self._counts["too_many_addresses"] += 1
                 return None
             remote = self._remotes.add_reflexive(path, request.priority or 1)
@@ -283,12 +283,12 @@ class Session:
         self._drop(self._list.trim(self._role.controlling, self.selected))
         return self._list.pairs.get(path)
 
-    def _make_place_for_reflexive(self) -> bool:
-        """An address that has never answered gives way to a new one; one that has answered never does."""
+    def _make_place_for_reflexive(self, now: float) -> bool:
+        """An address that has not answered of late gives way to a new one: the peer has left it, or was never there."""
         crowd = self._remotes.must_give_way()
         for candidate in crowd:
             pairs = [pair for pair in self._list.pairs.values() if pair.remote is candidate]
-            if all(pair.answered_at is None for pair in pairs):
+            if not any(pair is self.selected or self._is_fresh(pair, now) for pair in pairs):
                 self._remotes.remove(candidate)
                 for pair in pairs:
                     del self._list.pairs[pair.path]

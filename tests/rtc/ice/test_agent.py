@@ -105,6 +105,20 @@ def test_a_peer_whose_nat_gives_it_another_port_is_followed_at_its_next_check() 
     assert not ends(network, there)
 
 
+def test_a_peer_that_moves_again_and_again_is_followed_every_time() -> None:
+    network = Network()
+    here, there = agent_at("10.0.0.9", controlling=True), agent_at(THERE[0])
+    network.translate = nat("10.0.0.9", "203.0.113.50", 61000)
+    connect(network, here, there)
+    for port in range(61001, 61101):
+        network.translate = nat("10.0.0.9", "203.0.113.50", port)
+        moved = Path(THERE, ("203.0.113.50", port))
+        assert network.run(12, lambda moved=moved: there.path == moved)  # type: ignore[misc]
+    assert there._directory.size < 60
+    assert not ends(network, here)
+    assert not ends(network, there)
+
+
 def test_an_advertised_address_is_a_way_in() -> None:
     network = Network()
     there = Agent(gather(["10.0.0.5"], 5000, advertised=[Advertised("203.0.113.7")]), controlling=False, rng=Random(1))
@@ -207,6 +221,33 @@ def test_a_peer_may_name_only_so_many_candidates() -> None:
         agent.handle_timer(tick * 0.01)
         addresses |= {datagram.remote for datagram in agent.datagrams_to_send()}
     assert len(addresses) == 32
+
+
+def test_the_pairs_to_check_are_bounded_and_the_best_stay() -> None:
+    agent = agent_at(*(f"192.0.2.{number}" for number in range(1, 9)), controlling=True)
+    many = [Candidate("1", 1, "udp", 1 + place, "203.0.113.7", 1 + place, "host") for place in range(32)]
+    agent.set_remote(new_credentials(), many, 0.0)
+    checked = []
+    for tick in range(1000):
+        agent.handle_timer(tick * 0.01)
+        checked += [datagram.path for datagram in agent.datagrams_to_send()]
+    assert len(set(checked)) == 100
+    assert checked[0].remote == ("203.0.113.7", 32)
+
+
+def test_a_check_that_is_refused_is_not_repeated_until_the_peer_checks() -> None:
+    network = Network(conditions=Conditions(cut=True))
+    here, there = agent_at(HERE[0], controlling=True), agent_at(THERE[0])
+    connect(network, here, there)
+    network.run(0.1)
+    question = parse(next(each.data for _, each in network.sent if each.local == HERE))
+    refusal = Message(Kind.ERROR, question.transaction, error=StunErrorCode(400))
+    network.inject(serialize(refusal, there.local_credentials.password), Path(HERE, THERE))
+    began = len(network.sent)
+    network.run(10)
+    assert not [each for _, each in network.sent[began:] if each.local == HERE]
+    network.conditions.cut = False
+    assert network.run(20, lambda: settled(network, here))
 
 
 # Consent
