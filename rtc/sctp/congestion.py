@@ -10,7 +10,6 @@ class CongestionWindow:
 
     def __init__(self, settings: SctpSettings) -> None:
         self._packet = settings.max_packet
-        self._floor = settings.window_floor * settings.max_packet
         self._partial = 0  # bytes acknowledged since the window last grew
         self._recovery_ends: int | None = None  # at the acknowledgement of this TSN
         self.size = settings.initial_window * settings.max_packet
@@ -40,11 +39,11 @@ class CongestionWindow:
             self.size = self.threshold
 
     def expired(self) -> None:
-        """Nothing came back at all, twice (7.2.3; the floor is `SctpSettings.window_floor`)."""
+        """Nothing came back at all, twice (7.2.3). `SctpSettings.window_floor` is the sender's."""
         self._halve()
         self._recovery_ends = None
-        self.size = self._floor
+        self.size = self._packet
 
     def _halve(self) -> None:
-        self.threshold = max(self.size // 2, 4 * self._packet, self._floor)
+        self.threshold = max(self.size // 2, 4 * self._packet)
         self._partial = 0

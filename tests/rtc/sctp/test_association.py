@@ -30,12 +30,13 @@ from rtc.sctp.chunks import (
     Init,
     InitAck,
     InterleavedData,
+    Reconfig,
     Sack,
     Skip,
     Unknown,
 )
 from rtc.sctp.packet import decode_packet, encode_packet
-from rtc.sctp.parameters import STATE_COOKIE, UNRECOGNIZED_PARAMETER
+from rtc.sctp.parameters import OUTGOING_RESET_REQUEST, RECONFIG_RESPONSE, STATE_COOKIE, UNRECOGNIZED_PARAMETER
 from tests.rtc.sctp.hostile import Victim
 from tests.rtc.sctp.network import Link, World, associated, seeded
 
@@ -98,6 +99,14 @@ def test_an_answer_to_a_repeated_init_is_no_round_trip() -> None:
     world.ends[0].start(0.0)
     world.run(10.0)
     assert world.ends[0].round_trip.smoothed == pytest.approx(0.8)
+
+
+def test_the_wait_for_a_lost_init_is_no_round_trip() -> None:
+    world = pair()
+    world.links[0].lose = lambda number, packet: number == 0
+    world.ends[0].start(0.0)
+    world.run(3.0)
+    assert world.ends[0].round_trip.smoothed == pytest.approx(0.1)
 
 
 def test_a_repeated_init_and_cookie_are_answered_again_without_effect() -> None:
@@ -336,7 +345,66 @@ def test_a_closed_receive_window_is_probed_with_one_packet_at_a_time() -> None:
     assert len(victim.wait(0.6)) == 1
 
 
+def test_a_path_that_becomes_slower_than_every_timeout_is_measured_again() -> None:
+    """Each message is repeated before it can be acknowledged, which leaves no sample by Karn's rule."""
+    world, first, second = associated(seconds=3.0)
+    world.links = (Link(delay=1.5), Link(delay=1.5))
+    for _ in range(120):
+        first.send(0, 51, b"x", world.now)
+        world.run(world.now + 1.0)
+    assert first.round_trip.smoothed == pytest.approx(3.0, rel=0.1)
+    repeats = first.counts["repeats"]
+    for _ in range(20):
+        first.send(0, 51, b"x", world.now)
+        world.run(world.now + 1.0)
+    assert first.counts["repeats"] == repeats
+    world.run(world.now + 10.0)
+    assert len(second.events()) == 140
+
+
+def test_what_a_peer_had_acknowledged_and_dropped_is_sent_again() -> None:
+    """RFC 9260 6.2.1 D iii."""
+    victim = Victim()
+    for _ in range(3):
+        victim.end.association.send(1, 53, bytes(1000), victim.now)
+    assert len(victim.wait(0.0)) == 3
+    victim.say(Sack(victim.theirs - 1, 100_000, [(2, 3)]))
+    victim.say(Sack(victim.theirs - 1, 100_000))
+    again = [packet for _ in range(4) for packet in victim.wait(1.6)]
+    sent = {chunk.tsn for packet in again for chunk in decode_packet(packet).chunks if isinstance(chunk, Data)}
+    assert sent == {victim.theirs, victim.theirs + 1, victim.theirs + 2}
+
+
+def test_streams_take_turns() -> None:
+    world, first, second = associated(SctpSettings(interleaving=False))
+    for _ in range(10):
+        first.send(0, 53, bytes(16_000), world.now)
+    first.send(1, 53, b"short", world.now)
+    world.run(world.now + 10.0)
+    assert [event.stream for event in second.events() if isinstance(event, MessageReceived)][:2] == [0, 1]
+
+
+def test_two_messages_with_one_number_are_one() -> None:
+    victim = Victim()
+    victim.say(Data(victim.tsn + 1, WHOLE, 0, 2, 51, b"two"))
+    victim.say(Data(victim.tsn + 2, WHOLE, 0, 2, 51, b"another two"))
+    victim.say(Data(victim.tsn, WHOLE, 0, 1, 51, b"one"))
+    assert [getattr(event, "data", None) for event in victim.events][-2:] == ["one", "two"]
+    assert victim.end.association._receiver.reassembly.held == 0
+
+
 # Partial reliability
+
+
+def test_a_message_whose_time_has_passed_is_not_repeated() -> None:
+    world, first, second = associated()
+    world.links[0].cuts.append((world.now, world.now + 1.0))
+    first.send(0, 51, b"late", world.now, lifetime=0.2)
+    world.run(world.now + 5.0)
+    first.send(0, 51, b"next", world.now, lifetime=0.2)
+    world.run(world.now + 1.0)
+    assert second.events() == [MessageReceived(0, 51, b"next")]
+    assert first._sender.idle
 
 
 def test_many_messages_that_were_given_up_are_told_of_in_one_forward_tsn() -> None:
@@ -437,6 +505,31 @@ def test_streams_are_reset_after_their_last_message_and_begin_anew() -> None:
     first.send(4, 51, b"anew", world.now)
     world.run(world.now + 5.0)
     assert second.events() == [MessageReceived(4, 51, b"anew")]
+
+
+def results(packets: list[bytes]) -> list[int]:
+    chunks = (chunk for packet in packets for chunk in decode_packet(packet).chunks if isinstance(chunk, Reconfig))
+    return [value[7] for chunk in chunks for kind, value in chunk.parameters if kind == RECONFIG_RESPONSE]
+
+
+def test_a_reset_waits_for_the_messages_before_it() -> None:
+    victim = Victim()
+    number = victim.end.association._resets._peer_number
+    request = b"".join((value & 0xFFFFFFFF).to_bytes(4, "big") for value in (number, 0, victim.tsn)) + b"\0\0"
+    assert results(victim.say(Reconfig([(OUTGOING_RESET_REQUEST, request)]))) == [6]
+    assert results(victim.say(Reconfig([(OUTGOING_RESET_REQUEST, request)]))) == [6]
+    assert results(victim.say(Data(victim.tsn, WHOLE, 0, 1, 51, b"last"))) == [1]
+    assert results(victim.say(Reconfig([(OUTGOING_RESET_REQUEST, request)]))) == [1]
+    assert [getattr(event, "data", None) for event in victim.events][-1] == "last"
+
+
+@pytest.mark.parametrize(("kind", "result"), [(14, 2), (15, 2), (17, 1), (18, 2)])
+def test_other_requests_are_answered_once_in_their_turn(kind: int, result: int) -> None:
+    victim = Victim()
+    number = (victim.end.association._resets._peer_number & 0xFFFFFFFF).to_bytes(4, "big")
+    for _ in range(2):
+        assert results(victim.say(Reconfig([(kind, number + bytes(4))]))) == [result]
+    assert results(victim.say(Reconfig([(kind, b"\x7f" + number[1:] + bytes(4))]))) == [5]
 
 
 # The end
