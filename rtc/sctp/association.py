@@ -29,7 +29,7 @@ from rtc.sctp.chunks import (
 )
 from rtc.sctp.errors import AssociationClosed, MessageTooLarge, ProtocolViolation, SctpParseError
 from rtc.sctp.events import Closed, Established, Event, OutgoingStreamsReset, StreamsReset
-from rtc.sctp.handshake import CookieJar, PeerInit, own_parameters, read_init, unrecognized
+from rtc.sctp.handshake import Cookies, PeerInit, own_parameters, read_init, unrecognized
 from rtc.sctp.heartbeat import Heartbeats
 from rtc.sctp.packet import COMMON_HEADER, Packet, decode_packet, encode_packet
 from rtc.sctp.parameters import (
@@ -117,7 +117,7 @@ class Association:
         self.now = 0.0  # the last that was handed in
         self._peer_port = settings.port if peer_port is None else peer_port
         self._tag = int.from_bytes(random_bytes(4), "big") or 1
-        self._cookies = CookieJar(random_bytes(32), settings.cookie_lifetime)
+        self._cookies = Cookies(random_bytes(32), settings.cookie_lifetime)
         self._initial_tsn = int.from_bytes(random_bytes(4), "big")
         self._sender = Sender(settings, self.round_trip, self._initial_tsn, self.counts)
         self._peer: PeerInit | None = None

@@ -17,7 +17,7 @@ from rtc.sctp.parameters import (
 )
 from rtc.sctp.settings import SctpSettings
 
-__all__ = ["CookieJar", "PeerInit", "own_parameters", "read_init", "unrecognized"]
+__all__ = ["Cookies", "PeerInit", "own_parameters", "read_init", "unrecognized"]
 
 SMALLEST_WINDOW = 1500  # RFC 9260 3.3.2
 
@@ -85,7 +85,7 @@ def unrecognized(parameters: Iterable[Parameter]) -> list[Parameter]:
     return found
 
 
-class CookieJar:
+class Cookies:
     """Cookies hold all that is known of a peer that is not there yet, so that nothing is kept for it (5.1.3).
 
     They have a MAC and end after a time. Behind DTLS nobody can forge or spoof anything; what remains is a peer that

@@ -8,7 +8,7 @@ from rtc.sctp.parameters import encode_parameters
 __all__ = ["Heartbeats"]
 
 INFO = 1  # RFC 9260 3.3.5
-PATIENCE = 5.0  # s, after which another one may be sent
+LOST_AFTER = 5.0  # s, after which another one may be sent
 
 _number = Struct("!Q")
 
@@ -24,7 +24,7 @@ class Heartbeats:
 
     def ask(self, now: float) -> Heartbeat | None:
         """One to send; None while another is under way."""
-        if self._waits_for and now - self._sent_at < PATIENCE:
+        if self._waits_for and now - self._sent_at < LOST_AFTER:
             return None
         self._count += 1
         self._waits_for = encode_parameters([(INFO, _number.pack(self._count))])

@@ -9,8 +9,8 @@ __all__ = ["RoundTrip"]
 
 SHORT = 8  # samples, of which the shortest is the path's own round trip, and not an outage's
 LONG = 32  # samples, of which the longest is what the path's jitter does
-MOST_PATIENCE = 8.0
-PATIENCE_LASTS = 30.0  # s, after which half of it is given back
+LARGEST_FACTOR = 8.0
+FACTOR_LASTS = 30.0  # s, after which half of it is given back
 
 
 class RoundTrip:
@@ -26,8 +26,8 @@ class RoundTrip:
         self._settings = settings
         self._variation = 0.0
         self._latest: deque[float] = deque(maxlen=LONG)
-        self._patience = 1.0
-        self._impatient_at = 0.0
+        self._factor = 1.0
+        self._factor_ends = 0.0
         self._probe = settings.initial_timeout
         self._ceiling = settings.timeout_ceiling
         self.smoothed: float | None = None  # s
@@ -46,25 +46,25 @@ class RoundTrip:
             self.smoothed += (seconds - self.smoothed) / 8
         self._latest.append(seconds)
         self.sampled_at = now
-        if self._patience > 1.0 and now >= self._impatient_at:
-            self._patience /= 2
-            self._impatient_at = now + PATIENCE_LASTS
+        if self._factor > 1.0 and now >= self._factor_ends:
+            self._factor /= 2
+            self._factor_ends = now + FACTOR_LASTS
         self._decide()
 
     def needless(self, now: float) -> None:
         """The peer had a chunk already that was repeated."""
-        self._patience = min(2 * self._patience, MOST_PATIENCE)
-        self._impatient_at = now + PATIENCE_LASTS
+        self._factor = min(2 * self._factor, LARGEST_FACTOR)
+        self._factor_ends = now + FACTOR_LASTS
         self._decide()
 
     def _decide(self) -> None:
         if self.smoothed is None:
             return
-        settings, patience = self._settings, self._patience
+        settings, factor = self._settings, self._factor
         longest, extra = max(self._latest), self.smoothed / 8
         self.reordering = longest + extra
-        wanted = max(4 * self._variation, longest - self.smoothed + max(settings.margin_floor, extra) * patience)
-        most = (self.smoothed / 2 + settings.margin_ceiling) * patience
+        wanted = max(4 * self._variation, longest - self.smoothed + max(settings.margin_floor, extra) * factor)
+        most = (self.smoothed / 2 + settings.margin_ceiling) * factor
         if len(self._latest) < SHORT:
             wanted = most  # too few to know the jitter
         self._ceiling = max(settings.timeout_ceiling, 2 * min(islice(reversed(self._latest), SHORT)))
