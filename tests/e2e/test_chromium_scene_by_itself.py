@@ -84,6 +84,14 @@ async def test_the_scene_drawn_by_the_page_shows_no_newer_event_than_the_picture
         await console.page.locator('[data-view="3D scene"] .veil-words').get_by_text("events behind").wait_for()
 
 
+async def test_the_scene_is_veiled_while_nothing_is_heard_of_the_robot(stack: Stack, chromium: Browser) -> None:
+    async with open_on_machine(chromium, stack.observer) as console:
+        await console.until_live()
+        await console.until(DRAWN, 30)
+        with stack.frozen_console():
+            await console.page.locator('[data-view="3D scene"] .veil-words').get_by_text("No feedback for").wait_for()
+
+
 async def test_it_stays_away_and_leaves_no_box_without_graphics_on_a_phone_or_where_data_is_dear(
     stack: Stack, chromium: Browser
 ) -> None:

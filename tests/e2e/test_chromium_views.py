@@ -100,6 +100,7 @@ async def test_on_small_screens_no_box_is_empty_and_the_large_picture_has_its_ro
         phone = await _look(console, PHONE)
         _check(phone, "phone")
         assert [view["name"] for view in phone["views"]] == ["overview", "front"]
+        assert phone["gauges"] == []
         for size in (TURNED, ZOOMED):
             looked = await _look(console, size)
             large, small = looked["views"]
@@ -107,6 +108,20 @@ async def test_on_small_screens_no_box_is_empty_and_the_large_picture_has_its_ro
             assert not small["empty"]
             if size == TURNED:
                 assert small["x"] >= large["x"] + large["picture"] - 1, "it lies beside the picture, not over it"
+
+
+async def test_on_a_phone_the_scene_that_somebody_asked_for_has_a_place_beside_the_small_pictures(
+    stack: Stack, chromium: Browser
+) -> None:
+    chosen = "localStorage.setItem('lockstep.scene', 'shown')"
+    async with open_on_machine(
+        chromium, stack.operator, renderer=None, touch=True, width=390, height=844, scripts=(chosen,)
+    ) as console:
+        await console.until("window.lockstep.scene().state === 'drawn'", 60)
+        phone = await _look(console, PHONE)
+        _check(phone, "phone")
+        assert [view["name"] for view in phone["views"]] == ["overview", "front", "3D scene"]
+        assert phone["gauges"] == []
 
 
 async def test_a_view_taken_large_changes_places_with_the_large_one(stack: Stack, chromium: Browser) -> None:

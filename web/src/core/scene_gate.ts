@@ -75,9 +75,14 @@ export function sceneDue(context: GateContext, picture: number | null): number |
   return Math.abs(eventGap(feedback, picture)) <= tolerance ? picture : feedback;
 }
 
-/** Why the scene must not be trusted; null when it may. */
-export function sceneStaleness(gate: Pick<SceneGate, "shown">, context: GateContext): string | null {
+/** Why the scene must not be trusted; null when it may. `age`: of the feedback, once that is too old; null before. */
+export function sceneStaleness(
+  gate: Pick<SceneGate, "shown">,
+  context: GateContext,
+  age: string | null,
+): string | null {
   if (gate.shown === null) return "Waiting for the robot's state";
+  if (age !== null) return `No feedback for ${age}`;
   if (context.gate !== "event" || context.feedback === null) return null;
   const gap = eventGap(context.feedback, gate.shown);
   if (Math.abs(gap) <= context.tolerance) return null;

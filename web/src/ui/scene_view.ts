@@ -138,11 +138,11 @@ export class SceneView {
     setText(this.words, this.drawing.state === "failed" && !this.isFull ? FAILED : this.frameWords());
   }
 
-  /** Why it must not be trusted; null when it may, or shows nothing. */
-  staleness(): string | null {
+  /** Why it must not be trusted; null when it may, or shows nothing. `age`: of the feedback, once that is too old. */
+  staleness(age: string | null): string | null {
     const { shown } = this;
     const showsNothing = this.frameState !== "on" && this.drawing.state !== "on";
-    return showsNothing ? null : sceneStaleness({ shown }, this.page.context());
+    return showsNothing ? null : sceneStaleness({ shown }, this.page.context(), age);
   }
 
   /** Whether joints of what is shown were not measured. */

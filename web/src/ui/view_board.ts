@@ -1,5 +1,6 @@
 import type { ConsoleApp } from "../console_app";
 import { note, robotIsUp } from "../core/console_state";
+import { staleAge } from "../core/freshness";
 import { sourceWords } from "../core/source_words";
 import { planViews, smallShape } from "../core/view_room";
 import { stalenessOf } from "../statistics";
@@ -74,7 +75,7 @@ export class ViewBoard {
     this.scene.update();
     for (const view of this.views.values())
       if (view.canvas !== null) showVeil(app, view, now);
-      else this.showSceneVeil(app, view);
+      else this.showSceneVeil(app, view, now);
     if (this.shapes !== this.shapesNow()) this.fit();
   }
 
@@ -97,9 +98,9 @@ export class ViewBoard {
   }
 
   /** The scene is judged like a picture: by how far its event is from the feedback. */
-  private showSceneVeil(app: ConsoleApp, view: View): void {
+  private showSceneVeil(app: ConsoleApp, view: View, now: number): void {
     const { event, gap } = this.scene.statistics();
-    const staleness = this.scene.staleness();
+    const staleness = this.scene.staleness(staleAge(app.measuredMs, now));
     const words = event === null && staleness === null ? null : (unreachableWords(app) ?? staleness);
     setHidden(view.veil, words === null);
     view.element.classList.toggle("is-stale", words !== null);

@@ -92,11 +92,18 @@ describe("the scene's event", () => {
     ["ahead within tolerance", 14, null],
     ["too new", 15, "Ahead of the robot's feedback"],
   ])("is veiled when it is not to be trusted: %s", (_, shown, words) => {
-    expect(sceneStaleness({ ...createSceneGate(), shown }, CONTEXT)).toBe(words);
+    expect(sceneStaleness({ ...createSceneGate(), shown }, CONTEXT, null)).toBe(words);
+  });
+
+  it("is veiled once its feedback is old, whatever event it shows", () => {
+    const gate = { ...createSceneGate(), shown: 10 };
+    expect(sceneStaleness(gate, CONTEXT, "2 s")).toBe("No feedback for 2 s");
+    expect(sceneStaleness(gate, { ...CONTEXT, gate: "off" }, "2 s")).toBe("No feedback for 2 s");
+    expect(sceneStaleness(createSceneGate(), CONTEXT, "2 s")).toBe("Waiting for the robot's state");
   });
 
   it("is not judged while the gate is off", () => {
-    expect(sceneStaleness({ ...createSceneGate(), shown: 1 }, { ...CONTEXT, gate: "off" })).toBeNull();
+    expect(sceneStaleness({ ...createSceneGate(), shown: 1 }, { ...CONTEXT, gate: "off" }, null)).toBeNull();
   });
 
   it("is read from the label in the scene, the newest of a batch", () => {
