@@ -62,12 +62,14 @@ class Shelf:
 
     def path(self, recording_id: str) -> Path | None:
         """None: there is none of that id."""
-        return next((path for path in self.files() if path.stem == recording_id), None)
+        alike = (path for path in self.directory.glob(f"*{SUFFIX}") if path.stem == recording_id)
+        return next((path for path in alike if path.is_file()), None)
 
     def entries(self) -> list[RecordingEntry]:
         """The newest first. Files that are being written are not among them."""
         paths = self.files()
-        self._known = {path: known for path, known in self._known.items() if path in paths}
+        present = set(paths)
+        self._known = {path: known for path, known in self._known.items() if path in present}
         found = [entry for path in paths if (entry := self._entry(path)) is not None]
         return sorted(found, key=lambda entry: entry.started, reverse=True)
 

@@ -2,7 +2,9 @@
 
 import os
 import time
-from pathlib import Path
+from pathlib import Path, PurePath
+
+import pytest
 
 from server.recording.reader import RecordingReader
 from server.recording.settings import RecordingSettings
@@ -110,3 +112,22 @@ def test_what_cannot_be_looked_at_ends_nothing(tmp_path: Path) -> None:
     assert shelf(tmp_path / "none").prune() == []
     (tmp_path / "gone.mcap").symlink_to(tmp_path / "nowhere")
     assert shelf(tmp_path).prune() == []
+
+
+def test_listing_many_recordings_compares_each_with_few_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The list is made in a thread, and whatever that computes holds up whoever drives."""
+    count, content = 200, made(tmp_path / "0.mcap").read_bytes()
+    for number in range(1, count):
+        (tmp_path / f"{number}.mcap").write_bytes(content)
+    found = shelf(tmp_path)
+    assert len(found.entries()) == count
+    compared, equal = 0, PurePath.__eq__
+
+    def counting(self: PurePath, other: object) -> bool:
+        nonlocal compared
+        compared += 1
+        return equal(self, other)
+
+    monkeypatch.setattr(PurePath, "__eq__", counting)
+    assert len(found.entries()) == count
+    assert compared < 10 * count
