@@ -37,7 +37,7 @@ class _Kept:
 
 
 class History(Stage):
-    """Keeps packets before their extensions are written: a retransmission says anew when it leaves."""
+    """It stands before the extensions are written: a retransmission says anew when it leaves."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class History(Stage):
         before = self._kept.pop(packet.sequence_number, None)  # of a whole turn of the numbers ago
         if before is not None:
             self._octets -= len(before.packet.payload)
-        self._kept[packet.sequence_number] = _Kept(replace(packet), now)
+        self._kept[packet.sequence_number] = _Kept(packet, now)
         self._octets += len(packet.payload)
         while self._is_too_much(now):
             _, oldest = self._kept.popitem(last=False)
@@ -99,7 +99,7 @@ class History(Stage):
 
     def _repeated(self, packet: RtpPacket) -> RtpPacket:
         if self._repair is None:
-            return replace(packet, is_repair=True)
+            return replace(packet, extensions={}, is_repair=True)
         number, self._repair_number = self._repair_number, self._repair_number + 1
         return replace(
             packet,
@@ -107,6 +107,7 @@ class History(Stage):
             payload_type=self._repair.payload_type,
             sequence_number=number & 0xFFFF,
             payload=packet.sequence_number.to_bytes(2, "big") + packet.payload,  # RFC 4588 4
+            extensions={},
             is_repair=True,
         )
 
