@@ -1,4 +1,4 @@
-"""The baseline: what one builds with aiortc in an afternoon. `python -m bench.baseline_server tcp://HOST:PORT`
+"""The baseline: what one builds with aiortc in an afternoon. `python -m bench.baseline_server tcp://HOST:PORT [HOST]`
 
 The same pictures of the same robot bridge, from its robot link; each peer has a `VideoStreamTrack` of its own that
 gives out the newest picture as soon as there is one, and aiortc encodes it for each peer alone. No stamps, no
@@ -60,18 +60,20 @@ class NewestPictureTrack(VideoStreamTrack):
 class BaselineServer:
     """`run` until a signal."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, host: str = "127.0.0.1") -> None:
+        """`host`: where it is found."""
+        self._host = host
         parts = urlsplit(address)
         self._link = RobotLink(parts.hostname or "", parts.port or 0, "media", name="baseline")
         self._peers: dict[str, tuple[RTCPeerConnection, NewestPictureTrack]] = {}
         self._opened = 0
 
     async def run(self) -> None:
-        restrict_ice_hosts(["127.0.0.1"])
-        listener = bind("127.0.0.1", 0)
+        restrict_ice_hosts([self._host])
+        listener = bind(self._host, 0)
         async with self._link, running(self._app(), listener), asyncio.TaskGroup() as tasks:
             feeding = tasks.create_task(self._feed())
-            print(json.dumps({"console": f"http://127.0.0.1:{listener.getsockname()[1]}"}), flush=True)
+            print(json.dumps({"console": f"http://{self._host}:{listener.getsockname()[1]}"}), flush=True)
             await wait_for_signal()
             feeding.cancel()
             for name in list(self._peers):
@@ -122,7 +124,7 @@ class BaselineServer:
 
 
 def main() -> None:
-    uvloop.run(BaselineServer(sys.argv[1]).run())
+    uvloop.run(BaselineServer(*sys.argv[1:3]).run())
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ ConsoleError
 │   ├── RecordingUnreadable  what is asked for is damaged, and stays so
 │   ├── ResetTooSoon        a reset right after the stop that it names
 │   ├── PressUsed           the stop of this press was reset since
+│   ├── TooFewSections      fewer media sections than streams, of a peer that wants them all
 │   ├── StaleReset          a reset that does not name the newest stop
 │   ├── TooManyRequests
 │   └── WrongMediaType
@@ -111,6 +112,7 @@ __all__ = [
     "StateUnavailable",
     "TokenInvalid",
     "TokenMissing",
+    "TooFewSections",
     "TooManyInvitations",
     "TooManyPeers",
     "TooManyRequests",
@@ -202,6 +204,10 @@ class BadSdp(RequestError):
 
 
 class TooManySections(BadSdp):
+    pass
+
+
+class TooFewSections(RequestError):
     pass
 
 
@@ -391,6 +397,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     BadParameter: HttpError(422, "bad_parameter"),
     BadSdp: HttpError(400, "bad_sdp"),
     TooManySections: HttpError(400, "too_many_sections"),
+    TooFewSections: HttpError(409, "too_few_sections"),
     BadSdpFragment: HttpError(400, "bad_sdp_fragment"),
     NotFound: HttpError(404, "not_found"),
     RecordingUnreadable: HttpError(422, "recording_damaged"),

@@ -14,6 +14,7 @@ from aiortc.rtcpeerconnection import find_common_codecs
 from aiortc.rtcrtpparameters import RTCRtpCodecParameters
 from aiortc.sdp import SessionDescription
 
+from server.agreed_channels import CHANNEL_LINE
 from server.errors import BadSdp
 
 __all__ = ["AnswerableOffer", "answerable"]
@@ -29,6 +30,13 @@ class AnswerableOffer(NamedTuple):
 
     text: str
     rejected: dict[str, str]  # mid -> the offer's own m= line
+    channels: list[str]  # lines of the data channels that are agreed on; RFC 8864 6.4: the answer says the same
+
+    def receives(self, kind: str) -> int:
+        """How many sections of "video" or "audio" want something."""
+        _, sections = _split(self.text.splitlines())
+        wanted = ("a=recvonly", "a=sendrecv")
+        return sum(each[0].startswith(f"m={kind} ") and any(line in wanted for line in each) for each in sections)
 
     def answer(self, made: str) -> str:
         """aiortc's answer with a word about trickling, and rejected sections by RFC 3264 6 and RFC 9143 7.3.3."""
@@ -38,6 +46,8 @@ class AnswerableOffer(NamedTuple):
         for section in sections:
             mid = _value(section, "a=mid:")
             lines += self._rejection(mid) if mid in self.rejected else section
+            if section[0].startswith("m=application "):
+                lines += self.channels
         return "\r\n".join(lines) + "\r\n"
 
     def _without_rejected(self, group: str) -> str:
@@ -70,7 +80,8 @@ def answerable(text: str) -> AnswerableOffer:
         raise BadSdp("; ".join(f"section {mid}: no codec in common" for mid in rejected)[:500])
     lines = [*head, *(line for section in sections for line in section)]
     lines = ["a=setup:active" if line == "a=setup:actpass" else line for line in lines]
-    return AnswerableOffer("\r\n".join(lines) + "\r\n", rejected)
+    channels = [line for line in lines if line.startswith(CHANNEL_LINE)]
+    return AnswerableOffer("\r\n".join(lines) + "\r\n", rejected, channels)
 
 
 def _in_common(kind: str, offered: list[RTCRtpCodecParameters]) -> bool:

@@ -56,6 +56,7 @@ from server.errors import (
     StateUnavailable,
     TokenInvalid,
     TokenMissing,
+    TooFewSections,
     TooManyInvitations,
     TooManyPeers,
     TooManyRequests,
@@ -115,6 +116,7 @@ WATCHED = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{1,3}$"
 WATCH_TICKET = Parameter("ticket", "path", {"type": "string"}, required=True)
 CAMERA = Parameter("camera", "query", {"type": "string", "maxLength": 32})
 VIEW = Parameter("view", "query", {"type": "string", "enum": ["thumbnail"]})
+SECTIONS = Parameter("sections", "query", {"type": "string", "enum": ["all"]})
 PEER = Parameter("peer", "query", {"type": "string", "maxLength": 16})
 LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
 AFTER = Parameter("after", "query", {"type": "integer", "default": 0})
@@ -133,9 +135,18 @@ INVITATION = Parameter("invitation_id", "path", {"type": "string"}, required=Tru
 OPERATIONS: tuple[Operation, ...] = (
     Operation(
         *("post", "/whep", "Offer a WebRTC connection (WHEP).", 201, SDP),
-        errors=(BadSdp, WrongMediaType, BadParameter, RobotUnreachable, TooManyPeers, ShuttingDown, *WITH_BODY),
+        errors=(
+            BadSdp,
+            TooFewSections,
+            WrongMediaType,
+            BadParameter,
+            RobotUnreachable,
+            TooManyPeers,
+            ShuttingDown,
+            *WITH_BODY,
+        ),
         body=SDP,
-        parameters=(STAMP, RELAY, VIEW),
+        parameters=(STAMP, RELAY, VIEW, SECTIONS),
         headers=("Location", "ETag", "Accept-Patch"),
     ),
     Operation(

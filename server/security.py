@@ -13,7 +13,8 @@ __all__ = ["PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "check_origin", "sc
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 
-# The page loads only its own files; its workers may also come from blobs. Styles may be set on elements.
+# The page loads only its own files; its workers may also come from blobs. Styles may be set on elements. A page with a
+# script in it says which: by its hash, in a policy that has this directive alone (`server.page.script_policy`).
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; worker-src 'self' blob:; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data: blob:; media-src 'self' blob:; font-src 'self' data:; connect-src 'self'; "
@@ -29,6 +30,8 @@ SCENE_POLICY = (
     "connect-src {stream}; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
 
+SCRIPTS = "script-src 'self'"
+HASHED_SCRIPTS = re.compile(rf"{SCRIPTS}( 'sha256-[A-Za-z0-9+/]{{43}}=')+")
 HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)  # what may stand in a policy
 
 HEADERS = {
@@ -63,17 +66,22 @@ class SecurityHeaders:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        policy = scene_policy(scope) if below_robot(scope["path"]).startswith("/scene/") else self._page_policy
+        of_scene = below_robot(scope["path"]).startswith("/scene/")
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                headers["Content-Security-Policy"] = policy
+                own = headers.get("Content-Security-Policy", "")
+                headers["Content-Security-Policy"] = scene_policy(scope) if of_scene else self._policy_with(own)
                 for name, value in self._headers.items():
                     headers[name] = value
             await send(message)
 
         await self._app(scope, receive, send_with_headers)
+
+    def _policy_with(self, scripts: str) -> str:
+        """The page's policy, with the hashes of the scripts that stand in it."""
+        return self._page_policy.replace(SCRIPTS, scripts) if HASHED_SCRIPTS.fullmatch(scripts) else self._page_policy
 
 
 def scene_policy(scope: Scope) -> str:

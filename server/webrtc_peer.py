@@ -1,10 +1,12 @@
 """A peer on WebRTC: its connection and its data channels."""
 
 import secrets
+from collections.abc import Sequence
 
 from aiortc import RTCDataChannel, RTCPeerConnection
 
 from server.access import Identity
+from server.agreed_channels import AgreedChannel
 from server.channel_writer import ChannelWriter
 from server.channels import MessageBudget, channel_name
 from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
@@ -42,6 +44,14 @@ class WebRtcPeer(Peer):
             self._requests.spend(self._loop.time())
         except Flood as error:
             raise TooManyRequests(f"more than {MAX_REQUESTS:g} requests a second for one session") from error
+
+    def agree_on(self, channels: Sequence[AgreedChannel]) -> None:
+        """Data channels that open with the association, without a message that says so."""
+        for each in channels if self.pc.sctp is not None else ():
+            channel = self.pc.createDataChannel(
+                each.name, ordered=each.ordered, maxRetransmits=each.max_retransmits, negotiated=True, id=each.id
+            )
+            channel.once("open", lambda channel=channel: self._channel_offered(channel))
 
     async def _close_transport(self) -> None:
         with self.contained("close"):

@@ -1,8 +1,10 @@
 """WHEP signalling (draft-ietf-wish-whep): POST an offer, PATCH candidates, DELETE to end."""
 
 import asyncio
+import gzip
 import ipaddress
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Literal
 
@@ -11,6 +13,7 @@ from aiortc.sdp import SessionDescription, candidate_from_sdp, candidate_to_sdp
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
 from server.access import Identity, Right
+from server.agreed_channels import AgreedChannel, agreed_channels
 from server.api_ice import servers_for
 from server.body import read_text
 from server.data_transport_private import tune_data_transport
@@ -24,6 +27,7 @@ from server.errors import (
     PreconditionFailed,
     PreconditionRequired,
     RobotUnreachable,
+    TooFewSections,
 )
 from server.ice_restart_private import IceSession
 from server.ice_servers import IceServers, for_aiortc, link_headers
@@ -36,7 +40,8 @@ from server.offer import (
     parse_fragment,
     prepare_offer,
 )
-from server.offer_sections import answerable
+from server.offer_sections import AnswerableOffer, answerable
+from server.page import takes_coding
 from server.peer_guards_private import guard_data
 from server.services import Services, authorized, services
 from server.webrtc_peer import WebRtcPeer
@@ -68,12 +73,14 @@ async def create(
     stamp: Literal["trailer"] | None = None,
     relay: Annotated[str, Query(pattern=r"^\d{0,3}$")] = "",
     view: Literal["thumbnail"] | None = None,
+    sections: Literal["all"] | None = None,
 ) -> Response:
     """An offer in, an answer out; the peer lives on until DELETE, or until its connection ends.
 
     `relay`: an observer has its media from that relay, and offers data channels alone.
     `view`: a thumbnail is a small picture of the main camera on an overview, and takes part in nothing, whatever the
     role of who asks.
+    `sections`: an offer with fewer media sections than there are streams is refused, for the peer to make a larger one.
     """
     here = services(request)
     if here.console.robot.description is None:
@@ -81,6 +88,9 @@ async def create(
     here.guard.offer(caller.token_id)  # before it costs anything
     text = await read_text(request, SDP, here.settings.max_sdp_bytes)
     offer = answerable(prepare_offer(text, max(MAX_SECTIONS, len(here.media.offers) + FURTHER_SECTIONS)))
+    channels = agreed_channels(offer.text)
+    if sections == "all":
+        _check_sections(here, offer)
     identity = caller.identity
     ice = servers_for(here.settings, identity)
     thumbnail = view == "thumbnail"
@@ -89,7 +99,7 @@ async def create(
     relayed = bool(relay) and not thumbnail and identity.role == "observer" and here.relays.arrived(relay)
     with here.console.peers.place(identity, relayed=relayed, thumbnail=thumbnail):
         peer, answer = await _negotiate(
-            here, caller, identity, offer.text, ice, trailer=stamp == "trailer", thumbnail=thumbnail
+            here, caller, identity, offer.text, ice, channels, trailer=stamp == "trailer", thumbnail=thumbnail
         )
         peer.relay = relay if relayed else ""
         here.console.peers.admit(peer)
@@ -101,7 +111,10 @@ async def create(
     }
     if ice.ice_servers:
         headers["Link"] = ", ".join(link_headers(ice))
-    return Response(offer.answer(answer), status_code=201, media_type=SDP, headers=headers)
+    body = offer.answer(answer).encode()
+    if takes_coding(request.headers.get("accept-encoding", ""), "gzip"):  # sections repeat each other
+        body, headers = gzip.compress(body, mtime=0), headers | {"Content-Encoding": "gzip"}
+    return Response(body, status_code=201, media_type=SDP, headers=headers | {"Vary": "Accept-Encoding"})
 
 
 @router.options("/whep", include_in_schema=False)
@@ -194,8 +207,22 @@ def _own(here: Services, resource: str, caller: Right) -> WebRtcPeer:
     return peer
 
 
+def _check_sections(here: Services, offer: AnswerableOffer) -> None:
+    kinds = Counter(stream.kind for stream in here.media.offers)
+    if any(offer.receives(kind) < count for kind, count in kinds.items()):
+        raise TooFewSections(f"{kinds['video']} of video and {kinds['audio']} of audio are needed for all streams")
+
+
 async def _negotiate(
-    here: Services, caller: Right, identity: Identity, offer: str, ice: IceServers, *, trailer: bool, thumbnail: bool
+    here: Services,
+    caller: Right,
+    identity: Identity,
+    offer: str,
+    ice: IceServers,
+    channels: Sequence[AgreedChannel],
+    *,
+    trailer: bool,
+    thumbnail: bool,
 ) -> tuple[WebRtcPeer, str]:
     """`identity`: as whom `caller` takes part."""
     # No STUN server unless asked for: our host candidates are a setting, the peer's address is learnt from its checks.
@@ -206,6 +233,7 @@ async def _negotiate(
             with offers_fault():
                 await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
             peer = await _answering_peer(here, identity, offer, pc, own_servers, trailer=trailer, thumbnail=thumbnail)
+            peer.agree_on(channels)
             try:
                 caller.identity  # noqa: B018  raises when the link has ended meanwhile
             except ConsoleError:

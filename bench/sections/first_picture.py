@@ -2,6 +2,8 @@
 
 The time runs from the start of the navigation (the page's time origin) to the first picture that passed the gate and
 was drawn. The baseline is a bare page on a plain aiortc server: one inline script, one video element.
+
+Behind three networks it is opened in network namespaces, with the kernel's own TCP; for root only.
 """
 
 import sys
@@ -9,6 +11,8 @@ import sys
 from bench.browser import open_probed_page
 from bench.browsers.chromium import running_chromium
 from bench.context import Context
+from bench.emulator.errors import NamespacesUnavailable
+from bench.far_openings import far_baseline, far_console, open_far
 from bench.processes import running_process
 from bench.results import Result
 from bench.samples import median
@@ -19,6 +23,10 @@ __all__ = ["run"]
 SECTION = "first_picture"
 OPENINGS, QUICK_OPENINGS = 7, 3
 LIMIT_MS = 1000.0
+FAR_PROFILES = ("hong-kong", "satellite", "narrow-uplink")
+FAR_ROBOT = "planar"
+FAR_OPENINGS = 5
+LIMIT_BYTES = 60_000.0
 TIMEOUT_MS = 20_000.0
 OURS = "() => window.lockstep?.stats().first_picture_ms ?? 0"
 THEIRS = "() => window.drawProbe?.firstMs ?? 0"
@@ -35,7 +43,34 @@ async def run(context: Context) -> list[Result]:
             async with running_process(*command) as (_, ready):
                 theirs = [await _open(ready["console"], THEIRS) for _ in range(count)]
         results += _rows(robot, ours, theirs)
+    try:
+        for profile in FAR_PROFILES:
+            results += await _far(profile, context.scale(FAR_OPENINGS, 1))
+    except NamespacesUnavailable as error:
+        print(f"first_picture: not behind networks: {error}", file=sys.stderr)
     return results
+
+
+async def _far(profile: str, count: int) -> list[Result]:
+    async with far_console(profile, FAR_ROBOT) as (network, link):
+        ours = await open_far(network, link, OURS, count)
+    async with far_baseline(profile, FAR_ROBOT) as (network, link):
+        theirs = await open_far(network, link, THEIRS, count)
+
+    def row(name: str, unit: str, key: str, target: float | None) -> Result:
+        return Result(
+            section=SECTION,
+            name=f"{FAR_ROBOT}, {profile}: {name}",
+            value=median([each[key] for each in ours]),
+            unit=unit,
+            target=target,
+            baseline=median([each[key] for each in theirs]),
+            baseline_name=BARE,
+            samples=len(ours),
+            conditions=f"network {profile} between two network namespaces",
+        )
+
+    return [row("median", "ms", "first", None), row("asked for before it", "bytes", "bytes", LIMIT_BYTES)]
 
 
 async def _open(link: str, first_picture: str) -> float:

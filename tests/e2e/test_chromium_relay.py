@@ -29,14 +29,11 @@ SELECTED_PAIR = """async () => {
 }"""
 # As if the page had slept past the credentials' end: the same name and password, an hour too old.
 EXPIRE = """
-const real = window.fetch.bind(window);
-window.fetch = async (where, how) => {
-  const answer = await real(where, how);
-  if (!String(where).endsWith("/api/ice")) return answer;
-  const said = await answer.json();
-  for (const each of said.ice_servers)
-    if (each.username) each.username = `${Math.floor(Date.now() / 1000) - 3600}:` + each.username.split(":")[1];
-  return new Response(JSON.stringify(said), { headers: { "Content-Type": "application/json" } });
+const { get } = Headers.prototype;
+Headers.prototype.get = function (name) {
+  const said = get.call(this, name);
+  const past = Math.floor(Date.now() / 1000) - 3600;
+  return name === "Link" ? said?.replaceAll(/username="\\d+:/g, `username="${past}:`) ?? null : said;
 };
 """
 

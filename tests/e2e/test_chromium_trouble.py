@@ -10,6 +10,7 @@ from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
+OFFERS = re.compile(r"/whep(\?|$)")
 NOWHERE = "a=candidate:1 1 udp 2130706431 127.0.0.1 9 typ host\r\n"
 
 
@@ -29,18 +30,18 @@ async def test_each_way_not_to_get_through_has_its_own_words(own_stack: Stack, c
 
     async with open_console(chromium, "about:blank") as console:
         page = console.page
-        await page.route("**/whep", full)
+        await page.route(OFFERS, full)
         await page.goto(own_stack.operator)
         await _says(page, "The console is full", "Somebody has to leave first")
-        await page.unroute("**/whep")
-        await page.route("**/whep", no_robot)
+        await page.unroute(OFFERS)
+        await page.route(OFFERS, no_robot)
         await page.get_by_role("button", name="Try now").click()
         await _says(page, "Robot unreachable", "Connection refused.")
-        await page.unroute("**/whep")
-        await page.route("**/api/session", lambda route: route.abort())
+        await page.unroute(OFFERS)
+        await page.route(OFFERS, lambda route: route.abort())
         await page.get_by_role("button", name="Try now").click()
         await _says(page, "Console unreachable", "Check your network")
-        await page.unroute("**/api/session")
+        await page.unroute(OFFERS)
         await page.get_by_role("button", name="Try now").click()
         await console.until_live()
         await page.goto("about:blank")
@@ -58,7 +59,7 @@ async def test_blocked_udp_and_a_missing_relay_are_told_apart(stack: Stack, chro
         await route.fulfill(response=response, body=answer.replace("a=end-of-candidates\r\n", NOWHERE))
 
     async with open_console(chromium, "about:blank") as blocked, open_console(chromium, "about:blank") as relayed:
-        await blocked.page.route("**/whep", misled)
+        await blocked.page.route(OFFERS, misled)
         await blocked.page.goto(stack.operator)
         await relayed.page.goto(stack.observer + "&relay=only")
         await _says(blocked.page, "No path for pictures and commands", "A firewall blocks UDP")

@@ -1,17 +1,21 @@
+import base64
+import hashlib
 import os
 from pathlib import Path
 
 import httpx
 import pytest
-from fastapi import FastAPI
+from fastapi import FastAPI, Response
 
 from server.errors import NotFound
-from server.page import page_router
+from server.page import page_router, script_policy
+from server.security import PAGE_POLICY, SecurityHeaders
 
 
 async def _get(directory: Path, path: str, encoding: str = "identity") -> httpx.Response:
     app = FastAPI()
     app.include_router(page_router(directory))
+    app.add_middleware(SecurityHeaders)
     async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://console") as http:
         return await http.get(path, headers={"Accept-Encoding": encoding})
 
@@ -84,3 +88,50 @@ async def test_a_page_that_is_not_built_says_how_to_build_it(tmp_path: Path) -> 
     page = await _get(tmp_path, "/")
     assert page.status_code == 200
     assert "make setup" in page.text
+
+
+async def test_what_the_build_has_packed_is_served_to_whoever_takes_it(built: Path) -> None:
+    file = built / "assets" / "big-1a2b.js"
+    file.write_text("let x = 1;\n" * 1000)
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+    file.with_name(f"{file.name}.{digest}.br").write_bytes(b"packed by the build")
+    app = FastAPI()
+    app.include_router(page_router(built))
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://console") as http:
+
+        async def coding(accepted: str) -> str | None:
+            async with http.stream("GET", "/assets/big-1a2b.js", headers={"Accept-Encoding": accepted}) as found:
+                return found.headers.get("content-encoding")
+
+        assert await coding("gzip, deflate, br, zstd") == "br"
+        assert await coding("gzip, br;q=0") == "gzip"
+        assert await coding("identity") is None
+        file.write_text("let x = 2;\n" * 1000)  # built again, and not packed
+        os.utime(file, ns=(2**62, 2**62))
+        assert await coding("gzip, br") == "gzip"
+        assert await coding("br") is None
+
+
+async def test_a_page_may_run_the_script_that_stands_in_it_and_no_other(built: Path) -> None:
+    script = "let x = '</p>';\nlet y = 2;"
+    (built / "index.html").write_text(f"<p>console<script>{script}</script>" + " " * 2000)
+    hashed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    for encoding in ("identity", "gzip"):
+        page = await _get(built, "/", encoding)
+        allowed = f"script-src 'self' 'sha256-{hashed}';"
+        assert page.headers["content-security-policy"] == PAGE_POLICY.replace("script-src 'self';", allowed)
+    assert (await _get(built, "/recordings")).headers["content-security-policy"] == PAGE_POLICY
+
+
+@pytest.mark.parametrize("policy", ["script-src *", "script-src 'self' 'unsafe-inline'", "default-src *", "x"])
+async def test_an_answer_opens_nothing_else_of_the_policy(policy: str) -> None:
+    app = FastAPI()
+    app.add_api_route("/", lambda: Response("", headers={"Content-Security-Policy": policy}), response_model=None)
+    app.add_middleware(SecurityHeaders)
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://console") as http:
+        assert (await http.get("/")).headers["content-security-policy"] == PAGE_POLICY
+
+
+def test_a_page_without_scripts_asks_for_no_policy_of_its_own() -> None:
+    assert script_policy(b"<p>console") == ""
+    assert script_policy(b'<script type="module" src="./assets/a.js"></script>') == ""

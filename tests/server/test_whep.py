@@ -330,3 +330,18 @@ async def test_a_refusal_names_the_section_and_what_it_lacks(line: str, words: s
         answer = await _post(rig, offer(section("0").replace(line, "")))
         assert (answer.status_code, answer.json()["error"]) == (400, "bad_sdp")
         assert words in answer.json()["detail"]
+
+
+async def test_whoever_wants_all_streams_is_told_when_an_offer_has_too_few_sections_for_them() -> None:
+    async with running_rig() as rig:
+        kinds = [stream.kind for stream in rig.services.media.offers]
+        enough = offer(*(section(f"{number}", kind) for number, kind in enumerate(kinds)))
+        missing = offer(
+            *(section(f"{number}", kind) for number, kind in enumerate(kinds[:-1])), section("9", "application")
+        )
+        answer = await _post(rig, missing, "/whep?sections=all")
+        assert (answer.status_code, answer.json()["error"]) == (409, "too_few_sections")
+        assert len(rig.services.console.peers) == 0
+        assert (await _post(rig, missing)).status_code == 201
+        assert (await _post(rig, enough, "/whep?sections=all")).status_code == 201
+        assert (await _post(rig, enough, "/whep?sections=some")).status_code == 422

@@ -1,6 +1,7 @@
 """A path between a browser and a console that a test can cut, while HTTP and every later path go on."""
 
 import asyncio
+import re
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -17,6 +18,7 @@ from server.media.aiortc_private import own_addresses
 __all__ = ["MovablePath", "movable_path"]
 
 FOR_GOOD = 3600.0  # s
+OFFERS = re.compile(r"/whep(\?|$)")
 
 
 class MovablePath:
@@ -64,7 +66,7 @@ async def movable_path(page: Page) -> AsyncIterator[MovablePath]:
     relay = UdpRelay(ClientPaths(profile, "1", outages), deliveries, [*hosts, LOOPBACK])
     path = MovablePath(relay, outages)
     try:
-        await page.route("**/whep", path.connect)
+        await page.route(OFFERS, path.connect)
         await page.route("**/whep/*", path.patch)
         yield path
         await page.unroute_all(behavior="ignoreErrors")

@@ -1,4 +1,4 @@
-import { ChartSampler } from "./chart_sampler";
+import type { ChartSampler } from "./chart_sampler";
 import { axisValues, restValues } from "./core/axis_mapping";
 import * as arming from "./core/arming";
 import * as driver from "./core/driver";
@@ -32,12 +32,13 @@ import { ContactFeeling } from "./contact_feeling";
 import { Pulse } from "./pulse";
 import { Connection, type LinkState } from "./rtc/connection";
 import type { ConsoleApi } from "./rtc/console_api";
+import type { FirstOpening } from "./rtc/first_opening";
 import type { ChannelName, Peer, PeerOptions } from "./rtc/peer";
-import { StampReader } from "./rtc/stamp_reader";
+import { newReader } from "./rtc/stamp_reader";
 import { SessionDesk } from "./session_desk";
 import { reportOf } from "./statistics";
 import { StopSender } from "./stop_sender";
-import { VoiceDesk } from "./voice_desk";
+import type { VoiceDesk } from "./voice_desk";
 import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, Welcome } from "./wire";
 
 export interface ConsoleAppEvents {
@@ -60,8 +61,8 @@ export class ConsoleApp {
   readonly controls: Controls;
   readonly events = createRateMeter();
   readonly audio = new AudioDesk();
-  readonly charts = new ChartSampler(this);
-  readonly voice = new VoiceDesk(this);
+  charts: ChartSampler | null = null; // until its code is there
+  voice: VoiceDesk | null = null; // likewise
   link: LinkState = { kind: "connecting" };
   driver: driver.Driver | null = null;
   layer = 0;
@@ -69,11 +70,10 @@ export class ConsoleApp {
   viewDelayMs: number | null = null; // how late the pictures are now; null: not known
   speedShare = 1; // of full speed that the cap leaves
   firstPictureMs: number | null = null;
-  private readonly reader = StampReader.isSupported() ? new StampReader() : null;
   readonly touch = new ContactFeeling(this);
   readonly ticker: Ticker;
   private readonly disposal = new Disposal();
-  private peer: Peer | null = null;
+  peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
   private heardMs = 0;
   private readonly pulse = new Pulse({
@@ -88,14 +88,16 @@ export class ConsoleApp {
     name: string | null,
     sticks: TouchSticks,
     readonly page: ConsoleAppEvents,
+    first: FirstOpening | null,
+    private readonly reader = first === null ? newReader() : first.opening.reader,
   ) {
     this.room = new MediaRoom(this.state, this.reader, this.audio, {
       canvas: (info) => page.canvas(info),
       drawn: (stream, stamp, at) => this.drawn(stream, stamp, at),
     });
-    this.connection = new Connection(api, this.reader, options, {
+    this.connection = new Connection(api, this.reader, options, first, {
       state: (link) => (this.link = link),
-      message: (channel, data) => this.received(channel, data),
+      message: (channel, data, at) => this.received(channel, data, at),
       opened: (peer) => (this.peer = peer),
       streams: (peer, streams) => this.room.reopen(peer, streams, performance.now()),
       closed: () => this.connectionClosed(),
@@ -212,7 +214,7 @@ export class ConsoleApp {
 
   async close(): Promise<void> {
     this.disarm("operator");
-    this.voice.close();
+    this.voice?.close();
     this.disposal.close();
     this.controls.close();
     this.connection.close();
@@ -248,7 +250,7 @@ export class ConsoleApp {
     this.measuredMs = null;
   }
 
-  private received(channel: ChannelName, data: unknown): void {
+  private received(channel: ChannelName, data: unknown, at: number): void {
     const parsed = parseServerMessage(data);
     if (parsed.kind !== "message") {
       this.state.badMessages += 1;
@@ -257,7 +259,7 @@ export class ConsoleApp {
       return;
     }
     this.ticker.catchUp(performance.now());
-    this.heardMs = performance.now();
+    this.heardMs = at;
     const { feedback, handOver } = this.state;
     const standing = standingOf(this.state);
     applyMessage(this.state, parsed.message, Date.now());
@@ -315,20 +317,19 @@ export class ConsoleApp {
       this.pulse.isOnLine = this.peer.isOnLine;
       this.room.open(this.peer, welcome.streams, this.heardMs);
     }
-    this.voice.attach(this.peer?.voiceSender(welcome.voice) ?? null);
+    this.voice?.attach(this.peer?.voiceSender(welcome.voice) ?? null);
     this.session.welcomed(welcome);
   }
 
   private robotChanged(robot: RobotState, now: number): void {
     if (robot.link === "down" && this.driver !== null) driver.driverSilence(this.driver);
     if (this.driver !== null) return;
-    const { description } = robot;
+    const { axes, layers, max_event_rate: rate } = robot.description;
     const { settings, feedback } = this.state;
-    const interval = 1000 / description.max_event_rate;
-    const neutral = restValues(description.axes);
-    this.driver = driver.createDriver(settings.pacing, settings.tolerance.video, interval, neutral);
+    const { pacing, tolerance } = settings;
+    this.driver = driver.createDriver(pacing, tolerance.video, 1000 / rate, restValues(axes));
     this.pulse.begin();
-    this.layer = Math.min(this.layer, Math.max(0, description.layers.length - 1));
+    this.layer = Math.min(this.layer, Math.max(0, layers.length - 1));
     if (feedback !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
   }
 
@@ -348,9 +349,9 @@ export class ConsoleApp {
     if (change === "taped_down") this.page.armedChanged();
     this.drive(now);
     this.room.listen();
-    this.voice.step(now);
+    this.voice?.step(now);
     this.stopping.step(now);
-    this.charts.step(now);
+    this.charts?.step(now);
     this.touch.step(now);
     if (this.state.welcome !== null) this.pulse.step(now);
     this.connection.step(now);

@@ -55,7 +55,7 @@ export class ContactFeeling {
     const { settings } = app.state;
     const by = this.feeling(now);
     const strength = by === null ? 0 : contactStrength(this.force, by);
-    const pad = settings.rumble && app.isArmed() ? app.controls.pad.state : null;
+    const pad = settings.rumble && app.isArmed() ? app.controls.pad?.state : null;
     this.rumble.feel(pad?.gamepad ?? null, strength, now);
     this.tone.sound(settings.contactTone && app.room.isAudible() ? strength : 0);
   }

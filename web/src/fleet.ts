@@ -1,16 +1,4 @@
-import "./style/fonts.css";
-import "./style/base.css";
-import "./style/layout.css";
-import "./style/views.css";
-import "./style/panels.css";
-import "./style/deck.css";
-import "./style/controls.css";
-import "./style/library.css";
-import "./style/sheets.css";
-import "./style/audit.css";
-import "./style/fleet.css";
-import "./style/fleet_tiles.css";
-import "./style/fleet_audit.css";
+import "./style/fleet_page.css";
 import { readFragment } from "./core/fragment";
 import { installFleetHook } from "./fleet/fleet_hook";
 import { FleetPage } from "./fleet/fleet_page";

@@ -1,14 +1,4 @@
-import "./style/fonts.css";
-import "./style/base.css";
-import "./style/layout.css";
-import "./style/panels.css";
-import "./style/views.css";
-import "./style/gauges.css";
-import "./style/controls.css";
-import "./style/library.css";
-import "./style/replay.css";
-import "./style/replay_cards.css";
-import "./style/replay_deck.css";
+import "./style/recordings_page.css";
 import { readReplayLink, replayHash, tokenIn } from "./core/replay_link";
 import { ListView } from "./replay/list_view";
 import { startDecoders } from "./replay/picture_decoder";

@@ -132,7 +132,7 @@ function gateOf(app: ConsoleApp, now: number): Statistics["gate"] {
 }
 
 function padOf(app: ConsoleApp): Statistics["pad"] {
-  const { state } = app.controls.pad;
+  const state = app.controls.pad?.state ?? null;
   return state === null ? null : { id: state.id, ready: state.ready, calibrated: state.setup.calibrated };
 }
 

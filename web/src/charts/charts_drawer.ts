@@ -29,7 +29,7 @@ export class ChartsDrawer implements Panel {
   /** `toggled`: the page makes room, or takes it back. */
   constructor(
     private readonly sampler: ChartSampler,
-    private readonly toggled: (open: boolean) => void,
+    private readonly toggled: (open: boolean) => unknown,
   ) {
     this.rangeButtons = RANGES.map(({ seconds, label }) =>
       button("segment", label, () => this.range(seconds)),

@@ -5,25 +5,32 @@ export interface OfferableCodec {
 }
 
 const H264 = "video/h264";
-const LATER = ["video/rtx", "video/red", "video/ulpfec", "video/flexfec-03"];
+const VP8 = "video/vp8";
+const REPEATS = "video/rtx"; // RFC 4588, of either
 const BASELINE = "42"; // profile_idc 66, which every console encodes
 const FRAGMENTS = "packetization-mode=1"; // of which a picture may be larger than a packet
 
 /**
- * H.264 first, the profile that the console encodes before its larger ones; all others stay behind it as they were, so
- * that a console or a relay that has no H.264 answers as before. null: there is none to put first.
+ * What consoles and relays send, and nothing else, so that an offer fits one congestion window: H.264 first, the profile
+ * that the console encodes before its larger ones, then VP8; VP8 first where that profile is missing. null: there is
+ * none of them.
  */
-export function h264First<T extends OfferableCodec>(codecs: readonly T[]): T[] | null {
-  const rank = (codec: T): number => {
-    const type = codec.mimeType.toLowerCase();
-    if (LATER.includes(type)) return 3;
-    if (type !== H264) return 2;
-    return isBaseline(codec.sdpFmtpLine ?? "") ? 0 : 1;
-  };
-  if (!codecs.some((codec) => rank(codec) === 0)) return null;
-  return codecs.toSorted((one, other) => rank(one) - rank(other));
+export function offeredCodecs<T extends OfferableCodec>(codecs: readonly T[]): T[] | null {
+  const h264 = codecs.filter(
+    ({ mimeType, sdpFmtpLine }) => is(mimeType, H264) && sdpFmtpLine?.includes(FRAGMENTS),
+  );
+  const [plain, larger] = [h264.filter(isBaseline), h264.filter((codec) => !isBaseline(codec))];
+  const vp8 = codecs.filter(({ mimeType }) => is(mimeType, VP8));
+  const pictures = plain.length > 0 ? [...plain, ...larger, ...vp8] : [...vp8, ...larger];
+  return pictures.length > 0
+    ? [...pictures, ...codecs.filter(({ mimeType }) => is(mimeType, REPEATS))]
+    : null;
 }
 
-function isBaseline(format: string): boolean {
-  return format.includes(FRAGMENTS) && format.includes(`profile-level-id=${BASELINE}`);
+function is(mimeType: string, name: string): boolean {
+  return mimeType.toLowerCase() === name;
+}
+
+function isBaseline(codec: OfferableCodec): boolean {
+  return codec.sdpFmtpLine?.includes(`profile-level-id=${BASELINE}`) ?? false;
 }

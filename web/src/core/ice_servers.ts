@@ -9,11 +9,26 @@ export interface IceServer {
 
 const LIMIT = 8; // more only slow the search down
 const URL_START = /^(stun|turn)s?:/;
+const LINK = /<([^<>]*)>((?:\s*;\s*[\w-]+="[^"]*")*)/g; // RFC 8288 3, with all values quoted, as the console does
+const PARAMETER = /([\w-]+)="([^"]*)"/g;
 
 /** The servers in the console's answer (`GET /api/ice`); what a browser would refuse is left out. */
 export function parseIceServers(answer: unknown): IceServer[] {
   const listed = isRecord(answer) ? answer["ice_servers"] : undefined;
   return Array.isArray(listed) ? listed.flatMap(parseServer).slice(0, LIMIT) : [];
+}
+
+/** The same from the Link headers of an answer to an offer (RFC 9725 4.6). */
+export function iceServersOf(links: string): IceServer[] {
+  const found = [...links.matchAll(LINK)].map(([, url = "", parameters = ""]) => {
+    const named = new Map(
+      [...parameters.matchAll(PARAMETER)].map(([, name = "", value = ""]) => [name, value]),
+    );
+    return named.get("rel") === "ice-server"
+      ? { urls: [url], username: named.get("username"), credential: named.get("credential") }
+      : null;
+  });
+  return found.flatMap(parseServer).slice(0, LIMIT);
 }
 
 /** Whether a connection can be relayed. */

@@ -40,18 +40,13 @@ export class Thumbnail {
       canvas: () => this.canvas,
       drawn: () => this.changed(),
     });
-    this.connection = new Connection(
-      api,
-      reader,
-      { ...options, watches: false, thumbnail: true },
-      {
-        state: (link) => (this.link = link),
-        message: (_channel, data) => this.received(data),
-        opened: (peer) => (this.peer = peer),
-        streams: () => undefined, // thumbnails come from the console itself
-        closed: () => this.closed(),
-      },
-    );
+    this.connection = new Connection(api, reader, { ...options, watches: false, thumbnail: true }, null, {
+      state: (link) => (this.link = link),
+      message: (_channel, data) => this.received(data),
+      opened: (peer) => (this.peer = peer),
+      streams: () => undefined, // thumbnails come from the console itself
+      closed: () => this.closed(),
+    });
     this.pulse = new Pulse({
       tell: (message) => this.connection.send("control", JSON.stringify(message)),
       report: () => ({ type: "report", event: this.state.feedback?.event ?? 0 }),

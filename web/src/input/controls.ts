@@ -1,8 +1,7 @@
 import type { HeldInputs } from "../core/axis_mapping";
 import { createGrip, noteGrip } from "../core/grip";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
-import { Pad, type PadEvents, type PadState } from "./pad";
-import { PadStorage } from "./pad_storage";
+import type { Pad, PadEvents, PadState } from "./pad";
 import type { TouchSticks } from "./touch_sticks";
 
 const SLOW_SHARE = 0.3;
@@ -17,15 +16,14 @@ export interface ControlSample {
 
 /** Gamepad, keyboard and touch as one set of controls. */
 export class Controls {
-  readonly pad: Pad;
+  pad: Pad | null = null; // until its code is there
   readonly keyboard: Keyboard;
   private readonly grip = createGrip();
 
   constructor(
     readonly sticks: TouchSticks,
-    events: KeyboardEvents & PadEvents,
+    readonly events: KeyboardEvents & PadEvents,
   ) {
-    this.pad = new Pad(events, new PadStorage());
     this.keyboard = new Keyboard(events);
   }
 
@@ -35,11 +33,11 @@ export class Controls {
   }
 
   private get readyPad(): PadState | null {
-    return this.pad.state?.ready === true ? this.pad.state : null;
+    return this.pad?.state?.ready === true ? this.pad.state : null;
   }
 
   sample(): ControlSample {
-    this.pad.poll();
+    this.pad?.poll();
     const { keyboard, sticks, readyPad: pad } = this;
     const touch = sticks.deadman ? sticks.inputs : null;
     const held: HeldInputs = { pad: pad?.inputs ?? null, keys: keyboard.keys, touch };

@@ -1,5 +1,6 @@
 import { createRateMeter, noteHappening, rateOf } from "../core/samples";
 import type { Disposal } from "./disposal";
+import TickWorker from "./tick_worker?worker&inline";
 
 const STALL_MS = 300; // without a tick, which comes every 10 ms
 const LATE_MS = 100;
@@ -13,7 +14,7 @@ export class Ticker {
     disposal: Disposal,
     private readonly ontick: (now: number) => void,
   ) {
-    const worker = new Worker(new URL("./tick_worker.ts", import.meta.url), { type: "module" });
+    const worker = new TickWorker();
     worker.onmessage = () => this.tick(performance.now());
     disposal.add(() => worker.terminate());
   }

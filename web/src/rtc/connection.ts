@@ -10,7 +10,8 @@ import {
 } from "../core/resume";
 import { troubleOf, type LinkEnd, type LinkTrouble } from "../core/trouble";
 import { ConsoleError, type ConsoleApi } from "./console_api";
-import { Peer, PeerEnd, type ChannelName, type PeerOptions } from "./peer";
+import type { FirstOpening } from "./first_opening";
+import { Peer, PeerEnd, type ChannelName, type PeerEvents, type PeerOptions } from "./peer";
 import type { StreamInfo } from "../wire";
 import type { StampReader } from "./stamp_reader";
 
@@ -29,13 +30,13 @@ export type LinkState =
 
 export interface ConnectionEvents {
   state(state: LinkState): void;
-  message(channel: ChannelName, data: unknown): void;
+  message(channel: ChannelName, data: unknown, at: number): void; // `at`: when it came, by performance.now()
   opened(peer: Peer): void;
   streams(peer: Peer, streams: readonly StreamInfo[]): void; // media come from a relay, or from another one
   closed(): void; // after every `opened`
 }
 
-/** Keeps one peer connected: the only layer that tries again. */
+/** Keeps one peer connected: the only layer that tries again. `first`: what the page's first script has begun. */
 export class Connection {
   resume = createResume(); // of the present peer
   private readonly backoff = createBackoff();
@@ -47,6 +48,7 @@ export class Connection {
     private readonly api: ConsoleApi,
     private readonly reader: StampReader | null,
     private readonly options: PeerOptions,
+    private first: FirstOpening | null,
     private readonly events: ConnectionEvents,
   ) {}
 
@@ -107,15 +109,17 @@ export class Connection {
   private async live(): Promise<Trouble> {
     const started = performance.now();
     const ending = Promise.withResolvers<PeerEnd>();
-    const peer = new Peer(this.api, this.reader, this.options, {
-      message: (channel, data) => {
-        resumeHeard(this.resume, performance.now());
-        this.events.message(channel, data);
+    const events: PeerEvents = {
+      message: (channel, data, at) => {
+        resumeHeard(this.resume, at);
+        this.events.message(channel, data, at);
       },
       troubled: () => resumeAlarm(this.resume, performance.now()),
       ended: (end) => ending.resolve(end),
       streams: (streams) => this.events.streams(peer, streams),
-    });
+    };
+    const peer: Peer = new Peer(this.api, this.reader, this.options, events, this.first);
+    this.first = null;
     this.peer = peer;
     this.resume = createResume();
     this.end = (end) => ending.resolve(end);

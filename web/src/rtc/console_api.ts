@@ -1,25 +1,11 @@
 import { parseIceServers, type IceServer } from "../core/ice_servers";
-import { parseRelayAnswer, type RelayTicket } from "../core/relay";
 import { isRecord } from "../core/schema_check";
 import type { StopAnswer } from "../core/stop_press";
+import { ConsoleError, request } from "./http";
+import { postOffer, type WhepAnswer } from "./whep";
 
-/** What the console said instead of doing what it was asked. */
-export class ConsoleError extends Error {
-  constructor(
-    readonly status: number, // 0: it could not be reached
-    readonly error: string, // stable name
-    readonly detail: string,
-    readonly retryAfterMs: number | null,
-  ) {
-    super(detail === "" ? error : `${error}: ${detail}`);
-  }
-}
-
-export interface WhepAnswer {
-  readonly sdp: string;
-  readonly location: string; // of the session, to end it
-  readonly tag: string; // entity tag of its ICE session (RFC 9725 4.3.1)
-}
+export { ConsoleError } from "./http";
+export type { WhepAnswer } from "./whep";
 
 /** The answer to an ICE restart. */
 export interface RestartAnswer {
@@ -56,10 +42,10 @@ export class ConsoleApi {
     return { cameras: count("video"), microphones: count("audio"), voice };
   }
 
-  /** Where the console wants this observer to watch; null: with itself. `lost` is what the peer watched until now. */
-  async relay(peer: string, lost: string, signal: AbortSignal): Promise<RelayTicket | null> {
+  /** Where the console wants this observer to watch; `lost` is what the peer watched until now. */
+  async relay(peer: string, lost: string, signal: AbortSignal): Promise<unknown> {
     const query = new URLSearchParams({ peer, lost });
-    return parseRelayAnswer(await this.json("GET", `/api/relay?${query}`, undefined, signal));
+    return await this.json("GET", `/api/relay?${query}`, undefined, signal);
   }
 
   /** A ticket for the line of an observer behind that relay; see `lineAddress`. */
@@ -83,15 +69,7 @@ export class ConsoleApi {
 
   /** `query` of the URL: "stamp=trailer", "relay=0". */
   async offer(sdp: string, query: string, signal: AbortSignal): Promise<WhepAnswer> {
-    const path = query === "" ? "/whep" : `/whep?${query}`;
-    const response = await this.fetch("POST", path, { "Content-Type": "application/sdp" }, sdp, signal);
-    const { headers, url } = response;
-    const location = headers.get("Location");
-    return {
-      sdp: await response.text(),
-      location: location === null ? "" : new URL(location, url).href,
-      tag: headers.get("ETag") ?? "",
-    };
+    return await postOffer(this.token, this.address(query === "" ? "/whep" : `/whep?${query}`), sdp, signal);
   }
 
   /** STUN and TURN servers with credentials that are good for a while. */
@@ -163,22 +141,10 @@ export class ConsoleApi {
     body: string | undefined,
     signal: AbortSignal | undefined,
   ): Promise<Response> {
-    const init: RequestInit = {
-      method,
-      headers: { ...headers, Authorization: `Bearer ${this.token}` },
-      keepalive: method === "DELETE" || path.endsWith("/stop"),
-      cache: "no-store",
-    };
+    const init: RequestInit = { method, headers, keepalive: method === "DELETE" || path.endsWith("/stop") };
     if (body !== undefined) init.body = body;
     if (signal !== undefined) init.signal = signal;
-    let response: Response;
-    try {
-      response = await fetch(this.address(path), init);
-    } catch (error) {
-      throw new ConsoleError(0, "console_unreachable", error instanceof Error ? error.message : "", null);
-    }
-    if (!response.ok) throw await errorOf(response);
-    return response;
+    return await request(this.token, this.address(path), init);
   }
 }
 
@@ -198,19 +164,4 @@ function refusedStop(error: string): "waiting" | "doubtful" | "silenced" | "unkn
   if (error === "link_down" || error === "robot_unreachable") return "waiting";
   if (error === "unconfirmed") return "doubtful";
   return error === "silenced" ? "silenced" : "unknown";
-}
-
-async function errorOf(response: Response): Promise<ConsoleError> {
-  const body: unknown = await response.json().catch(() => null);
-  const field = (name: string): string => {
-    const value = isRecord(body) ? body[name] : undefined;
-    return typeof value === "string" ? value : "";
-  };
-  const retryAfter = Number(response.headers.get("Retry-After") ?? NaN);
-  return new ConsoleError(
-    response.status,
-    field("error") || `http_${response.status}`,
-    field("detail"),
-    Number.isFinite(retryAfter) ? retryAfter * 1000 : null,
-  );
 }

@@ -1,26 +1,22 @@
 import { iceCandidates, iceFragment, restartedAnswer } from "../core/ice_fragment";
 import { hasRelay, type IceServer } from "../core/ice_servers";
 import type { LinkTrouble } from "../core/trouble";
+import type { ChannelName } from "../core/channel_map";
 import { ConsoleError, type ConsoleApi } from "./console_api";
 import type { RelayTicket } from "../core/relay";
 import type { StreamInfo } from "../wire";
-import { RelayWatch } from "./relay_watch";
-import { preferH264 } from "./codec_preference";
-import { askForCaptureTime } from "./header_extensions";
-import { openLine, type WatchLine } from "./watch_line";
-import { receivedSection, type Section } from "./section";
+import type { RelayWatch } from "./relay_watch";
+import { USUAL_CAMERAS, USUAL_MICROPHONES, Opening, type OpeningOptions } from "./opening";
+import { answerOf, type FirstOpening } from "./first_opening";
+import type { WatchLine } from "./watch_line";
+import type { Section } from "./section";
 import type { StampReader } from "./stamp_reader";
+import type { WhepAnswer } from "./whep";
 
-export type ChannelName = "control" | "session" | "stop";
-
-interface OfferedSection extends Section {
-  readonly transceiver: RTCRtpTransceiver;
-}
+export type { ChannelName } from "../core/channel_map";
 
 /** What the page's link asks of connections. */
-export interface PeerOptions {
-  readonly trailer: boolean; // the event reference travels in trailers
-  readonly relayOnly: boolean; // through TURN or not at all
+export interface PeerOptions extends OpeningOptions {
   readonly watches: boolean; // the link is an observer's: the console may send it to a relay
   readonly thumbnail?: boolean; // one camera, small, without sound, nobody to be listed
 }
@@ -36,15 +32,12 @@ export class PeerEnd extends Error {
 }
 
 export interface PeerEvents {
-  message(channel: ChannelName, data: unknown): void;
+  message(channel: ChannelName, data: unknown, at: number): void; // `at`: when it came, by performance.now()
   troubled(): void; // WebRTC misses the other side
   ended(end: PeerEnd): void; // once, unless closed from here
   streams(streams: readonly StreamInfo[]): void; // media come from a relay, or from another one
 }
 
-/** Offered before the console has said how many there are; sections too many are answered inactive. */
-const USUAL_CAMERAS = 2;
-const USUAL_MICROPHONES = 1;
 const SIGNALLING_LIMIT_MS = 20_000; // for all requests until the answer
 const REQUEST_LIMIT_MS = 10_000;
 const PATH_LIMIT_MS = 10_000; // from the answer to the connection; and so many times what the answer took
@@ -56,15 +49,12 @@ const MOST_PATH_MS = 30_000; // the console gives up later
  * connecting again makes a new one.
  */
 export class Peer {
-  readonly sections: OfferedSection[] = [];
   isConnected = false; // once it was
   id = ""; // what the console calls it; "" before it has said so
   private relay: RelayWatch | null = null; // null: media come from the console
   private line: WatchLine | null = null; // instead of the WebRTC connection, which is closed then
-  private readonly connection: RTCPeerConnection;
-  private readonly channels: Record<ChannelName, RTCDataChannel>;
+  private readonly opening: Opening;
   private readonly abort = new AbortController();
-  private voice: RTCRtpTransceiver | null = null; // nothing is sent in it before somebody talks
   private location = "";
   private servers: readonly IceServer[] = [];
   private tag = ""; // of the ICE session
@@ -72,26 +62,23 @@ export class Peer {
   private isOver = false;
   private pathLimitMs = PATH_LIMIT_MS;
 
+  /** `first`: what the page's first script has begun; null: nothing. */
   constructor(
     private readonly api: ConsoleApi,
     private readonly reader: StampReader | null,
     private readonly options: PeerOptions,
     private readonly events: PeerEvents,
+    private readonly first: FirstOpening | null = null,
   ) {
-    this.connection = new RTCPeerConnection(this.configuration());
-    this.channels = {
-      control: this.openChannel("control", { ordered: false, maxRetransmits: 0 }),
-      session: this.openChannel("session", {}),
-      stop: this.openChannel("stop", {}),
-    };
-    this.connection.onconnectionstatechange = () => this.connectionChanged();
+    this.opening = first?.opening ?? new Opening(reader, options);
   }
 
   /** Returns when the answer is set; the channels open shortly after. Raises ConsoleError. */
   async connect(): Promise<void> {
+    this.listen();
     const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(SIGNALLING_LIMIT_MS)]);
     // Without an answer about relays there is still the console.
-    const ticket = this.options.watches ? await this.api.relay("", "", signal).catch(() => null) : null;
+    const ticket = this.options.watches ? await this.ticket(signal).catch(() => null) : null;
     if (this.options.thumbnail === true) await this.connectSmall(signal);
     else if (ticket === null) await this.connectForMedia(signal);
     else await this.connectBeside(ticket, signal);
@@ -101,31 +88,54 @@ export class Peer {
     this.endAfter(this.pathLimitMs);
   }
 
+  /** null: this observer watches with the console itself. */
+  private async ticket(signal: AbortSignal): Promise<RelayTicket | null> {
+    const asked = this.api.relay("", "", signal);
+    const [{ parseRelayAnswer }, answer] = await Promise.all([import("./observing"), asked]);
+    return parseRelayAnswer(answer);
+  }
+
+  private get connection(): RTCPeerConnection {
+    return this.opening.connection;
+  }
+
+  /** What the page's first script has begun may have got somewhere by now. */
+  private listen(): void {
+    const { connection, channels } = this.opening;
+    this.opening.listen((channel, data, at) => this.events.message(channel, data, at));
+    for (const channel of Object.values(channels)) {
+      channel.onclose = () => this.finish(consoleClosed(), true);
+      if (channel.readyState === "closed") this.finish(consoleClosed(), true);
+    }
+    connection.onconnectionstatechange = () => this.connectionChanged();
+    if (connection.connectionState !== "new") this.connectionChanged();
+  }
+
   /** Media come from the relay, everything else by a line, or by data channels where no WebSocket passes. */
   private async connectBeside(ticket: RelayTicket, signal: AbortSignal): Promise<void> {
     await this.refresh().catch(() => undefined);
-    const relay = new RelayWatch(
+    const { RelayWatch: Watch, openLine } = await import("./observing");
+    const relay = new Watch(
       this.api,
       this.reader,
       () => this.servers,
       () => this.id,
       {
-        feedback: (data) => this.events.message("control", data),
+        feedback: (data) => this.events.message("control", data, performance.now()),
         opened: ({ streams }) => this.events.streams(streams),
         direct: () => this.finish(new PeerEnd("relay_lost", "")),
       },
     );
     this.relay = relay; // before the welcome, whose reader asks
     this.line = await openLine(this.api, ticket.relay, signal, {
-      message: (data) => this.events.message("session", data),
+      message: (data) => this.events.message("session", data, performance.now()),
       ended: (why) => this.finish(why === "closed" ? consoleClosed() : new PeerEnd("silent", ""), true),
     });
     if (this.line === null) {
-      await this.connection.setLocalDescription();
       await this.exchange(`relay=${encodeURIComponent(ticket.relay)}`, signal);
     } else {
       this.isConnected = true;
-      for (const channel of Object.values(this.channels)) channel.onclose = null;
+      for (const channel of Object.values(this.opening.channels)) channel.onclose = null;
       this.connection.close();
       if (this.isOver) this.line.close();
     }
@@ -134,37 +144,50 @@ export class Peer {
 
   /** For one picture. Nothing has to be asked first: a robot has a first camera or none. */
   private async connectSmall(signal: AbortSignal): Promise<void> {
-    await this.refresh().catch(() => undefined);
-    const trailer = this.addSections(1, 0);
-    await this.connection.setLocalDescription();
-    await this.exchange(trailer ? "view=thumbnail&stamp=trailer" : "view=thumbnail", signal);
+    this.opening.addSections(1, 0);
+    await this.exchange("view=thumbnail", signal);
   }
 
+  /** Most robots have no more streams than are offered at first; a console with more says so instead of an answer. */
   private async connectForMedia(signal: AbortSignal): Promise<void> {
-    const media = this.api.media(AbortSignal.any([signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]));
-    // Without these servers there may still be a direct path.
-    const servers = this.refresh().catch(() => undefined);
-    let trailer = this.addSections(USUAL_CAMERAS, USUAL_MICROPHONES);
-    // The first offer makes the browser look for its codecs, which takes as long as the console's answer.
-    const [offer, usual] = await Promise.all([media, this.connection.createOffer(), servers]);
-    const cameras = Math.max(0, offer.cameras - USUAL_CAMERAS);
-    const microphones = Math.max(0, offer.microphones - USUAL_MICROPHONES);
-    const more = cameras + microphones > 0 || offer.voice;
-    if (offer.voice) this.voice = this.connection.addTransceiver("audio", { direction: "sendonly" });
-    if (cameras + microphones > 0) trailer = this.addSections(cameras, microphones) || trailer;
-    await this.connection.setLocalDescription(more ? await this.connection.createOffer() : usual);
-    await this.exchange(trailer ? "stamp=trailer" : "", signal);
+    try {
+      if (this.first !== null) await this.takeFirst(this.first);
+      else {
+        this.opening.addSections(USUAL_CAMERAS, USUAL_MICROPHONES);
+        if (!this.options.watches) this.opening.addVoice();
+        await this.exchange("sections=all", signal);
+      }
+    } catch (error) {
+      if (!(error instanceof ConsoleError) || error.error !== "too_few_sections") throw error;
+      const media = await this.api.media(AbortSignal.any([signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]));
+      const more = [media.cameras - USUAL_CAMERAS, media.microphones - USUAL_MICROPHONES] as const;
+      this.opening.addSections(Math.max(0, more[0]), Math.max(0, more[1]));
+      await this.exchange("", signal);
+    }
   }
 
+  private async takeFirst(first: FirstOpening): Promise<void> {
+    this.abort.signal.addEventListener("abort", () => first.abort.abort());
+    const { answer, tookMs } = await answerOf(first);
+    this.answered(answer, tookMs);
+  }
+
+  /** `query`: of the URL, besides what the offer itself needs. */
   private async exchange(query: string, signal: AbortSignal): Promise<void> {
+    const offer = await this.opening.offer();
     const offeredMs = performance.now();
-    const answer = await this.api.offer(this.localSdp(), query, signal);
-    const tookMs = performance.now() - offeredMs;
+    const queries = [query, offer.query].filter((each) => each !== "").join("&");
+    const answer = await this.api.offer(offer.sdp, queries, signal);
+    this.answered(answer, performance.now() - offeredMs);
+    await this.opening.take(answer);
+  }
+
+  private answered(answer: WhepAnswer, tookMs: number): void {
     this.pathLimitMs = Math.min(PATH_LIMIT_MS + PATH_TRIPS * tookMs, MOST_PATH_MS);
     this.location = answer.location;
     this.tag = answer.tag;
+    this.servers = answer.servers;
     if (this.isOver) throw new ConsoleError(0, "closed", "closed while connecting", null);
-    await this.connection.setRemoteDescription({ type: "answer", sdp: answer.sdp });
   }
 
   /** The relay that pictures come through now. */
@@ -191,7 +214,7 @@ export class Peer {
   async refresh(): Promise<void> {
     const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]);
     this.servers = await this.api.iceServers(signal);
-    if (!this.isOver && this.line === null) this.connection.setConfiguration(this.configuration());
+    if (!this.isOver && this.line === null) this.opening.configure(this.servers);
   }
 
   /**
@@ -218,7 +241,7 @@ export class Peer {
   /** Says whether it could be sent. What cannot go out now is not kept: newer follows. */
   send(channel: ChannelName, text: string): boolean {
     if (this.line !== null) return this.line.send(text);
-    const target = this.channels[channel];
+    const target = this.opening.channels[channel];
     if (target.readyState !== "open" || target.bufferedAmount > 100_000) return false;
     try {
       target.send(text);
@@ -230,40 +253,18 @@ export class Peer {
 
   section(mid: string): Section | undefined {
     if (this.relay !== null) return this.relay.section(mid);
-    return this.sections.find(({ transceiver }) => transceiver.mid === mid);
+    return this.opening.sections.find(({ transceiver }) => transceiver.mid === mid);
   }
 
   /** What sends this person's voice in the section that the console named; null when it takes none. */
   voiceSender(mid: string): RTCRtpSender | null {
-    return mid !== "" && this.voice?.mid === mid ? this.voice.sender : null;
+    const { voice } = this.opening;
+    return mid !== "" && voice?.mid === mid ? voice.sender : null;
   }
 
   /** Ends it from here; the session is deleted, also while the page is being left. */
   close(): void {
     this.finish(null);
-  }
-
-  private addSections(cameras: number, microphones: number): boolean {
-    const kinds = [...Array<"video">(cameras).fill("video"), ...Array<"audio">(microphones).fill("audio")];
-    const transceivers = kinds.map((kind) => this.connection.addTransceiver(kind, { direction: "recvonly" }));
-    for (const transceiver of transceivers.slice(0, cameras)) preferH264(transceiver);
-    const offered = transceivers.map((transceiver, index) =>
-      askForCaptureTime(transceiver, kinds[index] ?? "video"),
-    );
-    const trailer = this.options.trailer || offered.includes(false);
-    for (const [index, transceiver] of transceivers.entries()) {
-      const kind = kinds[index] ?? "video";
-      const stamps = this.reader?.attach(transceiver.receiver, kind, trailer) ?? null;
-      this.sections.push({ ...receivedSection(kind, transceiver.receiver, stamps), transceiver });
-    }
-    return trailer;
-  }
-
-  private openChannel(name: ChannelName, options: RTCDataChannelInit): RTCDataChannel {
-    const channel = this.connection.createDataChannel(name, options);
-    channel.onmessage = (event: MessageEvent<unknown>) => this.events.message(name, event.data);
-    channel.onclose = () => this.finish(consoleClosed(), true);
-    return channel;
   }
 
   private connectionChanged(): void {
@@ -290,12 +291,6 @@ export class Peer {
     );
   }
 
-  private configuration(): RTCConfiguration {
-    const iceServers = this.servers.map((server) => ({ ...server, urls: [...server.urls] }));
-    const iceTransportPolicy = this.options.relayOnly ? "relay" : "all";
-    return { bundlePolicy: "max-bundle", iceServers, iceTransportPolicy };
-  }
-
   private localSdp(): string {
     return this.connection.localDescription?.sdp ?? "";
   }
@@ -320,8 +315,7 @@ export class Peer {
     this.abort.abort();
     this.relay?.close();
     this.line?.close();
-    for (const { stamps } of this.sections) if (stamps !== null) this.reader?.detach(stamps);
-    this.connection.close();
+    this.opening.close();
     // The console notices a lost peer by itself; asking it to end the session only makes that quicker.
     if (!gone) this.api.end(this.location).catch(() => undefined);
     if (end !== null) this.events.ended(end);

@@ -1,5 +1,5 @@
 import type { IceServer } from "../core/ice_servers";
-import { hasKey, type RelayTicket } from "../core/relay";
+import { hasKey, parseRelayAnswer, type RelayTicket } from "../core/relay";
 import type { ConsoleApi } from "./console_api";
 import { relayLink, type RelayLink } from "./relay_link";
 import type { Section } from "./section";
@@ -79,7 +79,7 @@ export class RelayWatch {
       await this.connected();
       const limit = AbortSignal.timeout(REQUEST_LIMIT_MS);
       const answer = this.api.relay(this.peer(), lost === null ? "" : `${lost.relay}-${lost.feed}`, limit);
-      const ticket = await answer.catch(() => undefined);
+      const ticket = await answer.then(parseRelayAnswer).catch(() => undefined);
       if (ticket !== undefined && (ticket === null || hasKey(ticket))) return ticket;
     }
     return null;

@@ -1,4 +1,5 @@
 import { createStampBook, noteMark, type StampBook } from "../core/stamp_book";
+import StampWorker from "./stamp_worker?worker&inline"; // a request of its own would cost a round trip
 import { isFrameNote, type SoundContext, type SoundSkip, type TransformOptions } from "./stamp_messages";
 
 const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
@@ -11,9 +12,14 @@ export interface ReceiverStamps {
   onstamp: (() => void) | null;
 }
 
+/** null where the browser has no transforms: no picture passes the gate there. */
+export function newReader(): StampReader | null {
+  return StampReader.isSupported() ? new StampReader() : null;
+}
+
 /** Owns the transform worker, for all receivers of the page. */
 export class StampReader {
-  private readonly worker = new Worker(new URL("./stamp_worker.ts", import.meta.url), { type: "module" });
+  private readonly worker = new StampWorker();
   private readonly receivers = new Map<number, ReceiverStamps>();
   private nextReceiver = 1;
 

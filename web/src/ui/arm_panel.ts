@@ -58,8 +58,8 @@ function deadmanName(app: ConsoleApp): string {
 }
 
 function padWords(app: ConsoleApp): string {
-  const { state } = app.controls.pad;
-  if (app.controls.pad.isSuspended) return "A gamepad is being calibrated";
+  const state = app.controls.pad?.state ?? null;
+  if (app.controls.pad?.isSuspended === true) return "A gamepad is being calibrated";
   if (state === null) return "No gamepad: press a button on it to wake it";
   if (!state.ready) return `${state.name} has to be calibrated first: press G`;
   if (!app.isArmed()) {
@@ -86,7 +86,7 @@ function padLine(app: ConsoleApp, action: PadAction, what: string): string | nul
 
 /** What the pad in use calls the button of an action; null without such a pad or button. */
 function padButton(app: ConsoleApp, action: PadAction): string | null {
-  const { state } = app.controls.pad;
+  const state = app.controls.pad?.state ?? null;
   const layout = state?.setup.layout ?? null;
   if (state === null || layout === null) return null;
   return actionName(layout, action, isStandard(state.gamepad));

@@ -3,14 +3,13 @@ import { robotIsUp } from "../core/console_state";
 import { seatWords, type Obstacle } from "../core/seat_words";
 import type { SeatNews } from "../core/seat_news";
 import type { ConsoleApp } from "../console_app";
-import { createTalkButton } from "./talk_button";
 import { button, h, setData, setHidden, setText, type Panel } from "./dom";
 
 /** News are told this long. */
 const NEWS_MS = 10_000;
 
 /** Who drives, who asks for it, and the one button for it: always in the same place. */
-export function createSeatBar(app: ConsoleApp): Panel {
+export function createSeatBar(app: ConsoleApp, talk: Panel): Panel {
   const title = h("strong", "seat-title");
   const text = h("span", "seat-text");
   const why = h("span", "seat-why");
@@ -21,7 +20,6 @@ export function createSeatBar(app: ConsoleApp): Panel {
   action.classList.add("seat-action");
   const words = h("div", "seat-words", {}, title, text);
   const spoken = h("span", "unseen", { role: "status" }); // without the seconds, which would be read out all the time
-  const talk = createTalkButton(app);
   const buttons = h("div", "seat-buttons", {}, talk.element, keep, grant, decline, why, action);
   const element = h(
     "section",

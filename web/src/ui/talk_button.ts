@@ -1,31 +1,31 @@
 import type { ConsoleApp } from "../console_app";
 import { keyName } from "../core/page_keys";
-import { TALK_KEY } from "../voice_desk";
+import { TALK_KEY, type VoiceDesk } from "../voice_desk";
 import { h, setData, setHidden, setText, svg, type Panel } from "./dom";
 
 /** Hold to talk, with the level of what is heard of it; and for everyone, who speaks. */
-export function createTalkButton(app: ConsoleApp): Panel {
+export function createTalkButton(app: ConsoleApp, voice: VoiceDesk): Panel {
   const label = h("span", "talk-label");
   const key = h("kbd", "seat-key", {}, keyName(TALK_KEY));
   const level = h("span", "talk-level", { "aria-hidden": "true" });
   const button = h("button", "seat-button talk", { type: "button" }, level, microphone(), label, key);
   const speaker = h("span", "talk-speaker", { role: "status" });
   const element = h("div", "talk-panel", {}, speaker, button);
-  holding(app, button);
+  holding(voice, button);
   return {
     element,
     update() {
-      const { talk } = app.voice;
-      const obstacle = app.voice.obstacle();
+      const { talk } = voice;
+      const obstacle = voice.obstacle();
       const mine = app.state.voice?.peer === app.state.welcome?.peer;
-      const offered = app.voice.isOffered();
+      const offered = voice.isOffered();
       setHidden(button, !offered || (obstacle !== null && !talk.talking && !holdsOwnTrouble(app)));
-      setHidden(key, app.voice.keyDrives());
+      setHidden(key, voice.keyDrives());
       button.title = obstacle ?? "Your voice is heard at the robot while you hold this";
       button.disabled = obstacle !== null;
       setData(button, "talk", talk.talking ? "on" : talk.microphone);
-      setText(label, words(app, mine));
-      level.style.setProperty("--level", app.voice.level().toFixed(2));
+      setText(label, words(app, voice, mine));
+      level.style.setProperty("--level", voice.level().toFixed(2));
       const name = app.state.voice?.name ?? "";
       setHidden(speaker, mine || (app.state.voice?.peer ?? "") === "");
       setText(speaker, `${name} is speaking`);
@@ -39,8 +39,8 @@ function holdsOwnTrouble(app: ConsoleApp): boolean {
   return seat !== null && seat.holder === welcome?.peer && (voice?.trouble ?? "") !== "";
 }
 
-function words(app: ConsoleApp, heard: boolean): string {
-  const { talk } = app.voice;
+function words(app: ConsoleApp, voice: VoiceDesk, heard: boolean): string {
+  const { talk } = voice;
   if ((app.state.voice?.trouble ?? "") !== "") return "No loudspeaker";
   if (talk.talking) return heard ? "You are heard" : "Talking…";
   if (talk.microphone === "asking") return "Allow the microphone";
@@ -48,21 +48,21 @@ function words(app: ConsoleApp, heard: boolean): string {
 }
 
 /** Keeps no focus: the space bar is the deadman and must not press it. */
-function holding(app: ConsoleApp, button: HTMLButtonElement): void {
+function holding(voice: VoiceDesk, button: HTMLButtonElement): void {
   button.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     button.setPointerCapture(event.pointerId);
-    app.voice.press();
+    voice.press();
   });
   for (const type of ["pointerup", "pointercancel", "lostpointercapture"])
     button.addEventListener(type, () => {
-      app.voice.release();
+      voice.release();
       button.blur();
     });
   button.addEventListener("keydown", (event) => {
-    if (event.code === "Enter" && !event.repeat) app.voice.press();
+    if (event.code === "Enter" && !event.repeat) voice.press();
   });
-  for (const type of ["keyup", "blur"]) button.addEventListener(type, () => app.voice.release());
+  for (const type of ["keyup", "blur"]) button.addEventListener(type, () => voice.release());
   button.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 

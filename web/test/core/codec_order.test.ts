@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { h264First, type OfferableCodec } from "../../src/core/codec_order";
+import { offeredCodecs, type OfferableCodec } from "../../src/core/codec_order";
 
 const VP8 = { mimeType: "video/VP8" };
 const VP9 = { mimeType: "video/VP9", sdpFmtpLine: "profile-id=0" };
@@ -11,13 +11,17 @@ function h264(profile: string, mode: number): OfferableCodec {
   return { mimeType: "video/H264", sdpFmtpLine: format };
 }
 
-test("H.264 of the baseline comes first, its other profiles next, and nothing is left out", () => {
+test("H.264 of the baseline comes first, its other profiles next, then VP8, and nothing that no console sends", () => {
   const [high, single, plain] = [h264("64001f", 1), h264("42001f", 0), h264("42e01f", 1)];
-  const found = h264First([VP8, RTX, VP9, high, single, plain, RED]);
-  expect(found).toEqual([plain, high, single, VP8, VP9, RTX, RED]);
+  const found = offeredCodecs([VP8, RTX, VP9, high, single, plain, RED]);
+  expect(found).toEqual([plain, high, VP8, RTX]);
 });
 
-test("without H.264 that a console encodes the browser's own order stays", () => {
-  expect(h264First([VP8, RTX, VP9])).toBeNull();
-  expect(h264First([VP8, h264("64001f", 1), h264("42e01f", 0)])).toBeNull();
+test("without the profile of H.264 that a console encodes VP8 comes first", () => {
+  expect(offeredCodecs([VP9, RTX, VP8])).toEqual([VP8, RTX]);
+  expect(offeredCodecs([h264("64001f", 1), VP8, h264("42e01f", 0)])).toEqual([VP8, h264("64001f", 1)]);
+});
+
+test("a browser with neither keeps its own order", () => {
+  expect(offeredCodecs([VP9, RTX])).toBeNull();
 });

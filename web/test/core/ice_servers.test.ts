@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { hasRelay, parseIceServers } from "../../src/core/ice_servers";
+import { hasRelay, iceServersOf, parseIceServers } from "../../src/core/ice_servers";
 
 const TURN = { urls: ["turn:turn.example:3478?transport=udp"], username: "1:a", credential: "secret" };
 
@@ -24,4 +24,22 @@ it("leaves out what a browser would refuse, and takes none from an answer that i
 
 it("takes a bounded number", () => {
   expect(parseIceServers({ ice_servers: Array(50).fill(TURN) })).toHaveLength(8);
+});
+
+it("reads the same from the Link headers of an answer", () => {
+  const links = [
+    '<stun:stun.example>; rel="ice-server"',
+    '<turn:turn.example:3478?transport=udp>; rel="ice-server"; username="1:a"; credential="se,c=r;et"; credential-type="password"',
+    '<https://elsewhere.example>; rel="ice-server"',
+    '<turn:nobody.example>; rel="ice-server"',
+    '<stun:other.example>; rel="next"',
+  ].join(", ");
+  const turn = { ...TURN, credential: "se,c=r;et" };
+  expect(iceServersOf(links)).toEqual([{ urls: ["stun:stun.example"] }, turn]);
+  for (const links of ["", "<", "stun:stun.example", '<stun:a>; rel="'])
+    expect(iceServersOf(links)).toEqual([]);
+});
+
+it("takes a bounded number from headers too", () => {
+  expect(iceServersOf(Array(50).fill('<stun:a>; rel="ice-server"').join(", "))).toHaveLength(8);
 });

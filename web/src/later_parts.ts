@@ -1,0 +1,24 @@
+/** What the page can do without until its first picture: loaded after it, in one file. */
+import "./style/console_page_later.css";
+export { ChartSampler } from "./chart_sampler";
+export { ChartsDrawer } from "./charts/charts_drawer";
+export { Pad } from "./input/pad";
+export { PadStorage } from "./input/pad_storage";
+export { SessionApi } from "./rtc/session_api";
+export { createAuditSheet } from "./ui/audit_sheet";
+export { createDelayPanel } from "./ui/delay_panel";
+export { createForceGauge } from "./ui/force_gauge";
+export { createInviteSheet } from "./ui/invite_sheet";
+export { createKeysSheet } from "./ui/keys_sheet";
+export { createLogPanel } from "./ui/log_panel";
+export { createNotesPanel } from "./ui/notes_panel";
+export { createPadSheet } from "./ui/pad_sheet";
+export { createPeoplePanel } from "./ui/people_panel";
+export { createPlacePanel } from "./ui/place_panel";
+export { createRangeRadar } from "./ui/range_radar";
+export { createRecordButton } from "./ui/record_button";
+export { createScaleBar } from "./ui/scale_bar";
+export { createSettingsPanel } from "./ui/settings_panel";
+export { createStreamTable } from "./ui/stream_table";
+export { createTalkButton } from "./ui/talk_button";
+export { VoiceDesk } from "./voice_desk";
