@@ -101,7 +101,8 @@ async def test_what_the_build_has_packed_is_served_to_whoever_takes_it(built: Pa
 
         async def coding(accepted: str) -> str | None:
             async with http.stream("GET", "/assets/big-1a2b.js", headers={"Accept-Encoding": accepted}) as found:
-                return found.headers.get("content-encoding")
+                said: str | None = found.headers.get("content-encoding")
+                return said
 
         assert await coding("gzip, deflate, br, zstd") == "br"
         assert await coding("gzip, br;q=0") == "gzip"
