@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import shutil
 import signal
 import sys
 from collections.abc import AsyncIterator, Iterator, Mapping
@@ -19,6 +20,7 @@ START_SECONDS = 40.0  # a loaded two-core machine importing everything and openi
 STOP_SECONDS = 15.0
 # Root's Chromium gives itself and its sound a higher priority than all others, which no robot's machine has to share.
 FIRST = ("nice", "-n", "-12") if os.geteuid() == 0 else ()
+WITH_US = ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()  # ended also when the tests are killed
 
 
 @dataclass(kw_only=True)
@@ -130,7 +132,7 @@ async def _running(
     # One state directory for all runs of a test: the key in it lets a page's token outlive a restart of the console.
     environment = os.environ | {"PYTHONWARNINGS": "default", "LOCKSTEP_STATE_DIR": str(directory / "state")}
     process = await asyncio.create_subprocess_exec(
-        *FIRST,
+        *(*FIRST, *WITH_US),
         *(str(Path(sys.executable).with_name("lockstep")), *arguments),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
