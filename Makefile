@@ -10,14 +10,14 @@ TEST_PACKAGES := $(RUN_PACKAGES) gcc libc6-dev chromium firefox-esr pulseaudio p
 WEB_SOURCES := $(shell find web -path web/node_modules -prune -o -type f -print 2>/dev/null)
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 ARGS ?=
-# Tests wait more than they compute, and a file's tests share what they start.
-WORKERS ?= 3
+# A file's tests share what they start. Browsers take what there is: their tests run after the others, one at a time.
+WORKERS ?= 2
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-python test-unit test-web test-browser test-fast test-long check format bench fuzz lock generate clean
+.PHONY: help setup run test test-unit test-web test-browser test-fast test-long check format bench fuzz lock generate clean
 
 help: ## List the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/  make \1|\2/' | column -t -s '|'
@@ -30,7 +30,7 @@ run: setup ## Start the simulated robot and the console, and print the links (AR
 
 test: $(VENV)/.dev setup ## Install what the tests need and run all of them
 	@scripts/system-packages $(TEST_PACKAGES)
-	$(MAKE) --no-print-directory test-web test-python
+	$(MAKE) --no-print-directory test-web test-unit test-browser
 
 test-fast: $(VENV)/.dev web/node_modules/.installed ## Run the tests that take less than a minute together
 	cd web && npm test --silent
@@ -38,9 +38,6 @@ test-fast: $(VENV)/.dev web/node_modules/.installed ## Run the tests that take l
 
 test-web: web/node_modules/.installed
 	cd web && npm test --silent
-
-test-python: $(VENV)/.dev $(ROS2)/.installed server/web_dist/index.html
-	$(BIN)/python -m pytest -q -m "not long" $(PARALLEL)
 
 test-unit: $(VENV)/.dev $(ROS2)/.installed
 	$(BIN)/python -m pytest -q -m "not browser and not long" $(PARALLEL)

@@ -4,13 +4,13 @@ import asyncio
 import math
 import random
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from client import Console, NotArmed
 from robot_bridge.link_client import RobotLink
 from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Command, Feedback
+from robot_bridge.protocol.messages import Command, Feedback, Refusal
 from robot_bridge.protocol.serial import event_after
 
 __all__ = ["Pause", "Trip", "console_trips", "drive_on", "link_trips", "round_and_round"]
@@ -63,7 +63,7 @@ class Pause:
             pass
 
 
-async def drive_on(console: Console, values: Sequence[float]) -> Feedback:
+async def drive_on(console: Console, values: Mapping[str, float] | Sequence[float]) -> Feedback:
     """Drive, and arm first wherever the robot asks for it: nobody stands beside a simulated one.
 
     Raises:
@@ -97,23 +97,38 @@ async def console_trips(console: Console, count: int, *, seconds: float = 60.0, 
 
 
 async def link_trips(link: RobotLink, description: RobotDescription, count: int, *, seed: int = 1) -> list[Trip]:
-    """The same straight to the bridge, without a console between."""
+    """The same straight to the bridge, without a console between.
+
+    A busy machine may hold the robot up for so long that it wants a neutral command first; that is no trip.
+    """
     values, pause = round_and_round(description), Pause(description, seed)
-    newest = await _feedback_of(link, None)
+    rest = [axis.rest for axis in description.axes]
+    newest = await _feedback_of(link)
     trips: list[Trip] = []
     while len(trips) < count:
         sent = time.monotonic()
         event = event_after(newest.event)
-        moves = values(sent) if trips else [axis.rest for axis in description.axes]  # a neutral command comes first
+        moves = values(sent) if trips and not newest.neutral_needed else rest
         link.send(Command(event=event, issue=newest.issue, values=moves, nonce=newest.nonce))
-        newest = await _feedback_of(link, event)
-        trips.append(Trip(event, sent, time.monotonic()))
+        answer = await _answer_to(link, event)
+        if isinstance(answer, Feedback):
+            trips.append(Trip(event, sent, time.monotonic()))
+            newest = answer
+        else:
+            newest = await _feedback_of(link)
         await pause.after(sent)
     return trips
 
 
-async def _feedback_of(link: RobotLink, event: int | None) -> Feedback:
+async def _answer_to(link: RobotLink, event: int) -> Feedback | Refusal:
     async for message in link:
-        if isinstance(message, Feedback) and event in (None, message.event):
+        if isinstance(message, Feedback | Refusal) and message.event == event:
+            return message
+    raise RuntimeError("the robot link was closed")
+
+
+async def _feedback_of(link: RobotLink) -> Feedback:
+    async for message in link:
+        if isinstance(message, Feedback):
             return message
     raise RuntimeError("the robot link was closed")

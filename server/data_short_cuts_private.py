@@ -34,6 +34,7 @@ __all__ = ["ShortCuts"]
 
 ESTABLISHED = RTCSctpTransport.State.ESTABLISHED
 TSN_MODULO = 1 << 32
+LONGEST_ROUND_TRIP = 15.0  # s; what is longer is no path, but a clock that was set
 SACK_CHUNK = 16  # bytes of one without gaps and duplicates (RFC 9260 3.3.4)
 SACK_LENGTH = 12 + SACK_CHUNK  # of a packet that is such a one and nothing else
 
@@ -141,11 +142,8 @@ class ShortCuts:
         return chunk
 
     def _round_trip(self, seconds: float) -> None:
-        """A round trip as aiortc measures it, by the wall clock: one that was set meanwhile has measured nothing.
-
-        What takes longer than the timeout is sent again, and then it is no sample.
-        """
-        if 0 <= seconds <= 2 * self._sctp._rto:
+        """A round trip as aiortc measures it, by the wall clock: one that was set meanwhile has measured nothing."""
+        if 0 <= seconds <= LONGEST_ROUND_TRIP:
             self._take_round_trip(seconds)
 
     def _packet(self, chunks: bytes) -> bytes:

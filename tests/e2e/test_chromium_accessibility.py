@@ -79,7 +79,7 @@ async def _people_and_silencing(console: ConsolePage) -> None:
     await say(console, "session", {"type": "participants", "participants": people})
     await _tab(console, "People")
     await console.page.get_by_role("listitem").filter(has_text="Bo").get_by_role("button", name="Silence STOP…").click()
-    await console.page.get_by_text("links that were made with it, will have no effect").wait_for()
+    await console.page.get_by_text("STOP from Bo’s link, and from links that were made with it").wait_for()
 
 
 async def _notes(console: ConsolePage) -> None:

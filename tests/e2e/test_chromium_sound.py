@@ -1,5 +1,6 @@
 """What comes out of the loudspeaker in real Chromium, recorded from the sound card."""
 
+import asyncio
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from tests.support.stack import Stack, running_stack
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
 TONE = 440.0  # Hz, what the planar robot plays
+SILENT = 0.002
+PATIENCE = 30.0  # s
 
 
 async def test_the_robots_tone_is_heard(stack: Stack, chromium: Browser, sound_card: SoundCard) -> None:
@@ -73,5 +76,7 @@ async def test_a_dead_robot_link_is_silent(own_stack: Stack, chromium: Browser, 
         await console.until("s.streams.microphone.rendered > 20")
         with own_stack.frozen_bridge():
             await console.page.get_by_text("Robot unreachable").first.wait_for()
-            await sound_card.record(0.3)  # what was on its way to the sound card
-            assert tone_level(await sound_card.record(0.5), TONE) < 0.002
+            async with asyncio.timeout(PATIENCE):  # what was on its way to the sound card, for long on a busy machine
+                while tone_level(await sound_card.record(0.3), TONE) >= SILENT:
+                    pass
+            assert tone_level(await sound_card.record(1.0), TONE) < SILENT

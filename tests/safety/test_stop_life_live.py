@@ -323,7 +323,9 @@ async def test_in_a_random_life_the_robot_moves_only_as_the_rules_of_a_stop_let_
     told = [each.number for each in session.told]
     assert len(set(told)) == len(told), "two presses were told one number"
     for each in session.told:
-        numbers = robot.numbers.get(each.press, {each.number})  # a kill may have cut the record off
+        # A kill may have cut the record off, and what was not kept has another number in the bridge's next run.
+        numbers = robot.numbers.get(each.press, set()) if each.kept else {each.number}
+        numbers = numbers or {each.number}
         assert each.number in numbers, "another number than was told"
         assert not each.kept or len(numbers) == 1, "a press that was on the disk became another stop"
     assert not session.kept

@@ -1,8 +1,8 @@
 import type { ConsoleApp } from "./console_app";
 import { contactStrength, feelingOf, forceOf } from "./core/contact";
 import { clearTrace, createForceTrace, noteForce } from "./core/force_trace";
-import { Rumble } from "./input/rumble";
-import { ContactTone } from "./media/contact_tone";
+import type { Rumble } from "./input/rumble";
+import type { ContactTone } from "./media/contact_tone";
 import type { Feedback, ForceFeeling } from "./wire";
 
 const REFRESH_MS = 50;
@@ -12,13 +12,11 @@ const FELT_MS = 1000; // a force that was measured longer ago is not felt
 export class ContactFeeling {
   readonly trace = createForceTrace();
   private force = 0; // N
-  private readonly rumble = new Rumble();
-  private readonly tone: ContactTone;
+  rumble: Rumble | null = null; // as the tone: until its code is there
+  tone: ContactTone | null = null;
   private dueMs = 0;
 
-  constructor(private readonly app: ConsoleApp) {
-    this.tone = new ContactTone(app.audio);
-  }
+  constructor(private readonly app: ConsoleApp) {}
 
   took(feedback: Feedback, now: number): void {
     this.force = forceOf(feedback.wrench);
@@ -33,8 +31,8 @@ export class ContactFeeling {
 
   /** Nothing is felt or heard until the next feeling. */
   still(): void {
-    this.rumble.stop();
-    this.tone.sound(0);
+    this.rumble?.stop();
+    this.tone?.sound(0);
   }
 
   /** What was felt belonged to a connection that ended. */
@@ -46,7 +44,7 @@ export class ContactFeeling {
 
   close(): void {
     this.still();
-    this.tone.close();
+    this.tone?.close();
   }
 
   private feel(now: number): void {
@@ -56,8 +54,8 @@ export class ContactFeeling {
     const by = this.feeling(now);
     const strength = by === null ? 0 : contactStrength(this.force, by);
     const pad = settings.rumble && app.isArmed() ? app.controls.pad?.state : null;
-    this.rumble.feel(pad?.gamepad ?? null, strength, now);
-    this.tone.sound(settings.contactTone && app.room.isAudible() ? strength : 0);
+    this.rumble?.feel(pad?.gamepad ?? null, strength, now);
+    this.tone?.sound(settings.contactTone && app.room.isAudible() ? strength : 0);
   }
 
   /** How a contact feels; null while nothing may be felt. */

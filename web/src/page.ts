@@ -73,6 +73,11 @@ export class Page {
     this.app = new ConsoleApp(api, options, name, new TouchSticks(left, right), events, first);
     this.panels = this.build(left, right, api);
     this.later.use((parts) => this.takePad(parts));
+    this.later.use(({ Rumble, ContactTone, SceneSwitch }) => {
+      this.board.sceneSwitch = new SceneSwitch();
+      this.app.touch.rumble = new Rumble();
+      this.app.touch.tone = new ContactTone(this.app.audio);
+    });
     watchTouch();
   }
 
@@ -124,7 +129,7 @@ export class Page {
       keys: () => this.act("keys"),
       pads: () => this.act("pads"),
       scene: () => {
-        board.sceneSwitch.toggle();
+        board.sceneSwitch?.toggle();
         this.draw(performance.now());
       },
     });
@@ -161,7 +166,7 @@ export class Page {
     watchPageKeys(app, (action) => this.act(action));
     return [
       bar,
-      { element: tools.bar, update: () => tools.update(app, board.sceneSwitch.isOn) },
+      { element: tools.bar, update: () => tools.update(app, board.sceneSwitch?.isOn === true) },
       record,
       seat,
       alarm,

@@ -102,11 +102,6 @@ export function lacks(pad: PadSnapshot, layout: PadLayout): boolean {
   );
 }
 
-/** Only the standard mapping says which button is which; other pads are calibrated first. */
-export function isStandard(pad: PadSnapshot): boolean {
-  return pad.mapping === "standard";
-}
-
 function buttonPressure(pad: PadSnapshot, index: number): number {
   const found = pad.buttons[index];
   if (found === undefined) return 0;

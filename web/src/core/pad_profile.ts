@@ -1,6 +1,7 @@
 import { STANDARD_LAYOUT, type PadLayout } from "./pad_layout";
-import { isStandard, lacks, type PadSnapshot } from "./pad_mapping";
+import { lacks, type PadSnapshot } from "./pad_mapping";
 import { DEFAULT_SHAPING, type PadShaping } from "./pad_shaping";
+import { isStandard } from "./pad_standard";
 
 /** What is kept of one kind of pad. */
 export interface PadProfile {

@@ -1,7 +1,7 @@
 import { armRefusal } from "../core/arming";
 import { holdsSeat, isOperator } from "../core/console_state";
 import { actionName, type PadAction } from "../core/pad_layout";
-import { isStandard } from "../core/pad_mapping";
+import { isStandard } from "../core/pad_standard";
 import { warningSeconds } from "../core/start_warning";
 import { ARM_REFUSAL_WORDS, DISARM_WORDS } from "../core/words";
 import type { ConsoleApp } from "../console_app";

@@ -6,7 +6,7 @@ import { planViews, smallShape } from "../core/view_room";
 import { stalenessOf } from "../statistics";
 import type { StreamInfo } from "../wire";
 import { h, setData, setHidden, setText } from "./dom";
-import { SceneSwitch } from "./scene_switch";
+import type { SceneSwitch } from "./scene_switch";
 import type { SceneView } from "./scene_view";
 
 interface View {
@@ -28,7 +28,7 @@ const TOO_SLOW = "The 3D scene was closed: this machine draws it too slowly";
 export class ViewBoard {
   readonly element = h("main", "views", { "aria-label": "Views" });
   readonly gauges = h("div", "gauges");
-  readonly sceneSwitch = new SceneSwitch();
+  sceneSwitch: SceneSwitch | null = null; // until its code is there
   private readonly views = new Map<string, View>(); // cameras in their order, then the scene while it is there
   private readonly sceneView: View;
   private main: string | null = null;
@@ -68,8 +68,8 @@ export class ViewBoard {
     this.element.classList.toggle("is-locked", app.isArmed());
     this.followEpoch(app.state.robot?.epoch ?? null);
     if (this.scene.hasSettled(now) && app.ticker.isHeldUp(now)) this.dropScene(app);
-    if (this.scene.hasFailed && !this.sceneSwitch.isWanted) this.sceneSwitch.giveUp();
-    this.sceneSwitch.update(app, now);
+    if (this.scene.hasFailed && this.sceneSwitch?.isWanted === false) this.sceneSwitch.giveUp();
+    this.sceneSwitch?.update(app, now);
     this.showScene(app);
     this.scene.take(app.state.feedback);
     this.scene.update();
@@ -81,7 +81,7 @@ export class ViewBoard {
 
   /** The scene stands on the page or it does not: nothing is kept free for one that is not there. */
   private showScene(app: ConsoleApp): void {
-    const { isOn } = this.sceneSwitch;
+    const isOn = this.sceneSwitch?.isOn === true;
     const description = app.state.robot?.description;
     if (isOn && description !== undefined) this.scene.open(description);
     if (isOn === this.views.has(SCENE)) return;
@@ -118,7 +118,7 @@ export class ViewBoard {
   /** Nothing may keep STOP waiting, so a scene that this machine cannot draw fast enough goes. */
   private dropScene(app: ConsoleApp): void {
     if (this.scene.isFull) this.scene.unload();
-    else this.sceneSwitch.giveUp();
+    else this.sceneSwitch?.giveUp();
     const camera = [...this.views.keys()].find((name) => name !== SCENE);
     if (camera !== undefined && this.main === SCENE) this.swapIn(camera);
     note(app.state, "warning", TOO_SLOW, Date.now());

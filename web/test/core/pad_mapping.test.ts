@@ -1,13 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { STANDARD_LAYOUT } from "../../src/core/pad_layout";
-import {
-  deflection,
-  isStandard,
-  lacks,
-  readPad,
-  type PadReading,
-  type PadSnapshot,
-} from "../../src/core/pad_mapping";
+import { deflection, lacks, readPad, type PadReading, type PadSnapshot } from "../../src/core/pad_mapping";
+import { isStandard } from "../../src/core/pad_standard";
 import { DEFAULT_SHAPING } from "../../src/core/pad_shaping";
 import { ODD_LAYOUT, padOf } from "./pads";
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from bench.driving import drive_on
 from bench.emulator.client_paths import ClientPaths
 from bench.emulator.deliveries import Deliveries
 from bench.emulator.outages import Outages
@@ -67,7 +68,7 @@ async def test_a_published_picture_never_carries_a_newer_stamp_than_the_truth(
             try:
                 async with asyncio.timeout(60):
                     while len(shown) < SHOWN:
-                        feedback = await console.drive({"base.wz": 0.2})
+                        feedback = await drive_on(console, {"base.wz": 0.2})
             finally:
                 watching.cancel()
         await until_logged(stack, "feedback", lambda record: record["event"] >= feedback.event)

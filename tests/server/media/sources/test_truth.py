@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.driving import drive_on
 from client import Console
 from robot_bridge.robots.event_strip import read_event_strip
 from tests.client.truth import until_logged
@@ -55,7 +56,7 @@ async def test_a_camera_behind_an_unsteady_network_never_carries_a_newer_stamp_t
                 try:
                     async with asyncio.timeout(40):
                         while len(shown) < SHOWN:
-                            feedback = await console.drive({"base.wz": 0.2})
+                            feedback = await drive_on(console, {"base.wz": 0.2})
                 finally:
                     watching.cancel()
                 codecs = {stream.stream: stream.codec for stream in console.stats().streams}
