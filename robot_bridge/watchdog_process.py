@@ -2,10 +2,11 @@
 
     python -m robot_bridge.watchdog_process SECONDS package.module:function ARGUMENT...
 
-The function is called at once and returns what brings the robot to rest. The process hears of every tick through a pipe
-and calls that when none comes for so long while the robot moves, again every so often, and for three seconds when the
-pipe ends while the robot moves: then the bridge was killed. It needs nothing of the bridge's interpreter, so that it
-also works while native code keeps that from running anything.
+The function is called at once and returns what brings the robot to rest, and says False where nobody can have heard of
+that. The process hears of every tick through a pipe and calls it when none comes for so long while the robot moves,
+again every so often. When the pipe ends while the robot moves the bridge was killed: then it calls it for three seconds
+from the moment on at which somebody hears of it, or for half a minute in which nobody does. It needs nothing of the
+bridge's interpreter, so that it also works while native code keeps that from running anything.
 """
 
 import logging
@@ -22,7 +23,7 @@ from importlib import import_module
 from robot_bridge import clock
 from robot_bridge.errors import RobotUnavailable
 
-__all__ = ["WatchdogProcess", "watch"]
+__all__ = ["Act", "WatchdogProcess", "watch"]
 
 MOVING, RESTING, LEAVING = b"m", b"r", b"q"
 READY, ACTED = b"+", b"!"
@@ -31,6 +32,9 @@ CLOSE_SECONDS = 2.0
 SAYS_PER_LIMIT = 4  # ticks that are told, at least, in the time without any that counts
 TRIES = 3
 LAST_ACTS, LAST_INTERVAL = 30, 0.1  # s; when the bridge was killed
+LAST_SECONDS = 30.0  # for somebody to hear of it
+
+Act = Callable[[], bool | None]  # False: nobody can have heard of it
 
 _logger = logging.getLogger(__name__)
 
@@ -121,7 +125,7 @@ class WatchdogProcess:
             raise RobotUnavailable(f"the watchdog process is gone: {error}") from error
 
 
-def watch(heard: int, said: int, limit: float, act: Callable[[], None], now: clock.Clock = clock.now) -> None:
+def watch(heard: int, said: int, limit: float, act: Act, now: clock.Clock = clock.now) -> None:
     """Until the pipe `heard` ends or says that the bridge leaves in order. `said`: where an act is reported."""
     last, moving = now(), False
     while True:
@@ -134,36 +138,42 @@ def watch(heard: int, said: int, limit: float, act: Callable[[], None], now: clo
         news = os.read(heard, 4096)
         if not news:
             if moving:
-                _act_for_good(act, said)
+                _act_for_good(act, said, now)
             return
         if LEAVING in news:
             return
         last, moving = now(), news[-1:] == MOVING
 
 
-def _act_for_good(act: Callable[[], None], said: int) -> None:
+def _act_for_good(act: Act, said: int, now: clock.Clock) -> None:
     """The bridge is gone. What listens may not have found this process yet, and nobody says it later."""
     _logger.error("the bridge is gone: the robot is brought to rest by its watchdog process")
-    for _ in range(LAST_ACTS):
-        _act(act, said)
+    heard, end = 0, now() + LAST_SECONDS
+    while heard < LAST_ACTS and now() < end:
+        heard += _act(act, said)
         time.sleep(LAST_INTERVAL)
+    if heard == 0:
+        _logger.critical("nobody has heard that the robot has to rest")
 
 
-def _act(act: Callable[[], None], said: int) -> None:
+def _act(act: Act, said: int) -> bool:
+    """Whether somebody can have heard of it."""
+    is_heard = False
     for _ in range(TRIES):
         try:
-            act()
+            is_heard = act() is not False
             break
         except BaseException as error:
             _logger.critical("the watchdog process cannot bring the robot to rest: %r", error)
     with suppress(OSError):  # nobody hears it any more
         os.write(said, ACTED)
+    return is_heard
 
 
-def load(call: str, arguments: Sequence[str]) -> Callable[[], None]:
+def load(call: str, arguments: Sequence[str]) -> Act:
     """What the function that "package.module:function" names returns."""
     module, _, name = call.partition(":")
-    function: Callable[..., Callable[[], None]] = getattr(import_module(module), name)
+    function: Callable[..., Act] = getattr(import_module(module), name)
     return function(*arguments)
 
 

@@ -111,8 +111,8 @@ class Robot(ABC):
 
         For such code there is `rest_call`. A process of its own imports that module when the bridge starts, and calls
         the function with `rest_arguments`. What it returns is the function, without arguments, that brings the robot to
-        rest by a way of its own; it is called as this method is, and also when the bridge is killed while the robot
-        moves.
+        rest by a way of its own, and says False where nobody can have heard of that; it is called as this method is,
+        and also when the bridge is killed while the robot moves.
         """
         raise NotImplementedError
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robot_bridge import clock
+from robot_bridge import clock, watchdog_process
 from robot_bridge.bridge import Bridge
 from robot_bridge.errors import RobotFailed, RobotUnavailable
 from robot_bridge.protocol.description import RobotDescription
@@ -262,17 +262,32 @@ def test_the_process_acts_again_and_again_when_the_bridge_is_gone_while_the_robo
     assert _watched([MOVING], LEAVING, until=None, limit=60.0) == []
 
 
+def test_the_process_acts_until_somebody_has_heard_of_it_for_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Discovery may take longer than those acts."""
+    monkeypatch.setattr(watchdog_process, "LAST_INTERVAL", 0.001)
+    acts = _watched([MOVING], b"", until=None, limit=60.0, unheard=2 * LAST_ACTS)
+    assert len(acts) == 3 * LAST_ACTS
+    monkeypatch.setattr(watchdog_process, "LAST_SECONDS", 0.05)
+    assert _watched([MOVING], b"", until=None, limit=60.0, unheard=10**9), "and for a while where nobody ever does"
+
+
 def _watched(
-    says: Sequence[bytes], last: bytes, *, until: Callable[[list[int]], bool] | None, limit: float = 0.02
+    says: Sequence[bytes],
+    last: bytes,
+    *,
+    until: Callable[[list[int]], bool] | None,
+    limit: float = 0.02,
+    unheard: int = 0,
 ) -> list[int]:
-    """What `watch` does with these messages: its acts."""
+    """What `watch` does with these messages: its acts. `unheard`: of so many at first nobody can have heard."""
     acts: list[int] = []
     acted = threading.Event()
 
-    def act() -> None:
+    def act() -> bool:
         acts.append(1)
         if until is not None and until(acts):
             acted.set()
+        return len(acts) > unheard
 
     (heard, tell), (hear, said) = os.pipe(), os.pipe()
     thread = threading.Thread(target=watch, args=(heard, said, limit, act))

@@ -4,13 +4,12 @@ An arm needs none where it is driven by trajectories, which end by themselves af
 JointState, nobody but its own controller knows where it may stay.
 """
 
-from collections.abc import Callable
-
 import msgspec
 
 from robot_bridge.robots.ros2.ros_side import RosSide
 from robot_bridge.robots.ros2.settings import Base, Ros2Settings
 from robot_bridge.robots.ros2.twists import TwistMaker
+from robot_bridge.watchdog_process import Act
 
 __all__ = ["REST_CALL", "prepare", "rest_arguments"]
 
@@ -32,7 +31,7 @@ def rest_arguments(settings: Ros2Settings, base: Base, topic: str) -> tuple[str,
     return (msgspec.json.encode(own).decode(),)
 
 
-def prepare(encoded: str) -> Callable[[], None]:
+def prepare(encoded: str) -> Act:
     """The publisher is made now: those who listen need time to find it.
 
     Raises:
@@ -45,8 +44,10 @@ def prepare(encoded: str) -> Callable[[], None]:
     twists = TwistMaker(ros, settings.base.command)
     publisher = ros.publisher(twists.kind, settings.base.command.topic)
 
-    def rest() -> None:
+    def rest() -> bool:
+        is_heard: bool = publisher.get_subscription_count() > 0  # of those that have found this publisher, and it them
         publisher.publish(twists.make(0.0, 0.0, 0.0))
         ros.flush()
+        return is_heard
 
     return rest
