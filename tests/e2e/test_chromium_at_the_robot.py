@@ -141,10 +141,8 @@ async def test_before_the_first_motion_the_robot_warns_and_the_page_counts_down(
         await operator.until("s.driving && s.at_rest === false")
         assert (await operator.stats())["armed"], "the warning has not disarmed"
         await _warned(operator).wait_for(state="hidden")
-        assert robot.applied[:3] == [(False, False), (True, False), (False, False)], (
-            "it moved before or while it warned"
-        )
-        assert robot.applied[3] == (False, True)
+        at_work = [each for each in robot.applied if each != (False, False)]
+        assert at_work[:2] == [(True, False), (False, True)], "it moved before or while it warned"
 
 
 def _warned(console: ConsolePage) -> Locator:
