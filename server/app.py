@@ -3,7 +3,9 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import cache
 
+import msgspec
 from fastapi import FastAPI, Response
 from starlette.types import Lifespan
 
@@ -71,5 +73,11 @@ def attach_session(app: FastAPI, session: Services | None) -> None:
     app.state.recordings = None if session is None else session.recordings
 
 
+@cache
+def _description() -> msgspec.Raw:
+    """Made once: it is large, and anybody may ask for it."""
+    return msgspec.Raw(msgspec.json.encode(openapi_document()))
+
+
 async def _describe() -> Response:
-    return json_answer(openapi_document())
+    return json_answer(_description())

@@ -2,7 +2,9 @@
 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from functools import cache
 
+import msgspec
 from fastapi import FastAPI, Request, Response
 from starlette.routing import Mount
 
@@ -59,5 +61,11 @@ async def _with_slash(request: Request, name: str) -> Response:
     return Response(status_code=308, headers={"Location": f"{name}/"})
 
 
+@cache
+def _description() -> msgspec.Raw:
+    """Made once: it is large, and anybody may ask for it."""
+    return msgspec.Raw(msgspec.json.encode(fleet_openapi()))
+
+
 async def _describe() -> Response:
-    return json_answer(fleet_openapi())
+    return json_answer(_description())
