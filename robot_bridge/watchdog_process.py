@@ -2,11 +2,11 @@
 
     python -m robot_bridge.watchdog_process SECONDS package.module:function ARGUMENT...
 
-The function is called at once and returns what brings the robot to rest, and says False where nobody can have heard of
-that. The process hears of every tick through a pipe and calls it when none comes for so long while the robot moves,
-again every so often. When the pipe ends while the robot moves the bridge was killed: then it calls it for three seconds
-from the moment on at which somebody hears of it, or for half a minute in which nobody does. It needs nothing of the
-bridge's interpreter, so that it also works while native code keeps that from running anything.
+The function is called at once. It returns the call that brings the robot to rest; that call returns False while nobody
+listens. The process hears of every tick through a pipe. When no tick comes for SECONDS while the robot moves, it makes
+the call, and makes it again until a tick comes. When the pipe ends while the robot moves, the bridge was killed: the
+process goes on with the call for three seconds after the first that somebody could hear, or for half a minute in all.
+It needs nothing of the bridge's interpreter, so it also works while native code keeps that from running anything.
 """
 
 import logging

@@ -41,9 +41,10 @@ class RequestTurns:
         await turn
 
     async def begin(self) -> None:
-        """As `take`, for a new connection: it has its turn however many others wait, and they theirs.
+        """As `take`, for a new connection: every third turn is one's, however much other work waits.
 
-        Each beginning leaves room for two others: what has begun is served before the next one can push it out.
+        The two turns between are for connections that have begun, so that they are served before newer ones need their
+        places.
         """
         if self._may_begin(False):
             return

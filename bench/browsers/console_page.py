@@ -52,7 +52,7 @@ class ConsolePage:
         statistics: dict[str, Any] = await self.page.evaluate("window.lockstep.stats()")
         return statistics
 
-    async def until(self, condition: str, seconds: float = 20.0) -> None:
+    async def until(self, condition: str, seconds: float = 40.0) -> None:
         """Until `condition`, an expression over `s`, the page's statistics, is true; one that throws is not."""
         missed = await self._missed(condition, seconds)
         if missed is not None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser
+from playwright.async_api import Browser, expect
 
 from bench.browsers.chromium import running_chromium
 from bench.browsers.firefox import Firefox, running_firefox
@@ -21,6 +21,8 @@ from tests.e2e.as_new import as_new
 from tests.support.stack import Stack, running_stack
 
 HERE = Path(__file__).parent
+
+expect.set_options(timeout=30_000)  # ms; a page shows what it hears when a busy machine lets it draw
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from playwright.async_api import Browser, Locator
+from playwright.async_api import Browser, Locator, expect
 
 from bench.browsers.console_page import RB, ConsolePage, open_console
 from bench.processes import running_process
@@ -65,7 +65,7 @@ async def test_a_lock_at_the_robot_stops_it_for_everybody_and_takes_no_reset_unt
             plate = page.page.locator(".plate")
             await plate.get_by_text("Locked", exact=True).wait_for()
             await plate.get_by_text("Somebody at the robot has locked it").wait_for()
-            assert await plate.get_by_role("button").locator("visible=true").count() == 0
+            await expect(plate.get_by_role("button").locator("visible=true")).to_have_count(0)
         number = (await supervisor.stats())["stop"]["number"]
         await _until_old(stack, number)
         assert await supervisor.page.evaluate(RESET, number) == [409, "locked_out"]

@@ -24,11 +24,11 @@ async def test_a_robots_page_drives_shows_the_scene_invites_records_and_replays_
             await console.arm()
             record = page.locator(".record")
             await record.click()
-            await expect(record).to_contain_text("Rec 0:", timeout=20_000)
+            await expect(record).to_contain_text("Rec 0:")
             await console.drive_forward()
             await console.until("s.event > 8", 60)
             await record.click()
-            await expect(record).to_have_text("Record", timeout=20_000)
+            await expect(record).to_have_text("Record")
 
             async with page.expect_event("websocket", timeout=60_000) as viewer:  # its drawing is tested elsewhere
                 await console.open_full_scene()

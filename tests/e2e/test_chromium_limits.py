@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Browser
+from playwright.async_api import Browser, expect
 
 from bench.browsers.console_page import LEFT_X, LEFT_Y, RB, open_console
 from tests.support.stack import running_stack
@@ -20,8 +20,8 @@ async def test_a_geofence_and_the_speed_cap_are_shown_and_the_consoles_cap_canno
     ):
         await console.until_live()
         switch = console.page.get_by_role("switch", name="Slow down with delay")
-        assert await switch.get_attribute("aria-checked") == "true"
-        assert await switch.is_disabled()
+        await expect(switch).to_have_attribute("aria-checked", "true")
+        await expect(switch).to_be_disabled()
         await console.arm()
         await console.press(RB)
         await console.tilt(LEFT_Y, -0.9)

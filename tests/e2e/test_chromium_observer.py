@@ -1,7 +1,7 @@
 """An observer sees the same session and cannot drive; several pages share one robot."""
 
 import pytest
-from playwright.async_api import Browser
+from playwright.async_api import Browser, expect
 
 from bench.browsers.console_page import open_console
 from tests.support.stack import Stack
@@ -14,7 +14,7 @@ async def test_an_observer_sees_gated_pictures_and_has_no_way_to_arm(stack: Stac
         await observer.until_live()
         statistics = await observer.stats()
         assert statistics["role"] == "observer"
-        assert await observer.page.get_by_role("button", name="Arm", exact=True).count() == 0
+        await expect(observer.page.get_by_role("button", name="Arm", exact=True)).to_have_count(0)
         await observer.press(9)
         await observer.until("s.streams.overview.rendered > 30")
         assert not (await observer.stats())["armed"]

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.async_api import Browser
+from playwright.async_api import Browser, expect
 
 from bench.browsers.console_page import LEFT_Y, RB, START, ConsolePage, open_console
 from tests.support.stack import Stack
@@ -112,7 +112,7 @@ async def test_a_pad_without_the_standard_mapping_is_calibrated_tried_and_drives
         await page.get_by_text("has to be calibrated first").wait_for()
         await _calibrate(console, hand)
         save = page.get_by_role("button", name="Save")
-        assert await save.is_disabled()
+        await expect(save).to_be_disabled()
         await hand.press(DEADMAN)
         await hand.press(STOP)  # only tried: the robot is not stopped
         await hand.tilt(0, 1)

@@ -1,7 +1,7 @@
 """Names, notes, invitations and the audit trail, from page to page."""
 
 import pytest
-from playwright.async_api import Browser, Locator
+from playwright.async_api import Browser, Locator, expect
 
 from bench.browsers.console_page import ConsolePage, open_console
 from tests.support.stack import Stack
@@ -74,7 +74,7 @@ async def test_writing_a_note_lets_go_of_the_robot_and_its_keys_do_not_drive(sta
         statistics = await console.stats()
         assert not statistics["armed"]
         assert not statistics["stop"]["stopped"]
-        assert await field.input_value() == " wasd"
+        await expect(field).to_have_value(" wasd")
         moving = [each for each in list(stack.events("executed"))[executed:] if any(each["values"])]
         assert moving == []
         await console.page.keyboard.press("Escape")
@@ -116,13 +116,13 @@ async def test_an_invited_person_comes_in_by_link_or_qr_code_and_leaves_when_it_
             await guest.until("s.connected")
             assert (await guest.stats())["role"] == "observer"
             line = _dialogue(sue).get_by_role("listitem").filter(has_text="Guest")
-            await line.get_by_text("1 connected").wait_for(timeout=15_000)
+            await line.get_by_text("1 connected").wait_for()
             await line.get_by_role("button", name="Revoke").click()
             await line.get_by_text("Close their page?").click()
             await line.get_by_text("revoked").wait_for()
             await guest.page.locator(".plate").get_by_text("This link was revoked").wait_for()
             await guest.until("!s.connected")
-            assert await guest.page.locator("canvas.picture").first.is_hidden(), "no picture is left to look at"
+            await expect(guest.page.locator("canvas.picture").first, "no picture is left to look at").to_be_hidden()
         async with open_console(chromium, link, pad=False) as late:
             await late.page.locator(".plate").get_by_text("This link was revoked").wait_for()
 
@@ -135,7 +135,7 @@ async def test_an_operator_invites_observers_and_operators_only(stack: Stack, ch
         await ann.until("s.connected")
         await dee.until("s.connected")
         await _invite(ann, "Operator", "Ben")
-        assert await _dialogue(ann).get_by_role("button", name="Supervisor", exact=True).count() == 0
+        await expect(_dialogue(ann).get_by_role("button", name="Supervisor", exact=True)).to_have_count(0)
         for _ in range(12):
             await ann.page.keyboard.press("Tab")
             assert await ann.page.evaluate(REACHABLE), "focus left the dialogue for something that it covers"
@@ -145,7 +145,7 @@ async def test_an_operator_invites_observers_and_operators_only(stack: Stack, ch
         await _dialogue(ann).get_by_role("button", name="Close").press("Enter")
         assert await ann.page.evaluate("document.activeElement.textContent") == "Invite…"
         await _tab(dee, "People")
-        assert await dee.page.get_by_role("button", name="Invite…").count() == 0
+        await expect(dee.page.get_by_role("button", name="Invite…")).to_have_count(0)
 
 
 async def test_a_supervisor_reads_the_audit_trail_as_it_grows(own_stack: Stack, chromium: Browser) -> None:

@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Browser, Locator
+from playwright.async_api import Browser, Locator, expect
 
 from bench.browsers.console_page import RB, ConsolePage, open_console
 from tests.support.stack import Stack, running_stack
@@ -90,8 +90,8 @@ async def test_a_declined_request_changes_nothing_and_is_told(stack: Stack, chro
         await _button(ben, "Request control").click()
         await _button(ann, "Decline").click()
         await _says(ben, "Ann declined your request")
-        assert await _button(ben, "Request control").is_enabled()
-        assert await _button(ann, "Decline").count() == 0
+        await expect(_button(ben, "Request control")).to_be_enabled()
+        await expect(_button(ann, "Decline")).to_have_count(0)
         assert (await ann.stats())["driving"], "answering with the pointer lets go of nothing"
 
 
@@ -105,7 +105,7 @@ async def test_a_supervisor_takes_control_with_one_click_and_drives_after_arming
         await _drives(ann)
         await sue.until_live()
         assert not (await sue.stats())["seat"]["mine"], "a supervisor's page takes nothing by itself"
-        assert await sue.page.get_by_role("button", name="Arm", exact=True).count() == 0
+        await expect(sue.page.get_by_role("button", name="Arm", exact=True)).to_have_count(0)
         await _button(sue, "Take control").click()
         await _all_say((ann, "Sue took control from you"), (sue, "You took control from Ann. Arm to drive"))
         await _lost_the_seat(ann)

@@ -1,7 +1,7 @@
 """STOP from everybody, at any time; reset is the operator's and moves nothing."""
 
 import pytest
-from playwright.async_api import Browser
+from playwright.async_api import Browser, expect
 
 from bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
 from server.scene_page import HOOK
@@ -165,7 +165,7 @@ async def test_stop_works_while_a_dialogue_is_open_and_says_so_above_it(stack: S
         await observer.page.get_by_role("button", name="Stop the robot").click()
         await operator.until("s.stop.stopped")
         await operator.page.locator(".banner").get_by_text("Stopped by Dee").wait_for()
-        assert await dialogue.is_visible()
+        await expect(dialogue).to_be_visible()
         await dialogue.get_by_role("button", name="Close").click()
         await operator.reset()
         await operator.page.get_by_role("button", name="Invite…").click()
@@ -177,7 +177,7 @@ async def test_stop_works_while_a_dialogue_is_open_and_says_so_above_it(stack: S
         await dialogue.get_by_label("Name").fill("half written")
         await operator.page.keyboard.press("Escape")
         await operator.until("s.stop.stopped")
-        assert await dialogue.count() == 0, "Escape also closes it: the stop is to be seen"
+        await expect(dialogue, "Escape also closes it: the stop is to be seen").to_have_count(0)
 
 
 async def test_a_stop_key_works_inside_the_3d_scene(stack: Stack, chromium: Browser) -> None:

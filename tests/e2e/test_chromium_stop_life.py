@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.async_api import Browser, Locator
+from playwright.async_api import Browser, Locator, expect
 
 from bench.browsers.console_page import LEFT_Y, RB, ConsolePage, open_console
 from tests.e2e.tamper import open_tampered
@@ -103,7 +103,7 @@ async def test_a_hand_that_is_on_reset_does_not_release_the_stop_that_another_pa
         await operator.until("s.stop.stopped && s.stop_press === 'confirmed'")
         first = (await operator.stats())["stop"]["number"]
         await observer.page.locator(".plate").get_by_text("who has control, or a supervisor can reset it").wait_for()
-        assert await _hold_button(observer).count() == 0
+        await expect(_hold_button(observer)).to_have_count(0)
         await _hold_button(operator).wait_for()
         await _press_down(operator, _hold_button(operator))
         await observer.page.keyboard.press("Escape")

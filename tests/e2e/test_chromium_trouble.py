@@ -16,7 +16,7 @@ NOWHERE = "a=candidate:1 1 udp 2130706431 127.0.0.1 9 typ host\r\n"
 
 async def _says(page: Page, title: str, hint: str) -> None:
     plate = page.locator(".plate")
-    await expect(plate.locator(".plate-title")).to_have_text(title, timeout=20_000)
+    await expect(plate.locator(".plate-title")).to_have_text(title)
     await expect(plate).to_contain_text(hint)
 
 

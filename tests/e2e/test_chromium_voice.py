@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.async_api import Browser
+from playwright.async_api import Browser, expect
 
 from bench.browsers.chromium import running_chromium
 from bench.browsers.console_page import ConsolePage, open_console
@@ -87,7 +87,7 @@ async def test_the_holder_is_heard_while_the_button_is_held_and_everyone_sees_it
     ):
         await console.until_live()
         await console.until("s.seat && s.seat.mine")
-        assert await watcher.page.locator(".talk").is_hidden()
+        await expect(watcher.page.locator(".talk")).to_be_hidden()
         assert await level(card) < SILENT
         await talking(console, True)
         await console.page.locator(".talk-label", has_text="You are heard").wait_for()

@@ -1,0 +1,66 @@
+"""Pictures with a number drawn into them, whose stamps are held against what the bridge says of each event."""
+
+import asyncio
+from bisect import bisect_right
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from bench.driving import drive_on
+from client import Console
+from robot_bridge.robots.event_strip import read_event_strip
+from tests.client.truth import until_logged
+from tests.support.stack import Stack
+
+__all__ = ["Shown", "events_behind", "shown_while_driving"]
+
+
+class Shown(NamedTuple):
+    """A picture that the client has shown."""
+
+    number: int  # drawn into it
+    stamp: int | None
+
+
+async def shown_while_driving(console: Console, stream: str, count: int, seconds: float) -> tuple[list[Shown], int]:
+    """The first `count` pictures of the stream, and the newest event. Raises TimeoutError after `seconds`."""
+    shown: list[Shown] = []
+
+    async def watch() -> None:
+        async for picture in console.pictures(stream, keep=50):
+            number = read_event_strip(picture.frame.to_ndarray(format="gray"))
+            if number is not None:
+                shown.append(Shown(number, picture.stamp))
+
+    watching = asyncio.create_task(watch())
+    try:
+        async with asyncio.timeout(seconds):
+            while len(shown) < count:
+                feedback = await drive_on(console, {"base.wz": 0.2})
+    finally:
+        watching.cancel()
+    return shown, feedback.event
+
+
+async def events_behind(stack: Stack, shown: list[Shown], newest: int, captured: Mapping[int, float]) -> list[int]:
+    """How many events each stamp is behind the one that held when the picture was captured: never fewer than none.
+
+    `captured`: when, by number, on this machine's clock.
+    """
+    await until_logged(stack, "feedback", lambda record: record["event"] >= newest)
+    times, events = _truth(stack)
+    assert len({stamp for _, stamp in shown}) > 5
+    behind = []
+    for number, stamp in shown:
+        assert stamp is not None
+        held = events[bisect_right(times, captured[number]) - 1]
+        assert stamp <= held, f"picture {number} says {stamp}, and {held} held"
+        behind.append(held - stamp)
+    return behind
+
+
+def _truth(stack: Stack) -> tuple[list[float], list[int]]:
+    """When each event began to hold, by the bridge's own log; its clock is this machine's."""
+    first: dict[int, float] = {}
+    for record in stack.events("feedback"):
+        first.setdefault(record["event"], record["time"])
+    return list(first.values()), list(first)
