@@ -7,31 +7,42 @@
         async for event in connection:
             ...
 
-With `rtc.udp_socket`, this is the only file of the package that has sockets, a clock and timers. It decides nothing.
+With `rtc.udp_socket` and `rtc.server_links`, this is the only file of the package that has sockets, a clock and timers.
+It decides nothing.
 """
 
 import asyncio
+import secrets
+import socket
 import time
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Self
 
-from rtc.addresses import Address, Datagram
+from rtc.addresses import Address, Datagram, Path
 from rtc.certificate import Certificate
 from rtc.dcep import Reliability
 from rtc.dtls import dtls_context
 from rtc.ice.agent import Agent
-from rtc.ice.gathering import Advertised, gather
+from rtc.ice.check_list import LocalCandidate
+from rtc.ice.gathering import Advertised, gather, reflexive, relayed
 from rtc.ice.port import Port, PortSettings
 from rtc.peer import OfferedMedia, Peer, PeerSettings
 from rtc.peer_events import PacketReceived, PeerEnded, PeerEvent
-from rtc.sdp import LocalMedia, SessionDescription
+from rtc.sdp import Fragment, LocalMedia, SessionDescription
+from rtc.server_links import RelayLink, RelayRefused, open_relay
+from rtc.turn.servers import IceServer, MappedAddress, ServerUri, server_uris
 from rtc.udp_socket import UdpSocket
 
 __all__ = ["Connection", "Endpoint", "EndpointSettings", "TooManyPeers"]
+
+
+Listener = Callable[[PeerEvent], None]
+CLOCK_RESOLUTION = 0.001  # s, by which a loop may call too early
+SLOWEST = 4  # times as long as STUN over UDP: an address by TCP and TLS takes five round trips
+PORT_TRIES = 8  # a free port of one address may be taken at another
 
 
 class TooManyPeers(RuntimeError):
@@ -44,13 +55,20 @@ class EndpointSettings:
     port: PortSettings = field(default_factory=PortSettings)
     peers: int = 1024  # at a time; each has half a megabyte of buffers at the most
     waiting_packets: int = 4096  # media packets that an application has not read; more are dropped and counted
+    ask_seconds: float = 3.0  # for which STUN and TURN servers are waited for
+    ask_margin: float = 0.2  # s, at least, that the slower servers have when the first has answered
     waiting_events: int = 16_384  # of all kinds; an application that lets more wait does not live: the peer is closed
 
 
 class Connection:
-    """One peer: `rtc.peer.Peer` with a clock and a socket. Its events come by `async for`, once."""
+    """One peer: `rtc.peer.Peer` with a clock and a socket.
 
-    def __init__(self, endpoint: "Endpoint", peer: Peer, settings: EndpointSettings) -> None:
+    Its events come by `async for`, once; or a listener hears each as it happens, and nothing waits.
+    """
+
+    def __init__(
+        self, endpoint: "Endpoint", peer: Peer, settings: EndpointSettings, listener: Listener | None = None
+    ) -> None:
         self.peer = peer
         self.urgent = False  # whether its datagrams leave before those of others
         self.counts: Counter[str] = Counter()
@@ -58,6 +76,9 @@ class Connection:
         self._settings = settings
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
+        self._timer_at = 0.0
+        self._listener = listener
+        self._telling = False  # the listener, which may use this connection meanwhile
         self._waiting: deque[PeerEvent] = deque()
         self._arrived = asyncio.Event()
         self._ended = False  # PeerEnded is among those that wait, or was read
@@ -78,6 +99,20 @@ class Connection:
 
     def add_candidate(self, line: str) -> None:
         self.peer.add_candidate(line)
+        self.flush()
+
+    def restart(self, candidates: Sequence[LocalCandidate] | None = None) -> Fragment:
+        """`candidates`: None: those of the endpoint now."""
+        fragment = self.peer.restart(self._loop.time(), self._endpoint.candidates if candidates is None else candidates)
+        self.flush()
+        return fragment
+
+    def accept_restart(self, fragment: Fragment) -> None:
+        self.peer.accept_restart(fragment, self._loop.time())
+        self.flush()
+
+    def cancel_restart(self) -> None:
+        self.peer.cancel_restart()
         self.flush()
 
     # Sending: as of `Peer`
@@ -109,6 +144,10 @@ class Connection:
         self.peer.send_frame(mid, payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
         self.flush()
 
+    def send_rtcp(self, packet: bytes) -> None:
+        self.peer.send_rtcp(packet)
+        self.flush()
+
     def request_keyframe(self, mid: str) -> None:
         self.peer.request_keyframe(mid, self._loop.time())
         self.flush()
@@ -135,12 +174,32 @@ class Connection:
 
     def flush(self) -> None:
         """Send what is due, hand out what happened, and set the timer anew. Call it after you used `peer` itself."""
-        for event in self.peer.events():
-            self._keep(event)
+        if self._listener is None:
+            for event in self.peer.events():
+                self._keep(event)
+        else:
+            self._tell(self._listener)
         self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
         self._set_timer()
         if self._ended:
             self._endpoint.forget(self)
+
+    def _tell(self, listener: Listener) -> None:
+        """In order, also when the listener's own doing makes further events. What it raises is a fault of its own."""
+        self._waiting.extend(self.peer.events())
+        if self._telling:
+            return
+        self._telling = True
+        try:
+            while self._waiting:
+                event = self._waiting.popleft()
+                self._ended = isinstance(event, PeerEnded)
+                try:
+                    listener(event)
+                except Exception as error:
+                    self._loop.call_exception_handler({"message": "a listener failed", "exception": error})
+        finally:
+            self._telling = False
 
     def _keep(self, event: PeerEvent) -> None:
         waiting = len(self._waiting)
@@ -157,16 +216,23 @@ class Connection:
         self._arrived.set()
 
     def _set_timer(self) -> None:
+        """A timer that fires too early is left: most are put off by the next datagram, and nobody waits for them."""
+        due = self.peer.timer()
         if self._timer is not None:
+            if due is not None and self._timer_at <= due:
+                return
             self._timer.cancel()
             self._timer = None
-        due = self.peer.timer()
         if due is not None:
-            self._timer = self._loop.call_at(due, self._due)
+            self._timer, self._timer_at = self._loop.call_at(due, self._due), due
 
     def _due(self) -> None:
         self._timer = None
-        self.peer.handle_timer(self._loop.time())
+        due, now = self.peer.timer(), self._loop.time()
+        if due is None or due > now + CLOCK_RESOLUTION:
+            self._set_timer()
+            return
+        self.peer.handle_timer(max(now, due))
         self.flush()
 
 
@@ -184,7 +250,8 @@ class Endpoint:
     ) -> None:
         """
         Args:
-            hosts: addresses of this machine, those to prefer first; all have the same port.
+            hosts: addresses of this machine, those to prefer first; all have the same port. None at all: the peer
+                reaches us through TURN servers only (`ask`).
             port: 0: a free one.
             certificate: None: a new one.
             advertised: addresses of a 1:1 NAT in front of us.
@@ -204,11 +271,23 @@ class Endpoint:
         self._hosts = list(hosts)
         self._number = port
         self._advertised = tuple(advertised)
-        with ExitStack() as stack:
-            stack.callback(self.close)
-            for host in hosts:
-                self._bind(host)
-            stack.pop_all()
+        self._told: list[LocalCandidate] = []  # by servers
+        self._relays: list[RelayLink] = []
+        self._probes: dict[Path, MappedAddress] = {}
+        self._probed = asyncio.Event()  # one of them has heard something
+        for left in reversed(range(PORT_TRIES)):
+            try:
+                self._bind_all()
+                break
+            except OSError:
+                self.close()
+                if port or not left:
+                    raise
+                self._number = 0
+
+    def _bind_all(self) -> None:
+        for host in self._hosts:
+            self._bind(host)
 
     def _bind(self, host: str) -> None:
         found = UdpSocket.bind(host, self._number)
@@ -216,20 +295,121 @@ class Endpoint:
         self._number = found.address[1]
         self._loop.add_reader(found.fileno(), self._readable, found)
 
-    def connect(self, *, controlling: bool, settings: PeerSettings | None = None) -> Connection:
-        """A connection that is to be negotiated; `controlling` is as of `Peer`. Raises TooManyPeers."""
+    # Where peers reach us
+
+    @property
+    def candidates(self) -> list[LocalCandidate]:
+        """Of our own addresses, and of those that servers have told."""
+        return [*gather(self._hosts, self._number, advertised=self._advertised), *self._told]
+
+    def use_hosts(self, hosts: Sequence[str]) -> None:
+        """After a change of the network: these are our addresses now. Those that cannot be bound are left out.
+
+        A socket of an address that is gone stays, for it costs nothing and the address may come back.
+        """
+        known = {address[0] for address in self._sockets}
+        for host in hosts:
+            if host not in known:
+                try:
+                    self._bind(host)
+                except OSError:
+                    self.counts["host_not_bound"] += 1
+        bound = {address[0] for address in self._sockets}
+        self._hosts = [host for host in hosts if host in bound]
+
+    async def ask(self, servers: Sequence[IceServer]) -> list[RelayRefused | OSError]:
+        """Ask STUN servers how they see us, and TURN servers for addresses; `candidates` has what they told.
+
+        Addresses of earlier answers that carry nothing are given back. Returns why servers gave none.
+        """
+        self._give_back_unused()
+        uris = server_uris(servers, self.counts)
+        tasks = [self._loop.create_task(self._ask_turn(*each)) for each in uris if each[0].scheme == "turn"]
+        tasks += [self._loop.create_task(self._ask_stun(each[0])) for each in uris if each[0].scheme == "stun"]
+        begun, left = self._loop.time(), set(tasks)
+        deadline = begun + self.settings.ask_seconds
+        try:
+            while left and self._loop.time() < deadline:
+                done, left = await asyncio.wait(
+                    left, timeout=deadline - self._loop.time(), return_when=asyncio.FIRST_COMPLETED
+                )
+                if any(each.exception() is None for each in done):
+                    now = self._loop.time()
+                    deadline = min(deadline, now + max(self.settings.ask_margin, SLOWEST * (now - begun)))
+        finally:
+            for task in tasks:
+                task.cancel()
+            outcomes = await asyncio.gather(*tasks, return_exceptions=True)
+            self._probes.clear()
+        self._told = [each for found in outcomes if isinstance(found, list) for each in found]
+        return [each for each in outcomes if isinstance(each, OSError)]
+
+    async def _ask_turn(self, uri: ServerUri, server: IceServer) -> list[LocalCandidate]:
+        link = await open_relay(uri, server, self._relayed)
+        self._relays.append(link)
+        address = link.relayed
+        return [] if address is None else [relayed(address, link.mapped, len(self._relays))]
+
+    async def _ask_stun(self, uri: ServerUri) -> list[LocalCandidate]:
+        found = await self._loop.getaddrinfo(uri.host, uri.port, type=socket.SOCK_DGRAM)
+        probes: dict[Address, MappedAddress] = {}
+        for base, of_base in self._sockets.items():
+            family = socket.AF_INET6 if ":" in base[0] else socket.AF_INET
+            remote = next((each[4] for each in found if each[0] == family), None)
+            if remote is not None and base[0] in self._hosts:
+                path = Path(base, (str(remote[0]), int(remote[1])))
+                self._probes[path] = probes[base] = MappedAddress(secrets.token_bytes)
+                probes[base].start(self._loop.time())
+                self._send_probe(path, of_base)
+        await self._until_answered(list(probes.values()))
+        return [
+            reflexive(probe.mapped, base, place)
+            for place, (base, probe) in enumerate(probes.items())
+            if probe.mapped is not None and probe.mapped != base
+        ]
+
+    async def _until_answered(self, probes: Sequence[MappedAddress]) -> None:
+        """As soon as one is, which is enough: those of other addresses may have no way there."""
+        while not any(each.mapped is not None for each in probes) and not all(each.done for each in probes):
+            due = min((each for each in (probe.timer() for probe in probes) if each is not None), default=None)
+            self._probed.clear()
+            try:
+                async with asyncio.timeout_at(due):
+                    await self._probed.wait()
+            except TimeoutError:
+                for path, probe in self._probes.items():
+                    if probe in probes and (at := probe.timer()) is not None and at <= self._loop.time():
+                        probe.handle_timer(self._loop.time())
+                        self._send_probe(path, self._sockets[path.local])
+
+    def _send_probe(self, path: Path, found: UdpSocket) -> None:
+        self.send([Datagram(data, path) for data in self._probes[path].data_to_send()], urgent=False)
+
+    def _give_back_unused(self) -> None:
+        in_use = {path.local for each in self._connections.values() if (path := each.peer.ice.path) is not None}
+        for link in [each for each in self._relays if each.relayed not in in_use]:
+            link.close()
+            self._relays.remove(link)
+
+    def connect(
+        self, *, controlling: bool, settings: PeerSettings | None = None, listener: Listener | None = None
+    ) -> Connection:
+        """A connection that is to be negotiated; `controlling` is as of `Peer`. Raises TooManyPeers.
+
+        `listener`: hears its events as they happen; it may use the connection, and closes nothing else.
+        """
         if len(self._connections) >= self.settings.peers:
             raise TooManyPeers(f"{len(self._connections)} peers")
         epoch = time.time() - self._loop.time()
         peer = Peer(
             self._context,
             self.certificate.fingerprint,
-            gather(self._hosts, self._number, advertised=self._advertised),
+            self.candidates,
             controlling=controlling,
             settings=replace(settings or self.settings.peer, epoch=epoch),
             directory=self.port.directory,
         )
-        connection = Connection(self, peer, self.settings)
+        connection = Connection(self, peer, self.settings, listener)
         self._connections[peer.ice] = connection
         return connection
 
@@ -237,6 +417,9 @@ class Endpoint:
         """Close every connection and the port. Idempotent."""
         for connection in list(self._connections.values()):
             connection.close()
+        for link in self._relays:
+            link.close()
+        self._relays.clear()
         self._flush()
         for found in self._sockets.values():
             self._loop.remove_reader(found.fileno())
@@ -259,12 +442,19 @@ class Endpoint:
         for datagram in datagrams:
             found = self._sockets.get(datagram.local)
             if found is None:
-                self.counts["no_socket"] += 1
+                self._send_relayed(datagram)
             else:
                 found.queue((datagram,), urgent=urgent)
         if datagrams and not self._flush_is_due:
             self._flush_is_due = True
             self._loop.call_soon(self._flush)
+
+    def _send_relayed(self, datagram: Datagram) -> None:
+        link = next((each for each in self._relays if each.relayed == datagram.local), None)
+        if link is None:
+            self.counts["no_socket"] += 1
+        else:
+            link.send(datagram.data, datagram.remote)
 
     def forget(self, connection: Connection) -> None:
         self._connections.pop(connection.peer.ice, None)
@@ -275,12 +465,24 @@ class Endpoint:
         now = self._loop.time()
         heard: dict[Connection, None] = {}  # in order
         for data, path in found.receive():
+            if path in self._probes:
+                self._probes[path].receive(data, now)
+                self._probed.set()
+                continue
             agent = self.port.route(data, path, now)
             connection = self._connections.get(agent) if agent is not None else None
             if connection is not None:
                 connection.peer.receive_datagram(data, path, now)
                 heard[connection] = None
         for connection in heard:
+            connection.flush()
+
+    def _relayed(self, data: bytes, path: Path) -> None:
+        now = self._loop.time()
+        agent = self.port.route(data, path, now)
+        connection = self._connections.get(agent) if agent is not None else None
+        if connection is not None:
+            connection.peer.receive_datagram(data, path, now)
             connection.flush()
 
     def _flush(self) -> None:

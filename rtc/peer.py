@@ -25,16 +25,28 @@ from rtc.ice.candidates import CandidateError, parse_candidate
 from rtc.ice.check_list import LocalCandidate
 from rtc.ice.credentials import Credentials
 from rtc.ice.directory import Directory
-from rtc.ice.events import Ended, PathChanged
+from rtc.ice.events import Ended, PathChanged, Restarted, RestartFailed
 from rtc.ice.settings import IceSettings
-from rtc.peer_events import Connected, MediaEvent, PacketReceived, PathFound, PeerEnded, PeerEvent
+from rtc.peer_events import (
+    Connected,
+    MediaEvent,
+    PacketReceived,
+    PathFound,
+    PeerEnded,
+    PeerEvent,
+    PlainRtcp,
+    PlainRtp,
+)
 from rtc.rtp.outgoing import PathShare
 from rtc.rtp.stage import earliest
 from rtc.rtp.streams import Identity, NegotiatedMedia, Streams
 from rtc.sctp import SctpSettings
 from rtc.sdp import (
+    Fragment,
+    FragmentCandidate,
     LocalMedia,
     MediaSection,
+    SdpError,
     SessionDescription,
     Setup,
     Source,
@@ -128,6 +140,8 @@ class Peer:
         self.streams: Streams | None = None  # None until both descriptions are known
         self._protect: SrtpSender | None = None
         self._unprotect: SrtpReceiver | None = None
+        self._plain_packets = False
+        self._tagged: MediaSection | None = None  # whose transport is that of the bundle; None until negotiated
         self._out: list[Datagram] = []
         self._events: list[PeerEvent] = []
         self._now = 0.0
@@ -180,6 +194,62 @@ class Peer:
         except CandidateError:
             self.counts["candidate_malformed"] += 1
 
+    # A restart of ICE: what is encrypted stays, the path changes (RFC 8445 9, RFC 8842 5.1)
+
+    @property
+    def tagged(self) -> MediaSection:
+        """The section that candidates are for (RFC 9143 7.2.1). Raises PeerNotReady before both descriptions."""
+        if self._tagged is None:
+            raise PeerNotReady("not negotiated yet")
+        return self._tagged
+
+    def restart(self, now: float, candidates: Iterable[LocalCandidate] | None = None) -> Fragment:
+        """Look for another path, for the peer's fragment to go to `accept_restart`; `Restarted` or `RestartFailed`
+        follows. Until then the path is the one before, for as long as the peer consents.
+
+        `candidates`: where the peer may reach us now; None: where it could before. Raises PeerNotReady.
+        """
+        mid = self._check_alive().mid
+        credentials = self.ice.restart(now, candidates)
+        self._now = now
+        lines = (local.candidate.line() for local in self.ice.local_candidates)
+        found = tuple(FragmentCandidate(mid, line) for line in lines)
+        return Fragment(credentials.ufrag, credentials.password, found, end_of_candidates=True)
+
+    def accept_restart(self, fragment: Fragment, now: float) -> None:
+        """What the peer answers to the fragment of `restart`.
+
+        Raises:
+            SdpError: it has no credentials; the restart waits for a better one.
+            RuntimeError: no restart waits for it.
+        """
+        if not fragment.ufrag or not fragment.password:
+            raise SdpError("no ice-ufrag or no ice-pwd")
+        self._now = now
+        self.ice.set_remote(Credentials(fragment.ufrag, fragment.password), (), now)
+        for candidate in fragment.candidates:
+            self.add_candidate(candidate.line)
+        self._settle(now)
+
+    def answer_restart(
+        self, fragment: Fragment, now: float, candidates: Iterable[LocalCandidate] | None = None
+    ) -> Fragment:
+        """Our fragment for a restart that the peer has begun. Raises SdpError and PeerNotReady."""
+        if not fragment.ufrag or not fragment.password:
+            raise SdpError("no ice-ufrag or no ice-pwd")
+        answer = self.restart(now, candidates)
+        self.accept_restart(fragment, now)
+        return answer
+
+    def cancel_restart(self) -> None:
+        """The path before it stays. Nothing without one."""
+        self.ice.cancel_restart()
+
+    def _check_alive(self) -> MediaSection:
+        if self._ended:
+            raise PeerNotReady("the session has ended")
+        return self.tagged
+
     def _check_new(self) -> None:
         if self._dtls is not None:
             raise RuntimeError("this session is negotiated; another one is another peer")
@@ -210,6 +280,7 @@ class Peer:
     ) -> None:
         """`ours`: the answer's sections with our direction."""
         self._now = now
+        self._tagged = next(iter(answer.accepted), None)
         media = [
             NegotiatedMedia(
                 section,
@@ -246,6 +317,29 @@ class Peer:
             self.add_candidate(line)
         if self.ice.path is not None:
             self._start_dtls(now)
+
+    # Media without stages
+
+    def take_plain_packets(self) -> None:
+        """Hand out what comes decrypted and unread, as PlainRtp and PlainRtcp: for somebody who only counts.
+
+        Nothing reports on it then, or asks for what is missing.
+        """
+        self._plain_packets = True
+
+    def send_rtcp(self, packet: bytes) -> None:
+        """A compound packet of the application's own. Raises PeerNotReady before media are up, SrtpPacketTooLong."""
+        if self._protect is None or self._ended:
+            raise PeerNotReady("media are not up")
+        path = self.ice.path
+        protected = self._protect.protect_rtcp(packet)
+        if path is not None:
+            self._out.append(Datagram(protected, path))
+
+    def note_round_trip(self, seconds: float) -> None:
+        """The application has measured the path: lost packets are asked for accordingly."""
+        if self.streams is not None:
+            self.streams.share.round_trip.measure(seconds)
 
     # What the application sends
 
@@ -373,11 +467,15 @@ class Peer:
             self.counts["media_early"] += 1
         elif kind is DatagramKind.RTP:
             plain = self._unprotect.unprotect(data)
-            if plain is not None:
+            if plain is not None and self._plain_packets:
+                self._events.append(PlainRtp(plain))
+            elif plain is not None:
                 self.streams.receive_rtp(plain, now)
         else:
             plain = self._unprotect.unprotect_rtcp(data)
-            if plain is not None:
+            if plain is not None and self._plain_packets:
+                self._events.append(PlainRtcp(plain))
+            elif plain is not None:
                 self.streams.receive_rtcp(plain, now)
 
     def _settle(self, now: float) -> None:
@@ -386,6 +484,8 @@ class Peer:
             if isinstance(event, PathChanged):
                 self._events.append(PathFound(event.path))
                 self._start_dtls(now)
+            elif isinstance(event, Restarted | RestartFailed):
+                self._events.append(event)
             elif isinstance(event, Ended):
                 self._end(event.reason)
         if self._dtls is not None:

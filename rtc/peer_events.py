@@ -1,13 +1,26 @@
 """What a peer tells whoever uses it. Events of its data channels are in `rtc.channels`."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rtc.addresses import Path
 from rtc.channels import ChannelEvent
+from rtc.ice.events import Restarted, RestartFailed
 from rtc.rtp.packet import RtpPacket
 from rtc.rtp.stage import StreamEvent
 
-__all__ = ["Connected", "MediaEvent", "PacketReceived", "PathFound", "PeerEnded", "PeerEvent"]
+__all__ = [
+    "Connected",
+    "MediaEvent",
+    "PacketReceived",
+    "PathFound",
+    "PeerEnded",
+    "PeerEvent",
+    "PlainRtcp",
+    "PlainRtp",
+    "RestartFailed",
+    "Restarted",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +45,18 @@ class PacketReceived:
     packet: RtpPacket
 
 
+class PlainRtp(NamedTuple):
+    """A packet, decrypted and otherwise as it came, after `Peer.take_plain_packets`. A tuple for the sake of speed."""
+
+    data: bytes
+
+
+class PlainRtcp(NamedTuple):
+    """The same of a compound RTCP packet."""
+
+    data: bytes
+
+
 @dataclass(frozen=True, slots=True)
 class MediaEvent:
     """Something about the stream in section `mid`."""
@@ -52,4 +77,15 @@ class PeerEnded:
     detail: str = ""
 
 
-PeerEvent = PathFound | Connected | PacketReceived | MediaEvent | ChannelEvent | PeerEnded
+PeerEvent = (
+    PathFound
+    | Restarted
+    | RestartFailed
+    | Connected
+    | PacketReceived
+    | PlainRtp
+    | PlainRtcp
+    | MediaEvent
+    | ChannelEvent
+    | PeerEnded
+)

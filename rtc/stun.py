@@ -8,6 +8,7 @@ import hmac
 import ipaddress
 import struct
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from hashlib import sha1
@@ -22,7 +23,12 @@ __all__ = [
     "StunError",
     "StunErrorCode",
     "is_authentic",
+    "pack",
+    "pack_address",
     "parse",
+    "parse_address",
+    "parse_error_code",
+    "read_attributes",
     "serialize",
     "transaction_of",
     "username_of",
@@ -101,16 +107,8 @@ def parse(data: bytes) -> Message:
     Raises:
         StunError: too long or short, not STUN, a false fingerprint, or an attribute of a form that it cannot have.
     """
-    attributes = _attributes(data)
+    values = read_attributes(data)
     kind_and_method, _, _, transaction = HEADER.unpack_from(data)
-    values: dict[int, bytes] = {}
-    not_understood = []
-    for kind, start, length in attributes:
-        if MESSAGE_INTEGRITY in values and kind != FINGERPRINT:
-            continue  # not covered by it (RFC 8489 14.5)
-        if kind not in UNDERSTOOD and kind < 0x8000:
-            not_understood.append(kind)
-        values.setdefault(kind, data[start : start + length])  # the first one counts (RFC 8489 14)
     username = values.get(USERNAME)
     return Message(
         kind=Kind(kind_and_method & 0x110),
@@ -121,11 +119,25 @@ def parse(data: bytes) -> Message:
         use_candidate=_flag(values.get(USE_CANDIDATE)),
         controlling=_number(values.get(ICE_CONTROLLING), 8),
         controlled=_number(values.get(ICE_CONTROLLED), 8),
-        mapped=_xor_address(values.get(XOR_MAPPED_ADDRESS), transaction),
-        error=_error_code(values.get(ERROR_CODE)),
+        mapped=parse_address(values.get(XOR_MAPPED_ADDRESS), transaction),
+        error=parse_error_code(values.get(ERROR_CODE)),
         unknown_attributes=_numbers(values.get(UNKNOWN_ATTRIBUTES, b"")),
-        not_understood=tuple(not_understood),
+        not_understood=tuple(kind for kind in values if kind not in UNDERSTOOD and kind < 0x8000),
     )
+
+
+def read_attributes(data: bytes, most: int = MAX_MESSAGE) -> dict[int, bytes]:
+    """The attributes of a message of at most `most` bytes, by their type; of several of one type the first.
+
+    Raises:
+        StunError: too long or short, not STUN, or a false fingerprint.
+    """
+    values: dict[int, bytes] = {}
+    for kind, start, length in _attributes(data, most):
+        if MESSAGE_INTEGRITY in values and kind != FINGERPRINT:
+            continue  # not covered by it (RFC 8489 14.5)
+        values.setdefault(kind, data[start : start + length])  # the first one counts (RFC 8489 14)
+    return values
 
 
 def serialize(message: Message, password: str | None = None) -> bytes:
@@ -134,25 +146,41 @@ def serialize(message: Message, password: str | None = None) -> bytes:
     Raises:
         StunError: a value of the message does not fit its attribute.
     """
-    body = b"".join(_attribute(kind, value) for kind, value in _values(message))
-    end = len(body) + (INTEGRITY_BYTES if password is not None else 0)
+    key = None if password is None else password.encode()
+    return pack(message.kind, message.method, message.transaction, _values(message), key)
+
+
+def pack(
+    kind: Kind, method: int, transaction: bytes, attributes: Iterable[tuple[int, bytes]], key: bytes | None = None
+) -> bytes:
+    """A message of any attributes; MESSAGE-INTEGRITY and FINGERPRINT are as `serialize` has them.
+
+    Raises:
+        StunError: a transaction or method that fits no header, or more than MAX_MESSAGE bytes.
+    """
+    body = b"".join(_attribute(number, value) for number, value in attributes)
+    end = len(body) + (INTEGRITY_BYTES if key is not None else 0)
     if HEADER.size + end + FINGERPRINT_BYTES > MAX_MESSAGE:
         raise StunError("message of too many bytes")
-    if password is not None:
-        digest = hmac.digest(password.encode(), _header(message, end) + body, sha1)
+    if key is not None:
+        digest = hmac.digest(key, _header(kind, method, transaction, end) + body, sha1)
         body += _attribute(MESSAGE_INTEGRITY, digest)
-    data = _header(message, end + FINGERPRINT_BYTES) + body
+    data = _header(kind, method, transaction, end + FINGERPRINT_BYTES) + body
     return data + _attribute(FINGERPRINT, (zlib.crc32(data) ^ FINGERPRINT_MASK).to_bytes(4))
 
 
-def is_authentic(data: bytes, password: str) -> bool:
-    """Whether `data`, which `parse` has accepted, has a MESSAGE-INTEGRITY of this password (RFC 8489 14.5)."""
+def is_authentic(data: bytes, password: str | bytes) -> bool:
+    """Whether `data`, which `parse` has accepted, has a MESSAGE-INTEGRITY of this password (RFC 8489 14.5).
+
+    As bytes it is the key of a long-term credential (RFC 8489 9.2.2).
+    """
+    secret = password.encode() if isinstance(password, str) else password
     for kind, start, length in _attributes(data):
         if kind == MESSAGE_INTEGRITY:
             covered = start - ATTRIBUTE.size
             # The length field as it was when the sender computed the digest: this attribute was the last.
             text = data[:2] + (start + 20 - HEADER.size).to_bytes(2) + data[4:covered]
-            return hmac.compare_digest(hmac.digest(password.encode(), text, sha1), data[start : start + length])
+            return hmac.compare_digest(hmac.digest(secret, text, sha1), data[start : start + length])
     return False
 
 
@@ -183,10 +211,10 @@ def username_of(data: bytes) -> str | None:
     return None
 
 
-def _attributes(data: bytes) -> list[tuple[int, int, int]]:
+def _attributes(data: bytes, most: int = MAX_MESSAGE) -> list[tuple[int, int, int]]:
     """Type, where the value begins, and its length, of every attribute."""
-    if not HEADER.size <= len(data) <= MAX_MESSAGE:
-        raise StunError("not between 20 and 1280 bytes")
+    if not HEADER.size <= len(data) <= most:
+        raise StunError(f"not between 20 and {most} bytes")
     kind_and_method, length, cookie, _ = HEADER.unpack_from(data)
     if kind_and_method & 0xC000 or cookie != COOKIE:
         raise StunError("not STUN")
@@ -220,11 +248,11 @@ def _method(kind_and_method: int) -> int:
     return kind_and_method & 0xF | (kind_and_method & 0xE0) >> 1 | (kind_and_method & 0x3E00) >> 2
 
 
-def _header(message: Message, length: int) -> bytes:
-    if len(message.transaction) != 12 or not 0 <= message.method < 1 << 12:
+def _header(kind: Kind, method: int, transaction: bytes, length: int) -> bytes:
+    if len(transaction) != 12 or not 0 <= method < 1 << 12:
         raise StunError("a transaction has 12 bytes and a method 12 bits")
-    spread = message.method & 0xF | (message.method & 0x70) << 1 | (message.method & 0xF80) << 2
-    return HEADER.pack(spread | message.kind, length, COOKIE, message.transaction)
+    spread = method & 0xF | (method & 0x70) << 1 | (method & 0xF80) << 2
+    return HEADER.pack(spread | kind, length, COOKIE, transaction)
 
 
 def _text(value: bytes, most: int) -> str:
@@ -256,7 +284,8 @@ def _numbers(value: bytes) -> tuple[int, ...]:
     return struct.unpack(f"!{len(value) // 2}H", value)
 
 
-def _error_code(value: bytes | None) -> StunErrorCode | None:
+def parse_error_code(value: bytes | None) -> StunErrorCode | None:
+    """The value of ERROR-CODE, which may be absent. Raises StunError."""
     if value is None:
         return None
     if len(value) < 4 or not 3 <= value[2] & 7 <= 6 or value[3] > 99:
@@ -264,7 +293,8 @@ def _error_code(value: bytes | None) -> StunErrorCode | None:
     return StunErrorCode((value[2] & 7) * 100 + value[3], _text(value[4:], MAX_REASON))
 
 
-def _xor_address(value: bytes | None, transaction: bytes) -> Address | None:
+def parse_address(value: bytes | None, transaction: bytes) -> Address | None:
+    """The value of an attribute in the form of XOR-MAPPED-ADDRESS, which may be absent. Raises StunError."""
     if value is None:
         return None
     if (len(value), value[1:2]) not in ((8, b"\x01"), (20, b"\x02")):
@@ -288,7 +318,7 @@ def _values(message: Message) -> list[tuple[int, bytes]]:
     if message.use_candidate:
         values.append((USE_CANDIDATE, b""))
     if message.mapped is not None:
-        values.append((XOR_MAPPED_ADDRESS, _address_value(message.mapped, message.transaction)))
+        values.append((XOR_MAPPED_ADDRESS, pack_address(message.mapped, message.transaction)))
     if message.error is not None:
         hundreds, rest = divmod(message.error.code, 100)
         if not 3 <= hundreds <= 6:
@@ -316,7 +346,8 @@ def _fixed(number: int, length: int) -> bytes:
         raise StunError(f"{number} does not fit {length} bytes") from error
 
 
-def _address_value(address: Address, transaction: bytes) -> bytes:
+def pack_address(address: Address, transaction: bytes) -> bytes:
+    """The other way round. Raises StunError."""
     try:
         host = ipaddress.ip_address(address[0]).packed
     except ValueError as error:

@@ -9,7 +9,7 @@ from rtc.ice.candidates import Candidate
 from rtc.ice.check_list import LocalCandidate
 from rtc.ice.credentials import Credentials, new_credentials
 from rtc.ice.directory import Directory
-from rtc.ice.events import Ended, Event, PathChanged, RestartFailed
+from rtc.ice.events import Ended, Event, PathChanged, Restarted, RestartFailed
 from rtc.ice.role import Role
 from rtc.ice.session import Session
 from rtc.ice.settings import IceSettings
@@ -45,7 +45,8 @@ class Agent:
         rng: Random | None = None,
     ) -> None:
         self._settings = settings or IceSettings()
-        self.local_candidates = tuple(local_candidates)[: self._settings.max_local_candidates]
+        self.local_candidates: tuple[LocalCandidate, ...] = ()
+        self._set_candidates(local_candidates)
         self.counts: Counter[str] = Counter()  # what was dropped, by reason
         # Requests from paths that it has not claimed; `Port` asks before it passes one on.
         self.unclaimed = TokenBuckets(self._settings.max_checks_per_second, self._settings.check_burst)
@@ -100,8 +101,14 @@ class Agent:
         else:
             session.add_remote_candidate(candidate)
 
-    def restart(self, now: float) -> Credentials:
-        """Begin another session (RFC 8445 9), in place of one that has not finished. Returns what to signal."""
+    def restart(self, now: float, local_candidates: Iterable[LocalCandidate] | None = None) -> Credentials:
+        """Begin another session (RFC 8445 9), in place of one that has not finished. Returns what to signal.
+
+        `Restarted` or `RestartFailed` follows. `local_candidates`: where the peer may reach us from now on, as after a
+        change of the network; None: where it could.
+        """
+        if local_candidates is not None:
+            self._set_candidates(local_candidates)
         if self._next is not None:
             self._next.end()
         self._next = self._new_session()
@@ -190,6 +197,9 @@ class Agent:
 
     # Inside
 
+    def _set_candidates(self, candidates: Iterable[LocalCandidate]) -> None:
+        self.local_candidates = tuple(candidates)[: self._settings.max_local_candidates]
+
     def _new_session(self) -> Session:
         return Session(
             self,
@@ -251,6 +261,7 @@ class Agent:
         self._current.retire()
         self._retired = (self._current, now + self._settings.retired_seconds)
         self._current, self._next = session, None
+        self._events.append(Restarted())
 
     def _tell_path(self) -> None:
         selected = None if self._current.failed else self._current.selected

@@ -5,7 +5,7 @@ from typing import Literal
 
 from rtc.addresses import Path
 
-__all__ = ["Ended", "Event", "PathChanged", "RestartFailed"]
+__all__ = ["Ended", "Event", "PathChanged", "RestartFailed", "Restarted"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +14,11 @@ class PathChanged:
 
     path: Path | None
     nominated: bool  # false: it works, and the controlling agent has not decided yet (RFC 8445 12.1)
+
+
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """The restart found a path, which may be the one before; data take it from now on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,4 +33,4 @@ class Ended:
     reason: Literal["no_path", "consent_expired"]
 
 
-Event = PathChanged | RestartFailed | Ended
+Event = PathChanged | Restarted | RestartFailed | Ended

@@ -1,4 +1,4 @@
-"""Host candidates for sockets that are bound, and addresses by which a 1:1 NAT in front of them is reached."""
+"""Candidates: of sockets that are bound, of a 1:1 NAT in front of them, and what STUN and TURN servers have told."""
 
 import ipaddress
 from collections.abc import Iterable, Sequence
@@ -8,7 +8,7 @@ from rtc.addresses import Address, Transport
 from rtc.ice.candidates import Candidate, CandidateType, TcpType, candidate_priority, foundation
 from rtc.ice.check_list import LocalCandidate
 
-__all__ = ["Advertised", "AdvertisedError", "gather", "parse_advertised"]
+__all__ = ["Advertised", "AdvertisedError", "gather", "parse_advertised", "reflexive", "relayed"]
 
 
 class AdvertisedError(ValueError):
@@ -65,8 +65,24 @@ def gather(
     return found
 
 
+def reflexive(mapped: Address, base: Address, place: int) -> LocalCandidate:
+    """What a STUN server sees of the socket at `base`; those of a lower `place` are preferred."""
+    return _local("srflx", mapped, base, 65535 - place)
+
+
+def relayed(address: Address, mapped: Address | None, place: int) -> LocalCandidate:
+    """An address on a TURN server, which is its own base (RFC 8445 5.1.1.2)."""
+    return _local("relay", address, address, 65535 - place, related=mapped)
+
+
 def _local(
-    kind: CandidateType, address: Address, base: Address, preference: int, tcp_type: TcpType | None = None
+    kind: CandidateType,
+    address: Address,
+    base: Address,
+    preference: int,
+    tcp_type: TcpType | None = None,
+    *,
+    related: Address | None = None,
 ) -> LocalCandidate:
     transport: Transport = "udp" if tcp_type is None else "tcp"
     candidate = Candidate(
@@ -77,7 +93,7 @@ def _local(
         host=address[0],
         port=address[1],
         type=kind,
-        related=None if kind == "host" else base,
+        related=None if kind == "host" else related or base,
         tcp_type=tcp_type,
     )
     return LocalCandidate(candidate, base)

@@ -213,3 +213,39 @@ async def test_aiortc_offers_and_sends_pictures_and_messages(endpoint: Endpoint)
     finally:
         connection.close()
         await pc.close()
+
+
+async def test_a_listener_hears_everything_in_order_and_its_faults_are_its_own(endpoint: Endpoint) -> None:
+    heard: list[PeerEvent] = []
+    done = asyncio.Event()
+    faults: list[str] = []
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(lambda _, context: faults.append(context["message"]))
+
+    def listen(event: PeerEvent) -> None:
+        heard.append(event)
+        if isinstance(event, Connected):
+            offerer.send(offerer.open_channel("x"), "from within")
+            raise RuntimeError("for the test")
+        if isinstance(event, ChannelOpened):
+            done.set()
+
+    async with Endpoint([HOST]) as other:
+        offerer = endpoint.connect(controlling=True, listener=listen)
+        answerer = other.connect(controlling=False)
+        offerer.accept(answerer.answer(offerer.offer(), {}))
+        assert await until(answerer, of(ChannelMessage)) == ChannelMessage(0, "from within")
+        async with asyncio.timeout(20):
+            await done.wait()
+        offerer.close()
+    assert faults == ["a listener failed"]
+    assert heard[-1] == PeerEnded("closed")
+
+
+async def test_addresses_that_come_later_are_used_and_those_that_are_none_left_out(endpoint: Endpoint) -> None:
+    endpoint.use_hosts(["127.0.0.2", "192.0.2.200", HOST])
+    assert [each.base[0] for each in endpoint.candidates] == ["127.0.0.2", HOST]
+    assert len({each.base[1] for each in endpoint.candidates}) == 1
+    assert endpoint.counts["host_not_bound"] == 1
+    endpoint.use_hosts(["127.0.0.2"])
+    assert [each.base[0] for each in endpoint.candidates] == ["127.0.0.2"]

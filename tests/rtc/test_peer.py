@@ -8,11 +8,24 @@ from hypothesis import strategies as st
 from rtc.addresses import Path
 from rtc.certificate import Certificate
 from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
+from rtc.ice.gathering import gather
 from rtc.peer import OfferedMedia, PeerNotReady, PeerSettings
-from rtc.peer_events import Connected, MediaEvent, PacketReceived, PathFound, PeerEnded
+from rtc.peer_events import (
+    Connected,
+    MediaEvent,
+    PacketReceived,
+    PathFound,
+    PeerEnded,
+    PlainRtcp,
+    PlainRtp,
+    Restarted,
+    RestartFailed,
+)
+from rtc.rtp.packet import RtpPacket
+from rtc.rtp.rtcp import ReceiverReport, ReportBlock, pack_rtcp
 from rtc.rtp.stage import KeyframeRequested, Reception
 from rtc.sctp import Closed
-from rtc.sdp import MID_URI, Codec, LocalMedia, SdpError
+from rtc.sdp import MID_URI, Codec, Fragment, LocalMedia, SdpError, parse_fragment, write_fragment
 from tests.rtc.peer_pair import PeerPair, through_text
 
 STAMP = "urn:stamp"
@@ -212,6 +225,89 @@ def test_a_restart_of_ice_changes_nothing_else() -> None:
     pair.run(1)
     assert pair.of(1, ChannelMessage) == [ChannelMessage(channel, "after")]
     assert not pair.of(0, PeerEnded)
+
+
+def test_a_restart_by_fragments_brings_a_new_path_and_says_so() -> None:
+    pair = connected()
+    channel = pair.peers[0].open_channel("x", pair.now)
+    moved = gather(["192.0.2.1"], 5000)
+    fragment = fragment_through_text(pair, pair.peers[0].restart(pair.now, moved))
+    answer = pair.peers[1].answer_restart(fragment, pair.now)
+    pair.peers[0].accept_restart(fragment_through_text(pair, answer), pair.now)
+    pair.run(5)
+    assert pair.of(0, Restarted) == pair.of(1, Restarted) == [Restarted()]
+    assert pair.peers[0].ice.path == Path(("192.0.2.1", 5000), ("192.0.2.2", 4000))
+    pair.peers[0].send(channel, "after", pair.now)
+    pair.run(1)
+    assert pair.of(1, ChannelMessage) == [ChannelMessage(channel, "after")]
+
+
+def fragment_through_text(pair: PeerPair, fragment: Fragment) -> Fragment:
+    section = pair.peers[0].tagged
+    return parse_fragment(write_fragment(fragment, section.kind, section.mid), section.mid)
+
+
+def test_a_restart_that_finds_no_path_says_so_and_leaves_the_one_before() -> None:
+    pair = connected()
+    before = pair.peers[0].ice.path
+    pair.peers[0].restart(pair.now)
+    pair.peers[0].accept_restart(Fragment("nobody", "x" * 22), pair.now)
+    pair.run(60)
+    assert pair.of(0, RestartFailed) == [RestartFailed()]
+    assert not pair.of(0, PeerEnded)
+    assert pair.peers[0].ice.path == before
+
+
+def test_a_restart_needs_a_session_and_credentials() -> None:
+    pair = PeerPair()
+    with pytest.raises(PeerNotReady):
+        pair.peers[0].restart(pair.now)
+    pair = connected()
+    pair.peers[0].restart(pair.now)
+    for lacking in (Fragment(), Fragment("abcd")):
+        with pytest.raises(SdpError):
+            pair.peers[0].accept_restart(lacking, pair.now)
+        with pytest.raises(SdpError):
+            pair.peers[1].answer_restart(lacking, pair.now)
+    pair.peers[0].cancel_restart()
+    with pytest.raises(RuntimeError):
+        pair.peers[0].accept_restart(Fragment("abcd", "x" * 22), pair.now)
+    pair.peers[0].close(pair.now)
+    with pytest.raises(PeerNotReady, match="ended"):
+        pair.peers[0].restart(pair.now)
+
+
+def test_plain_packets_come_as_they_are_and_nothing_is_said_about_them() -> None:
+    pair = PeerPair()
+    pair.peers[1].take_plain_packets()
+    with pytest.raises(PeerNotReady):
+        pair.peers[1].send_rtcp(b"")
+    negotiate(pair)
+    pair.run(2)
+    pair.peers[0].send_frame("camera", [b"payload"], 3000, pair.now, values={STAMP: b"12"})
+    pair.run(3)
+    [plain] = pair.of(1, PlainRtp)
+    assert isinstance(plain, PlainRtp)
+    assert RtpPacket.parse(plain.data).payload == b"payload"
+    assert pair.of(1, PlainRtcp), "sender reports"
+    assert not pair.of(1, PacketReceived)
+    assert not pair.of(0, MediaEvent), "no receiver report"
+    ssrc = RtpPacket.parse(plain.data).ssrc
+    block = ReportBlock(ssrc, 0, 0, RtpPacket.parse(plain.data).sequence_number, 0, 0, 0)
+    pair.peers[1].send_rtcp(pack_rtcp([ReceiverReport(7, (block,))]))
+    pair.run(1)
+    [told] = [each.event for each in pair.of(0, MediaEvent) if isinstance(each, MediaEvent)]
+    assert isinstance(told, Reception)
+    pair.peers[1].close(pair.now)
+    with pytest.raises(PeerNotReady):
+        pair.peers[1].send_rtcp(b"")
+
+
+def test_a_round_trip_that_the_application_has_measured_is_used() -> None:
+    pair = connected()
+    pair.peers[1].note_round_trip(0.7)
+    assert pair.peers[1].streams is not None
+    assert pair.peers[1].streams.share.round_trip.seconds == 0.7
 
 
 def test_a_session_is_negotiated_once() -> None:
