@@ -33,6 +33,39 @@ HANDSHAKE_DONE = "_RTCDtlsTransport__handshake_done"
 ESTIMATOR = "_RTCRtpReceiver__remote_bitrate_estimator"
 COMPONENT = 1  # of ICE: RTP and RTCP are multiplexed
 DATAGRAM_MAX = 1500  # bytes, what pylibsrtp takes
+MAX_SOURCES = 64  # SSRCs of one peer; a browser that publishes in three layers has twelve
+
+
+class _TooManySources(pylibsrtp.Error):
+    """Handled as what is not from the peer."""
+
+
+class _FewSources:
+    """Stands in for what decrypts SRTP: libsrtp keeps a context for each SSRC, searches all of them and forgets none.
+
+    So does aiortc's table of receivers, which sees only what gets through here.
+    """
+
+    def __init__(self, session: pylibsrtp.Session, on_error: Callable[[str], None]) -> None:
+        self._session = session
+        self._on_error = on_error
+        self._sources: set[bytes] = set()
+
+    def unprotect(self, data: bytes) -> bytes:
+        return self._take(data, data[8:12], self._session.unprotect)
+
+    def unprotect_rtcp(self, data: bytes) -> bytes:
+        return self._take(data, data[4:8], self._session.unprotect_rtcp)
+
+    def _take(self, data: bytes, source: bytes, unprotect: Callable[[bytes], bytes]) -> bytes:
+        if source in self._sources:
+            return unprotect(data)
+        if len(self._sources) >= MAX_SOURCES:
+            self._on_error("too_many_sources")
+            raise _TooManySources
+        plain = unprotect(data)
+        self._sources.add(source)  # only now: anybody can write an SSRC
+        return plain
 
 
 class _Intake(asyncio.Queue[Any]):
@@ -181,6 +214,7 @@ def _guard_transport(
     receive = dtls._recv_next
 
     async def guarded() -> None:
+        _bound_sources(dtls, on_error)  # nothing is decrypted before the first time that this is called when connected
         try:
             await receive()
         except ConnectionError:
@@ -189,3 +223,8 @@ def _guard_transport(
             on_error("malformed")
 
     cast(Any, dtls)._recv_next = guarded
+
+
+def _bound_sources(dtls: Any, on_error: Callable[[str], None]) -> None:
+    if dtls._rx_srtp is not None and not isinstance(dtls._rx_srtp, _FewSources):
+        dtls._rx_srtp = _FewSources(dtls._rx_srtp, on_error)

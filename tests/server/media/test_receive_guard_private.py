@@ -4,15 +4,16 @@ import asyncio
 import inspect
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
 from aiortc.rtcdtlstransport import RTCDtlsTransport, State
+from aiortc.rtp import RtcpRrPacket
 
 from server.loop_turns import HasFileno, LoopTurns
 from server.media.aiortc_private import create_peer_connection
-from server.media.receive_guard_private import HANDSHAKE_DONE, _Intake, guard_transports
+from server.media.receive_guard_private import HANDSHAKE_DONE, MAX_SOURCES, _Intake, guard_transports
 from server.media.receive_turns import ReceiveTurns
 from tests.server.rig import PATIENCE
 
@@ -187,6 +188,25 @@ async def test_a_message_that_cannot_be_handled_is_counted_and_the_connection_go
             await failed.wait()
         assert set(ends.errors) == {"malformed"}
         assert await ends.came.get() == "lost, and sent again"
+        await exchanged(ends, "after")
+
+
+async def test_a_peer_has_only_so_many_sources_and_goes_on_with_those_it_has() -> None:
+    handled: list[bytes] = []
+
+    async def take(data: bytes, *more: Any) -> None:
+        handled.append(data)
+
+    async with connected() as ends:
+        await exchanged(ends, "before")
+        ends.dtls._handle_rtcp_data, protect = take, cast(Any, ends.client.transport.transport)._tx_srtp.protect_rtcp
+        ends.intake.put_nowait((bytes((128, 200, 0, 1)) + bytes(30), 1))  # forged: it takes no place
+        for source in range(1, 2 * MAX_SOURCES + 1):
+            ends.intake.put_nowait((protect(bytes(RtcpRrPacket(ssrc=source))), 1))
+        assert len(handled) == MAX_SOURCES
+        assert ends.errors == ["too_many_sources"] * MAX_SOURCES
+        ends.intake.put_nowait((protect(bytes(RtcpRrPacket(ssrc=1))), 1))
+        assert len(handled) == MAX_SOURCES + 1
         await exchanged(ends, "after")
 
 
