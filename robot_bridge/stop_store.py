@@ -26,6 +26,7 @@ NOTE_FILE = "ended.txt"
 MAX_NOTE = 500  # characters
 MAX_BYTES = 1 << 20  # of a file that is read
 RESERVED = 1 << 30  # numbers that are reserved at each start
+RESERVED_BYTES = 64  # of the file that says so, spaces included
 LATEST_CLOCK = 2**52  # microseconds; a clock beyond it, in the year 2112, is wrong
 
 
@@ -149,15 +150,15 @@ class StopStore:
     def reserve(self, number: int) -> int:
         """The number that this was raised to: none above it may be given before the next call.
 
-        Written in place, since the file is the lock.
+        Written in place, since the file is the lock, and always in as many bytes: a full disk leaves the older one.
 
         Raises:
             OSError: as `write`.
         """
         up_to = min(number + RESERVED, MAX_NUMBER)
-        os.ftruncate(self._lock, 0)
         os.lseek(self._lock, 0, os.SEEK_SET)
-        write_all(self._lock, msgspec.json.encode(Reserved(up_to=up_to)))
+        write_all(self._lock, msgspec.json.encode(Reserved(up_to=up_to)).ljust(RESERVED_BYTES))
+        os.ftruncate(self._lock, RESERVED_BYTES)
         os.fsync(self._lock)
         self._sync_directory()
         return up_to

@@ -69,7 +69,11 @@ class AuditFile:
         """Find the end of the chain. Done by the first `write` too."""
         if self._handle is None:
             self._opened()
-            self.last, self.head = _end_of(self._path)
+            try:
+                self.last, self.head = _end_of(self._path)
+            except OSError:
+                self.close()  # else the next record would begin a chain of its own
+                raise
 
     def _chained(self, records: list[AuditRecord]) -> tuple[bytes, str]:
         """Their lines, and the hash of the last one."""
@@ -88,10 +92,15 @@ class AuditFile:
     def _opened(self) -> int:
         if self._handle is None:
             handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)
-            self._handle, self._size = handle, os.fstat(handle).st_size
-            if self._size and not _ends_line(self._path, self._size):
-                self._write_all(handle, b"\n")  # the last run ended in the middle of a line
-                self._size += 1
+            try:
+                size = os.fstat(handle).st_size
+                if size and not _ends_line(self._path, size):
+                    self._write_all(handle, b"\n")  # the last run ended in the middle of a line
+                    size += 1
+            except OSError:
+                os.close(handle)
+                raise
+            self._handle, self._size = handle, size
         return self._handle
 
     @staticmethod
@@ -147,12 +156,13 @@ def last_records(path: Path) -> list[AuditRecord]:
     """Those at the end of the log; empty when there is none or it cannot be read."""
     found: list[AuditRecord] = []
     for each in (path, chatter_path(path)):
-        found += [record for record, _ in _last_lines(each)]
+        with suppress(OSError):  # the writer says so
+            found += [record for record, _ in _last_lines(each)]
     return sorted(found, key=lambda record: record.n)
 
 
 def _end_of(path: Path) -> tuple[int, str]:
-    """Number and hash of the last line that is a record."""
+    """Number and hash of the last line that is a record. Raises OSError: it cannot be read."""
     last = (0, GENESIS)
     for record, line in _last_lines(path):
         last = record.n, line_hash(line)
@@ -165,7 +175,7 @@ def _last_lines(path: Path) -> Iterator[tuple[AuditRecord, bytes]]:
             with open(each, "rb") as file:
                 file.seek(max(0, os.fstat(file.fileno()).st_size - TAIL_BYTES))
                 lines = file.read(TAIL_BYTES).split(b"\n")
-        except OSError:
+        except FileNotFoundError:
             continue
         for line in lines:
             with suppress(msgspec.DecodeError, UnicodeError, RecursionError):

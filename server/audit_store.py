@@ -45,7 +45,7 @@ class AuditStore:
         self._signer = signer
         self._anchors = anchors
         self._anchored_at = -ANCHOR_SECONDS
-        self._trouble = False
+        self._trouble = False  # the newest anchor is not kept
         self._written = 0  # number up to which the audit's own file has the records of this run
 
     def write(self, records: list[AuditRecord]) -> None:
@@ -75,7 +75,7 @@ class AuditStore:
         try:
             self._own.open()
             self._chatter.open()
-            if self._is_anchored():
+            if self._is_anchored() and not self._trouble:
                 return
             anchor = sign_anchor(self._head(self._signer), self._signer)
             self.newest_anchor = anchor

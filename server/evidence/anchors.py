@@ -3,6 +3,7 @@
 `AnchorFile` is the shell; the rest has no I/O and no clock.
 """
 
+import errno
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -131,13 +132,18 @@ class AnchorFile:
         self._max_bytes = max_bytes
 
     def append(self, anchor: Anchor) -> None:
-        """Raises OSError."""
+        """Raises OSError: it is not there, or not whole."""
         self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if self.path.exists() and self.path.stat().st_size > self._max_bytes:
             os.replace(self.path, self._older)
-        handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        handle = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
-            os.write(handle, msgspec.json.encode(anchor) + b"\n")  # one write: others may append too
+            line = msgspec.json.encode(anchor) + b"\n"
+            size = os.fstat(handle).st_size
+            if size and os.pread(handle, 1, size - 1) != b"\n":  # a full disk cut the last one off
+                line = b"\n" + line
+            if os.write(handle, line) < len(line):  # one write: others may append too
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             os.fsync(handle)
         finally:
             os.close(handle)

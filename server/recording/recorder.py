@@ -231,10 +231,14 @@ class Recorder(SessionTap):
         return self.state()
 
     async def stop(self) -> RecordingState:
-        """End the recording; returns when the file is closed. Nothing when none is running."""
+        """End the recording; returns when the file is closed. Nothing when none is running.
+
+        The state says so when the end of it could not be written.
+        """
         self._settings = self._settings.model_copy(update={"automatic": False})  # whoever stops it means it
+        if self._thread is None:
+            self._failure = ""
         await self.close()
-        self._failure = ""
         self._tell(self.state())
         return self.state()
 

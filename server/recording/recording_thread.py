@@ -139,7 +139,7 @@ class RecordingThread:
         if self._lost:
             self._tell_lost(writer)
         if writer.flush_if_due(self._now()):
-            self._look_at_disk(writer)
+            self._look_at_disk()
 
     def _take(self, item: Item) -> None:
         """Records of another epoch than the file's belong into none."""
@@ -176,6 +176,7 @@ class RecordingThread:
 
     def _begin_part(self, robot: RobotItem) -> None:
         """The file begins with what holds now."""
+        self._look_at_disk()  # else what records by itself, and tries again and again, fills the disk with beginnings
         self._part += 1
         info = msgspec.structs.replace(
             self.info, part=self._part, epoch=robot.record.epoch, robot=robot.record.description.label
@@ -210,9 +211,10 @@ class RecordingThread:
             self._begin_part(self._robot)
 
     def _end_part(self) -> None:
-        writer, self._writer = self._writer, None
+        writer = self._writer
         if writer is not None:
             writer.close()
+            self._writer = None  # not before: what fails here is cut to what is whole
             self._bytes_before += writer.bytes_written
             self._head = writer.head
 
@@ -224,7 +226,7 @@ class RecordingThread:
             record = Degraded(epoch=self._robot.record.epoch, event=event, lost=lost)
             self._write(writer, OwnItem(self._newest, record), self._robot.record.description)
 
-    def _look_at_disk(self, writer: RecordingWriter) -> None:
+    def _look_at_disk(self) -> None:
         free = shutil.disk_usage(self._directory).free
         if free < self._settings.free_bytes:
             raise DiskTrouble(f"only {free / 1e6:.0f} MB are free on the disk")

@@ -1,6 +1,7 @@
 """The directory of recordings: lists them, completes interrupted ones, deletes what is too much. Blocks."""
 
 import fcntl
+import threading
 import time
 from collections.abc import Collection
 from contextlib import suppress
@@ -46,11 +47,12 @@ class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Shelf:
-    """One directory. Files that are no recordings are passed over."""
+    """One directory. Files that are no recordings are passed over. From any thread."""
 
     def __init__(self, directory: Path, settings: RecordingSettings) -> None:
         self.directory = directory
         self._settings = settings
+        self._busy = threading.Lock()  # one list at a time: those that wait find all known
         self._known: dict[Path, tuple[tuple[int, int], RecordingEntry | None]] = {}  # by size and time of change
 
     def prepare(self) -> None:
@@ -67,10 +69,11 @@ class Shelf:
 
     def entries(self) -> list[RecordingEntry]:
         """The newest first. Files that are being written are not among them."""
-        paths = self.files()
-        present = set(paths)
-        self._known = {path: known for path, known in self._known.items() if path in present}
-        found = [entry for path in paths if (entry := self._entry(path)) is not None]
+        with self._busy:
+            paths = self.files()
+            present = set(paths)
+            self._known = {path: known for path, known in self._known.items() if path in present}
+            found = [entry for path in paths if (entry := self._entry(path)) is not None]
         return sorted(found, key=lambda entry: entry.started, reverse=True)
 
     def _entry(self, path: Path) -> RecordingEntry | None:

@@ -195,11 +195,17 @@ class RecordingWriter:
         return index
 
     def abandon(self) -> None:
-        """The disk took no more: cut off what is no whole record. `recover` can complete the rest. Raises nothing."""
+        """The disk took no more: cut off what is no whole record. `recover` can complete the rest. Raises nothing.
+
+        A file that has none goes.
+        """
         with suppress(OSError):
             self._file.close()  # what Python still had buffered may not fit
         with suppress(OSError):
-            os.truncate(self.path, self._whole)  # else readers stop at the broken record
+            if self._whole:
+                os.truncate(self.path, self._whole)  # else readers stop at the broken record
+            else:
+                self.path.unlink()
 
 
 def _text(topic: Topic) -> TopicText:

@@ -165,3 +165,21 @@ def test_what_a_bridge_said_of_its_end_counts_for_nothing_when_it_ended_in_order
     store.write(Kept(latch=STOPPED, ended=True))
     store.close()
     assert start_of(found(tmp_path), WALL).stop_reason == ""
+
+
+def test_a_full_disk_leaves_the_older_reserve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = StopStore(tmp_path)
+    store.open()
+    kept = store.reserve(5)
+
+    def full(descriptor: int, data: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as disk:
+        disk.setattr(os, "write", full)
+        with pytest.raises(OSError, match="No space left"):
+            store.reserve(7)
+    store.close()
+    assert found(tmp_path).reserved == kept > 5
+    kept_in(tmp_path, STOPPED)
+    assert found(tmp_path).reserved > kept, "the next one is read in its place"

@@ -1,6 +1,7 @@
 """Recordings over HTTP: who may what, and what comes back."""
 
 import json
+import os
 import time
 from collections import Counter
 from collections.abc import AsyncIterator
@@ -11,7 +12,7 @@ from typing import Any
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from robot_bridge.protocol.console import Role, SeatRequest
+from robot_bridge.protocol.console import RecordingState, Role, SeatRequest
 from server.access import Identity
 from server.ending_response import EndingResponse
 from server.recording.reader import RecordingReader
@@ -221,3 +222,23 @@ async def test_a_damaged_part_and_a_deleted_file_are_told_apart(tmp_path: Path) 
         assert (await rig.http.get("/api/recordings/one/chunks/2", headers=observer)).status_code == 200
         path.unlink()
         assert (await rig.http.get("/api/recordings/one/chunks/2", headers=observer)).status_code == 404
+
+
+async def test_a_recording_whose_end_the_disk_does_not_take_is_told_as_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = {"recording": RecordingSettings(directory=tmp_path / "recordings", free_bytes=0)}
+    async with running_rig(**settings) as rig, rig.peer("observer", "session") as peer:
+        operator, library = rig.token("operator"), rig.app.state.recordings.library
+        await rig.http.post("/api/recordings", headers=operator)
+        await eventually(lambda: bool(library.entries()))
+
+        def full(descriptor: int) -> None:
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(os, "fdatasync", full)
+        stopped = (await rig.http.post("/api/recordings/stop", headers=operator)).json()
+        assert (stopped["state"], stopped["detail"]) == ("failed", "No space left on device")
+        await peer.until(lambda each: isinstance(each, RecordingState) and each.state == "failed")
+        again = (await rig.http.post("/api/recordings/stop", headers=operator)).json()
+        assert (again["state"], again["detail"]) == ("off", ""), "it was told"

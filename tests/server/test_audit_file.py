@@ -136,3 +136,51 @@ def test_a_log_of_an_earlier_version_is_continued_and_what_it_held_is_bound_by_t
     assert (report.unchained, report.count) == (2, 0)
     path.write_text(path.read_text().replace('"n":2,"time":1.0', '"n":2,"time":2.0'))
     assert check_chain(chained_lines(path)).faults[0].kind == "changed"
+
+
+def test_a_disk_that_is_full_at_the_start_breaks_no_chain_when_it_has_room_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "audit.jsonl"
+    file = _file(path)
+    file.write([_record(1)])
+    file.close()
+    with path.open("a") as cut:
+        cut.write('{"n":99,"ti')
+    file = _file(path)
+
+    def full(handle: int, data: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as disk:
+        disk.setattr("os.write", full)
+        for _ in range(2):
+            with pytest.raises(OSError, match="No space left"):
+                file.write([_record(2)])
+    file.write([_record(2)])
+    file.close()
+    report = check_chain(chained_lines(path))
+    assert (report.records, report.first, report.last, report.count) == (2, 1, 2, 0)
+
+
+def test_while_the_end_of_the_log_cannot_be_read_nothing_begins_another_chain(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "audit.jsonl"
+    file = _file(path)
+    file.write([_record(1)])
+    file.close()
+    file = _file(path)
+    with monkeypatch.context() as disk:
+        disk.setattr("server.audit_file._last_lines", _unreadable)
+        assert last_records(path) == []
+        for _ in range(2):
+            with pytest.raises(OSError, match="Input/output error"):
+                file.write([_record(2)])
+    file.write([_record(2)])
+    file.close()
+    assert check_chain(chained_lines(path)).count == 0
+
+
+def _unreadable(path: Path) -> list[tuple[AuditRecord, bytes]]:
+    raise OSError(5, "Input/output error")

@@ -1,5 +1,6 @@
 """The audit on disk: two files with a chain each, and signed heads in a second place."""
 
+import os
 from itertools import count
 from pathlib import Path
 
@@ -179,3 +180,23 @@ def test_a_second_place_that_cannot_be_written_stops_nothing(tmp_path: Path) -> 
     verdict = made.verdict()
     assert verdict.ok
     assert verdict.anchors.newest is None
+
+
+def test_a_head_that_a_full_disk_took_half_of_is_signed_again_and_spoils_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Made(tmp_path)
+    made.write("start")
+    made.store.settle()
+    made.write("stop")
+    real = os.write
+    with monkeypatch.context() as disk:
+        disk.setattr(audit_store, "ANCHOR_SECONDS", 0.0)
+        disk.setattr("server.evidence.anchors.os.write", lambda handle, data: real(handle, data[:20]))
+        made.store.settle()
+    assert made.verdict().anchors.known == 1
+    made.store.close()
+    found = made.verdict().anchors
+    assert (found.known, found.fitting) == (2, 2)
+    assert found.newest is not None
+    assert found.newest.n == 2

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import threading
 from pathlib import Path
 from typing import Any
@@ -168,8 +169,17 @@ def test_a_full_disk_ends_the_recording_with_its_reason_and_leaves_a_file_that_o
         assert 1 <= reader.index.last_event < 199
 
 
-def test_recording_ends_before_the_disk_is_full(tmp_path: Path) -> None:
-    made = Made(tmp_path, free_bytes=10**18)
+def test_recording_ends_before_the_disk_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Made(tmp_path, free_bytes=1_000_000)
+    begun = threading.Event()
+    real = shutil.disk_usage
+
+    def filling(path: Path) -> Any:
+        found = real(path)._replace(free=0 if begun.is_set() else 10**9)
+        begun.set()
+        return found
+
+    monkeypatch.setattr(shutil, "disk_usage", filling)
     made.robot()
     made.feedback(1)
     made.pass_second()
@@ -179,6 +189,32 @@ def test_recording_ends_before_the_disk_is_full(tmp_path: Path) -> None:
     assert "free on the disk" in made.thread.failure
     with RecordingReader(tmp_path / "r.mcap") as reader:
         assert not reader.interrupted
+
+
+def test_on_a_disk_that_is_nearly_full_no_file_is_begun(tmp_path: Path) -> None:
+    made = Made(tmp_path, free_bytes=10**18)
+    made.robot()
+    made.thread.start()
+    assert made.ended.wait(PATIENCE)
+    made.thread.close()
+    assert "free on the disk" in made.thread.failure
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_of_which_the_disk_takes_nothing_is_not_left_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fdatasync", full)
+    made = Made(tmp_path)
+    made.robot()
+    made.thread.start()
+    assert made.ended.wait(PATIENCE)
+    made.thread.close()
+    assert made.thread.failure == "No space left on device"
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_was_put_is_on_the_disk_within_a_second_without_anything_following(tmp_path: Path) -> None:

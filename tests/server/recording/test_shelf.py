@@ -1,7 +1,9 @@
 """The directory of recordings: what is listed, what is completed, and what is deleted to make room."""
 
 import os
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path, PurePath
 
 import pytest
@@ -131,3 +133,26 @@ def test_listing_many_recordings_compares_each_with_few_others(tmp_path: Path, m
     monkeypatch.setattr(PurePath, "__eq__", counting)
     assert len(found.entries()) == count
     assert compared < 10 * count
+
+
+def test_several_who_ask_for_the_list_at_once_have_each_file_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(20):
+        made(tmp_path / f"{number}.mcap", 2)
+    read: list[Path] = []
+
+    def reading(path: Path) -> RecordingReader:
+        read.append(path)
+        return RecordingReader(path)
+
+    monkeypatch.setattr("server.recording.shelf.RecordingReader", reading)
+    found, begin = shelf(tmp_path), threading.Barrier(8)
+
+    def ask(_: int) -> int:
+        begin.wait()
+        return len(found.entries())
+
+    with ThreadPoolExecutor(8) as threads:
+        assert [*threads.map(ask, range(8))] == [20] * 8
+    assert len(read) == 20
