@@ -1,6 +1,5 @@
 """The HTTP API of recordings (docs/recording.md). Files are read in threads, never on the loop."""
 
-import asyncio
 import gzip
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -252,24 +251,26 @@ async def download(request: Request, recording_id: str, ticket: str = "") -> Res
 async def delete(request: Request, caller: Caller, recording_id: str) -> Response:
     require_role(caller, "supervisor")
     actor = caller.actor  # also for the audit, should the link end meanwhile
-    library = _service(request).library
+    service = _service(request)
+    library = service.library
     try:
-        await asyncio.to_thread(library.delete, recording_id)
+        await service.in_thread(lambda: library.delete(recording_id))
     except OSError as error:
         raise RecordingFailed(error.strerror or str(error)) from error
-    _service(request).audit.record("recording", actor, "deleted", recording_id)
+    service.audit.record("recording", actor, "deleted", recording_id)
     return _json(await _list(request, library, caller))
 
 
 async def _list(request: Request, library: Library, caller: Right) -> RecordingList:
     right = _right(request, caller)
-    found = await asyncio.to_thread(library.entries)
+    found = await _service(request).in_thread(library.entries)
     return RecordingList(state=library.state(), recordings=[each for each in found if right.sees(each.ended)])
 
 
 async def _open(request: Request, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
+    service = _service(request)
     try:
-        return await asyncio.to_thread(_service(request).library.open, recording_id)
+        return await service.in_thread(lambda: service.library.open(recording_id))
     except (RecordingError, OSError) as error:
         raise _told(error) from error
 
@@ -277,13 +278,15 @@ async def _open(request: Request, recording_id: str) -> tuple[RecordingReader, R
 async def _with_reader(
     request: Request, recording_id: str, read: Callable[[RecordingReader, RecordingEntry], Result]
 ) -> Result:
+    service = _service(request)
+
     def work() -> Result:
-        reader, entry = _service(request).library.open(recording_id)
+        reader, entry = service.library.open(recording_id)
         with reader:
             return read(reader, entry)
 
     try:
-        return await asyncio.to_thread(work)
+        return await service.in_thread(work)
     except (RecordingError, OSError) as error:
         raise _told(error) from error
 

@@ -167,6 +167,7 @@ async def _session(
             for task in running:
                 task.cancel()
     finally:
+        made.recordings.close()
         await media.close()
         if scene is not None:
             await scene.close()

@@ -1,14 +1,23 @@
 """What the routes of recordings need."""
 
+import asyncio
+import contextvars
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
 
 from server.access import Access
 from server.audit import Actor, AuditKind
+from server.errors import ShuttingDown
 from server.recording.library import Library
 
 __all__ = ["RecordingAudit", "RecordingService"]
+
+
+READERS = 2  # threads; who reads recordings waits for each other
+
+Result = TypeVar("Result")
 
 
 class RecordingAudit(Protocol):
@@ -40,3 +49,21 @@ class RecordingService:
     audit: RecordingAudit = _NoAudit()
     holds_seat: Callable[[str], bool] = lambda link: False
     opens_all: bool = False
+    threads: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(READERS, "recordings"))
+
+    async def in_thread(self, work: Callable[[], Result]) -> Result:
+        """What reads files. A slow disk, or many who read, take no thread from anything else.
+
+        Raises:
+            ShuttingDown: it is closed.
+        """
+        loop, context = asyncio.get_running_loop(), contextvars.copy_context()
+        try:
+            reading = loop.run_in_executor(self.threads, context.run, work)
+        except RuntimeError as error:
+            raise ShuttingDown("the session of this robot ends") from error
+        return await reading
+
+    def close(self) -> None:
+        """Idempotent; waits for nobody."""
+        self.threads.shutdown(wait=False, cancel_futures=True)

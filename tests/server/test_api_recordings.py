@@ -1,10 +1,13 @@
 """Recordings over HTTP: who may what, and what comes back."""
 
+import asyncio
 import json
 import os
+import threading
 import time
 from collections import Counter
 from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,7 +19,9 @@ from robot_bridge.protocol.console import RecordingState, Role, SeatRequest
 from server.access import Identity
 from server.ending_response import EndingResponse
 from server.recording.reader import RecordingReader
+from server.recording.service import READERS
 from server.recording.settings import RecordingSettings
+from server.recording.shelf import RecordingEntry
 from server.settings import Settings
 from tests.server.recording.makers import SECOND, START, Story
 from tests.server.rig import Rig, eventually, running_rig
@@ -242,3 +247,28 @@ async def test_a_recording_whose_end_the_disk_does_not_take_is_told_as_failed(
         await peer.until(lambda each: isinstance(each, RecordingState) and each.state == "failed")
         again = (await rig.http.post("/api/recordings/stop", headers=operator)).json()
         assert (again["state"], again["detail"]) == ("off", ""), "it was told"
+
+
+async def test_many_who_read_recordings_on_a_disk_that_hangs_hold_up_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running_rig(recording=RecordingSettings(directory=tmp_path, free_bytes=0)) as rig:
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(READERS))
+        waiting, hangs = threading.Semaphore(0), threading.Event()
+
+        def entries() -> list[RecordingEntry]:
+            waiting.release()
+            hangs.wait()
+            return []
+
+        monkeypatch.setattr(rig.app.state.recordings.library, "entries", entries)
+        asked = [asyncio.create_task(rig.http.get("/api/recordings", headers=rig.token("observer"))) for _ in range(10)]
+        try:
+            for _ in range(READERS):
+                await eventually(lambda: waiting.acquire(blocking=False))
+            made = await rig.http.post("/api/invitations", headers=rig.token("operator"), json={"role": "observer"})
+            assert made.status_code == 201, "it was written to its own disk, in a thread of its own"
+            assert not any(each.done() for each in asked)
+        finally:
+            hangs.set()
+        assert {(await each).status_code for each in asked} == {200}
