@@ -321,7 +321,7 @@ def hasten_sctp(pc: RTCPeerConnection) -> None:
 
     async def transmit_or_not() -> None:
         # A timer may fire while the connection closes; aiortc runs this in a task that nobody awaits.
-        with contextlib.suppress(ConnectionError):
+        with contextlib.suppress(ConnectionError, SSL.Error):  # it has ended, or its goodbye was said just now
             await transmit()
 
     sctp._rto = RETRANSMISSION_START

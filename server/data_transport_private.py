@@ -4,7 +4,9 @@ What is used and why:
 
 - `RTCSctpTransport._rto`, `._srtt`, `._rttvar`, `._update_rto`, `._t1_expired`, `._t3_expired`, `._cwnd`: it waits at
   least one second before it repeats a lost message, three while it connects, and then sends one packet at a time
-- `RTCSctpTransport._transmit`: runs in tasks that nobody awaits, and raises there when the connection has ended
+- `RTCSctpTransport._transmit`, `._transmit_reconfig`; `._send_chunk`, `._send_reconfig_param` called by `._t1_expired`,
+  `._t2_expired`, `._reconfig_timer_expired`: run in tasks that nobody awaits, and raise there when the connection has
+  ended, or while it ends: between its goodbye and the end of its task OpenSSL refuses what aiortc still sends
 - `RTCSctpTransport._data_channel_flush`, `._data_channel_send`: each message is sent by a task of its own
 - `RTCSctpTransport._send_sack`, `._sack_needed`, `._sack_misordered`, `._sack_duplicates`: every single packet is
   acknowledged
@@ -16,6 +18,7 @@ What is used and why:
 import asyncio
 import contextlib
 from collections import deque
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from aiortc import RTCDataChannel, RTCPeerConnection
@@ -33,6 +36,7 @@ SAMPLES = 8  # of the round trip, of which the shortest is the path's and not an
 RETRANSMISSION_START = 0.5  # s before the first measured round trip
 CONNECT_CEILING = 3.0  # s, to which the interval grows while nobody answers; aiortc gives up after eight
 ACKNOWLEDGEMENT_DELAY = 0.15  # s; RFC 9260 6.2 allows 0.5 and recommends 0.2
+ENDED = (ConnectionError, SSL.Error)  # what sending raises when the connection has ended
 RECORD = 1500  # bytes, the most that a DTLS record carries here
 WINDOW_FLOOR = 8 * USERDATA_MAX_LENGTH  # bytes that may be unacknowledged after a timeout
 # The same for who drives, whatever was lost: the answers to two salvos of a command's copies. Else the newest feedback
@@ -54,6 +58,7 @@ def tune_data_transport(pc: RTCPeerConnection, *, observes: bool = False) -> Non
         _hasten_sctp(pc.sctp)
         if not observes:
             _keep_window(pc.sctp)
+        _end_in_silence(pc.sctp)
         _send_at_once(pc.sctp, short_cuts)
 
 
@@ -87,7 +92,7 @@ def _hasten_sctp(sctp: Any) -> None:
     What a peer gets on data channels is some kilobytes a second, so that neither a timeout of less than a second
     (RFC 9260 16 leaves RTO.Min to the application's needs) nor a window of a few packets after one can congest a path.
     """
-    measure, transmit = sctp._update_rto, sctp._transmit
+    measure = sctp._update_rto
     expire_connecting, expire_sending = sctp._t1_expired, sctp._t3_expired
 
     samples: deque[float] = deque(maxlen=SAMPLES)
@@ -109,16 +114,44 @@ def _hasten_sctp(sctp: Any) -> None:
         expire_sending()
         sctp._cwnd = max(sctp._cwnd, WINDOW_FLOOR)
 
-    async def transmit_or_not() -> None:
-        # Not around single packets: the end of the connection must keep aiortc from starting its timer again.
-        with contextlib.suppress(ConnectionError):
-            await transmit()
-
     sctp._rto = RETRANSMISSION_START
     sctp._update_rto = update
     sctp._t1_expired = expired_connecting
     sctp._t3_expired = expired_sending
-    sctp._transmit = transmit_or_not
+
+
+def _end_in_silence(sctp: Any) -> None:
+    """What is sent in a task that nobody awaits raises nothing when the connection has ended.
+
+    Not around every single packet: the end of the connection must keep aiortc from starting its timer again.
+    """
+    for name in ("_transmit", "_transmit_reconfig"):
+        setattr(sctp, name, _or_not(getattr(sctp, name)))
+    timers = {"_t1_expired": "_send_chunk", "_t2_expired": "_send_chunk"}
+    for timer, send in {**timers, "_reconfig_timer_expired": "_send_reconfig_param"}.items():
+        setattr(sctp, timer, _sending_or_not(sctp, getattr(sctp, timer), send))
+
+
+def _or_not(send: Callable[..., Awaitable[None]]) -> Callable[..., Awaitable[None]]:
+    async def send_or_not(*what: Any) -> None:
+        with contextlib.suppress(*ENDED):
+            await send(*what)
+
+    return send_or_not
+
+
+def _sending_or_not(sctp: Any, expire: Callable[[], None], name: str) -> Callable[[], None]:
+    """`expire`, during which what is called `name` does not raise."""
+
+    def expired() -> None:
+        send = getattr(sctp, name)
+        setattr(sctp, name, _or_not(send))
+        try:
+            expire()
+        finally:
+            setattr(sctp, name, send)
+
+    return expired
 
 
 def _keep_window(sctp: Any) -> None:
@@ -156,7 +189,7 @@ def _send_at_once(sctp: Any, short_cuts: ShortCuts) -> None:
             is_flushing = True
             try:
                 run_now(flush())
-            except (ConnectionError, SSL.Error):
+            except ENDED:
                 pass  # the connection has ended
             finally:
                 is_flushing = False
@@ -170,7 +203,7 @@ def _send_at_once(sctp: Any, short_cuts: ShortCuts) -> None:
         is_flushing = True
         try:
             sent = short_cuts.send(channel, data)
-        except (ConnectionError, SSL.Error):
+        except ENDED:
             sent = True  # to nobody: the connection has ended
         finally:
             is_flushing = False
@@ -218,7 +251,7 @@ class _Acknowledgements:
     def _send_late(self) -> None:
         self._timer = None
         if self._sctp.state == "connected":
-            with contextlib.suppress(ConnectionError, SSL.Error):  # the connection ends meanwhile
+            with contextlib.suppress(*ENDED):  # the connection ends meanwhile
                 run_now(self._acknowledge())
 
     def _forget(self) -> None:

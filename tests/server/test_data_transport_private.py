@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from aiortc import RTCSctpTransport
 from aiortc.rtcdtlstransport import RTCDtlsTransport
+from aiortc.rtcsctptransport import AbortChunk, StreamResetOutgoingParam
+from OpenSSL import SSL
 
 from server.data_transport_private import (
     DRIVING_WINDOW_FLOOR,
@@ -49,6 +51,13 @@ async def test_sctp_has(name: str) -> None:
         (RTCSctpTransport._t3_start, "call_later(self._rto, self._t3_expired)"),
         (RTCSctpTransport._t3_restart, "call_later(self._rto, self._t3_expired)"),
         (RTCSctpTransport._t3_expired, "asyncio.ensure_future(self._transmit())"),
+        (RTCSctpTransport._t1_expired, "asyncio.ensure_future(self._send_chunk(self._t1_chunk))"),
+        (RTCSctpTransport._t2_expired, "asyncio.ensure_future(self._send_chunk(self._t2_chunk))"),
+        (
+            RTCSctpTransport._reconfig_timer_expired,
+            "asyncio.ensure_future(self._send_reconfig_param(self._reconfig_request))",
+        ),
+        (RTCSctpTransport._data_channel_close, "asyncio.ensure_future(self._transmit_reconfig())"),
         (RTCSctpTransport._send, "await self._transmit()"),
         (RTCSctpTransport._data_channel_send, "asyncio.ensure_future(self._data_channel_flush())"),
         (RTCSctpTransport._set_state, "asyncio.ensure_future(self._data_channel_flush())"),
@@ -218,6 +227,32 @@ async def test_a_timer_after_the_end_of_the_connection_raises_nothing(ends: Ends
     await asyncio.wait([repeat])
     assert repeat.exception() is None
     assert unhandled == []
+
+
+@pytest.mark.parametrize("timer", ["_t1_expired", "_t2_expired", "_t3_expired", "_reconfig_timer_expired"])
+async def test_a_timer_while_the_connection_says_goodbye_raises_nothing(
+    ends: Ends, timer: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await ends.exchange()
+    sctp: Any = ends.server.transport
+    lose(sctp, 1)
+    ends.server.send("never arrives")
+    sctp._t1_chunk = sctp._t2_chunk = AbortChunk()
+    sctp._reconfig_request = StreamResetOutgoingParam(1, 1, 1, [1])
+    sctp._t3_cancel()
+
+    async def refuse(data: bytes) -> None:
+        raise SSL.Error([("SSL routines", "", "protocol is shutdown")])
+
+    with monkeypatch.context() as ending:  # as after `SSL.Connection.shutdown` in `RTCDtlsTransport.stop`
+        ending.setattr(sctp.transport, "_send_data", refuse)
+        before = asyncio.all_tasks()
+        getattr(sctp, timer)()
+        (sending,) = asyncio.all_tasks() - before
+        await asyncio.wait([sending])
+        assert sending.exception() is None
+    for cancel in (sctp._t1_cancel, sctp._t2_cancel, sctp._t3_cancel, sctp._reconfig_timer_cancel):
+        cancel()
 
 
 async def test_while_connecting_the_wait_grows() -> None:
