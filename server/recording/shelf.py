@@ -1,11 +1,13 @@
 """The directory of recordings: lists them, completes interrupted ones, deletes what is too much. Blocks."""
 
 import fcntl
+import math
 import threading
 import time
 from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import structlog
@@ -23,6 +25,8 @@ log = structlog.get_logger(__name__)
 
 SUFFIX = ".mcap"
 DAY = 86_400.0
+LIST_SECONDS = 1.0  # that a list holds at most: whoever asks again and again costs no more than a look at the directory
+SETTLED_NS = 100_000_000  # since when a directory is unchanged, or a change may bear the same time
 
 
 class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
@@ -46,6 +50,15 @@ class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
     interrupted: bool
 
 
+class _Listed(NamedTuple):
+    """What the directory had."""
+
+    at: float  # s, monotonic; minus infinity: it may have changed since without a sign
+    changed: int  # ns, when it was changed last
+    written: list[Path]  # what somebody was writing
+    entries: list[RecordingEntry]
+
+
 class Shelf:
     """One directory. Files that are no recordings are passed over. From any thread."""
 
@@ -53,6 +66,8 @@ class Shelf:
         self.directory = directory
         self._settings = settings
         self._busy = threading.Lock()  # one list at a time: those that wait find all known
+        self._listed = _Listed(-math.inf, -1, [], [])
+        self._written: list[Path] = []  # what somebody writes, as far as the list under way has come
         self._known: dict[Path, tuple[tuple[int, int], RecordingEntry | None]] = {}  # by size and time of change
 
     def prepare(self) -> None:
@@ -70,11 +85,31 @@ class Shelf:
     def entries(self) -> list[RecordingEntry]:
         """The newest first. Files that are being written are not among them."""
         with self._busy:
-            paths = self.files()
-            present = set(paths)
-            self._known = {path: known for path, known in self._known.items() if path in present}
-            found = [entry for path in paths if (entry := self._entry(path)) is not None]
-        return sorted(found, key=lambda entry: entry.started, reverse=True)
+            if not self._is_still(self._listed):
+                self._listed = self._list()
+            return [*self._listed.entries]
+
+    def _list(self) -> _Listed:
+        now, changed = time.monotonic(), _changed(self.directory)
+        paths = self.files()
+        present = set(paths)
+        self._known = {path: known for path, known in self._known.items() if path in present}
+        self._written = []
+        found = [entry for path in paths if (entry := self._entry(path)) is not None]
+        if time.time_ns() - changed < SETTLED_NS:
+            now = -math.inf
+        return _Listed(now, changed, self._written, sorted(found, key=lambda entry: entry.started, reverse=True))
+
+    def _is_still(self, listed: _Listed) -> bool:
+        """Whether nothing was made, deleted or finished since."""
+        try:
+            return (
+                time.monotonic() - listed.at < LIST_SECONDS
+                and _changed(self.directory) == listed.changed
+                and all(map(_is_locked, listed.written))
+            )
+        except OSError:
+            return False
 
     def _entry(self, path: Path) -> RecordingEntry | None:
         try:
@@ -84,7 +119,9 @@ class Shelf:
             if known is not None and known[0] == version:
                 return known[1]
             entry = None
-            if not _is_locked(path):
+            if _is_locked(path):
+                self._written.append(path)
+            else:
                 with RecordingReader(path) as reader:
                     entry = entry_of(path, reader.info, reader.index, interrupted=reader.interrupted)
                 self._known[path] = version, entry
@@ -166,6 +203,14 @@ def entry_of(
         running=running,
         interrupted=interrupted,
     )
+
+
+def _changed(directory: Path) -> int:
+    """When something was made in it or deleted, in ns; -1: nobody knows."""
+    try:
+        return directory.stat().st_mtime_ns
+    except OSError:
+        return -1
 
 
 def _is_locked(path: Path) -> bool:

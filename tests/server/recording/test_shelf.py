@@ -8,6 +8,7 @@ from pathlib import Path, PurePath
 
 import pytest
 
+from server.recording import shelf as shelf_module
 from server.recording.reader import RecordingReader
 from server.recording.settings import RecordingSettings
 from server.recording.shelf import Shelf
@@ -156,3 +157,31 @@ def test_several_who_ask_for_the_list_at_once_have_each_file_read_once(
     with ThreadPoolExecutor(8) as threads:
         assert [*threads.map(ask, range(8))] == [20] * 8
     assert len(read) == 20
+
+
+def test_whoever_asks_again_and_again_costs_a_look_and_what_changes_is_in_the_list_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made(tmp_path / "one.mcap")
+    writer = Story(events=100).write(tmp_path / "running.mcap", close=False)
+    os.utime(tmp_path, (0, 0))  # what is done from now on is later, however coarse the clock of the disk is
+    found, times = shelf(tmp_path), list[str]()
+
+    def looked() -> list[Path]:
+        times.append("looked")
+        return Shelf.files(found)
+
+    monkeypatch.setattr(shelf_module, "SETTLED_NS", 0)
+    monkeypatch.setattr(shelf_module, "LIST_SECONDS", 1e9)
+    monkeypatch.setattr(found, "files", looked)
+    for _ in range(20):
+        assert [entry.id for entry in found.entries()] == ["one"]
+    assert len(times) == 1
+    writer.close()
+    assert {entry.id for entry in found.entries()} == {"one", "running"}, "it is finished"
+    (tmp_path / "one.mcap").unlink()
+    assert [entry.id for entry in found.entries()] == ["running"]
+    assert len(times) == 3
+    monkeypatch.setattr(shelf_module, "LIST_SECONDS", 0.0)
+    found.entries()
+    assert len(times) == 4, "a file that somebody copies here grows without a sign"
