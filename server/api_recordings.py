@@ -1,6 +1,7 @@
 """The HTTP API of recordings (docs/recording.md). Files are read in threads, never on the loop."""
 
 import gzip
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -23,6 +24,7 @@ from server.errors import (
     RecordingFailed,
     RecordingUnreadable,
     RobotFailed,
+    TooManyRequests,
 )
 from server.names import printable
 from server.recording.errors import RecordingError
@@ -34,6 +36,7 @@ from server.recording.service import RecordingService
 from server.recording.shelf import RecordingEntry
 
 __all__ = [
+    "MAX_LISTED",
     "FileTicket",
     "RecordingDetails",
     "RecordingList",
@@ -44,6 +47,7 @@ __all__ = [
 
 router = APIRouter()
 
+MAX_LISTED = 500  # recordings in one answer
 MAX_EVENTS = 10_000  # in one answer of `records`
 MAX_BYTES = 64 * 1024 * 1024
 EVENT_SPACING = 1_000_000  # µs between events of the index that is sent
@@ -62,7 +66,8 @@ class RecordingList(msgspec.Struct, frozen=True, kw_only=True):
     """Answer of GET /api/recordings."""
 
     state: RecordingState
-    recordings: list[RecordingEntry]
+    recordings: list[RecordingEntry]  # the newest first
+    older: int  # that were left out behind these
 
 
 class RecordingDetails(msgspec.Struct, frozen=True, kw_only=True):
@@ -108,16 +113,25 @@ def _told_audit(request: Request, caller: Right, what: str, recording_id: str) -
 
 
 @router.get("/api/recordings")
-async def recordings(request: Request, caller: Caller) -> Response:
+async def recordings(
+    request: Request,
+    caller: Caller,
+    before: Annotated[int, Query(ge=0)] = 0,
+    limit: Annotated[int, Query(ge=1, le=MAX_LISTED)] = MAX_LISTED,
+) -> Response:
+    """The newest; with `before` the newest of those that began before that time, in µs since 1970."""
     library = _service(request).library
-    return _json(await _list(request, library, caller))
+    return _json(await _list(request, library, caller, before, limit))
 
 
 @router.post("/api/recordings")
 async def start(request: Request, caller: Caller) -> Response:
     require_role(caller, "operator", "supervisor")
     wanted = await read_json(request, RecordingRequest)
-    state = _service(request).library.start(caller.name, printable(wanted.name))
+    service = _service(request)
+    if not service.starts.spend(caller.token_id, time.monotonic()):
+        raise TooManyRequests("recordings begin too often with this link")
+    state = service.library.start(caller.name, printable(wanted.name))
     _told_audit(request, caller, "started", state.recording)
     return _json(state, 201)
 
@@ -261,10 +275,13 @@ async def delete(request: Request, caller: Caller, recording_id: str) -> Respons
     return _json(await _list(request, library, caller))
 
 
-async def _list(request: Request, library: Library, caller: Right) -> RecordingList:
+async def _list(
+    request: Request, library: Library, caller: Right, before: int = 0, limit: int = MAX_LISTED
+) -> RecordingList:
     right = _right(request, caller)
-    found = await _service(request).in_thread(library.entries)
-    return RecordingList(state=library.state(), recordings=[each for each in found if right.sees(each.ended)])
+    entries = await _service(request).in_thread(library.entries)
+    found = [each for each in entries if right.sees(each.ended) and (not before or each.started < before)]
+    return RecordingList(state=library.state(), recordings=found[:limit], older=max(0, len(found) - limit))
 
 
 async def _open(request: Request, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:

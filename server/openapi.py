@@ -15,7 +15,7 @@ from robot_bridge.protocol.console import RecordingState
 from robot_bridge.protocol.serial import MAX_EVENT
 from server.api import Delivered, Health, Released, ResetRequest, ScenePath, SessionInfo
 from server.api_access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
-from server.api_recordings import FileTicket, RecordingDetails, RecordingList, RecordingRequest
+from server.api_recordings import MAX_LISTED, FileTicket, RecordingDetails, RecordingList, RecordingRequest
 from server.errors import (
     HTTP_ERRORS,
     AlreadyPublishing,
@@ -122,6 +122,7 @@ LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
 AFTER = Parameter("after", "query", {"type": "integer", "default": 0})
 BEFORE = Parameter("before", "query", {"type": "integer", "minimum": 0, "default": 0})
 LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS, "default": 100})
+LISTED = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_LISTED, "default": MAX_LISTED})
 RECORDING = Parameter("recording_id", "path", {"type": "string"}, required=True)
 CHUNK = Parameter("number", "path", {"type": "integer"}, required=True)
 AFTER_CHUNK = Parameter("after", "query", {"type": "integer", "minimum": 0, "default": 0})
@@ -238,10 +239,14 @@ OPERATIONS: tuple[Operation, ...] = (
         errors=(NotAllowed, BadParameter),
         parameters=(AFTER, BEFORE, LIMIT),
     ),
-    Operation("get", "/api/recordings", "Whether the session is recorded, and what was.", 200, RecordingList),
+    Operation(
+        *("get", "/api/recordings", "Whether the session is recorded, and what was.", 200, RecordingList),
+        errors=(BadParameter,),
+        parameters=(BEFORE, LISTED),
+    ),
     Operation(
         *("post", "/api/recordings", "Record from now on.", 201, RecordingState),
-        errors=(NotAllowed, AlreadyRecording, RecordingFailed, *WITH_JSON),
+        errors=(NotAllowed, AlreadyRecording, TooManyRequests, RecordingFailed, *WITH_JSON),
         body=RecordingRequest,
     ),
     Operation("post", "/api/recordings/stop", "End the recording.", 200, RecordingState, (NotAllowed,)),

@@ -10,11 +10,13 @@ from typing import Protocol, TypeVar
 from server.access import Access
 from server.audit import Actor, AuditKind
 from server.errors import ShuttingDown
+from server.rate_limits import RateLimits
 from server.recording.library import Library
 
 __all__ = ["RecordingAudit", "RecordingService"]
 
 
+STARTS, START_RATE = 20, 0.1  # Hz, of one link: the shelf is bounded in bytes, not in files
 READERS = 2  # threads; who reads recordings waits for each other
 
 Result = TypeVar("Result")
@@ -41,6 +43,7 @@ class RecordingService:
 
     Attributes:
         holds_seat: whether a peer with the link of this id drives
+        starts: how often each link may begin a recording
         opens_all: every good link reads everything: it was made for the one file that is replayed
     """
 
@@ -49,6 +52,7 @@ class RecordingService:
     audit: RecordingAudit = _NoAudit()
     holds_seat: Callable[[str], bool] = lambda link: False
     opens_all: bool = False
+    starts: RateLimits = field(default_factory=lambda: RateLimits(START_RATE, STARTS))
     threads: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(READERS, "recordings"))
 
     async def in_thread(self, work: Callable[[], Result]) -> Result:

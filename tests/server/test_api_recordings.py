@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from starlette.types import Receive, Scope, Send
 
@@ -19,7 +20,7 @@ from robot_bridge.protocol.console import RecordingState, Role, SeatRequest
 from server.access import Identity
 from server.ending_response import EndingResponse
 from server.recording.reader import RecordingReader
-from server.recording.service import READERS
+from server.recording.service import READERS, STARTS
 from server.recording.settings import RecordingSettings
 from server.recording.shelf import RecordingEntry
 from server.settings import Settings
@@ -272,3 +273,36 @@ async def test_many_who_read_recordings_on_a_disk_that_hangs_hold_up_nothing_els
         finally:
             hangs.set()
         assert {(await each).status_code for each in asked} == {200}
+
+
+async def test_the_list_has_pages_and_says_how_much_is_left_out(tmp_path: Path) -> None:
+    for number in range(5):
+        Story(events=2).write(tmp_path / f"{number}.mcap")
+    async with running_rig(recording=RecordingSettings(directory=tmp_path, free_bytes=0)) as rig:
+        supervisor = rig.token("supervisor")
+        library = rig.app.state.recordings.library
+        entries = [msgspec.structs.replace(each, started=number + 1) for number, each in enumerate(library.entries())][
+            ::-1
+        ]
+        library.entries = lambda: entries
+
+        async def page(**query: int) -> tuple[list[int], int]:
+            answer = (await rig.http.get("/api/recordings", headers=supervisor, params=query)).json()
+            return [each["started"] for each in answer["recordings"]], answer["older"]
+
+        assert await page() == ([5, 4, 3, 2, 1], 0)
+        assert await page(limit=2) == ([5, 4], 3)
+        assert await page(limit=2, before=4) == ([3, 2], 1)
+        assert await page(limit=2, before=2) == ([1], 0)
+        refused = await rig.http.get("/api/recordings", headers=supervisor, params={"limit": 501})
+        assert (refused.status_code, refused.json()["error"]) == (422, "bad_parameter")
+
+
+async def test_a_link_begins_only_so_many_recordings_and_others_go_on(rig: Rig) -> None:
+    operator, supervisor = rig.token("operator"), rig.token("supervisor")
+    for _ in range(STARTS):
+        assert (await rig.http.post("/api/recordings", headers=operator)).status_code in (201, 409)
+    refused = await rig.http.post("/api/recordings", headers=operator)
+    assert (refused.status_code, refused.json()["error"]) == (429, "too_many_requests")
+    assert (await rig.http.post("/api/recordings", headers=supervisor)).status_code == 409
+    assert (await rig.http.post("/api/recordings/stop", headers=operator)).status_code == 200

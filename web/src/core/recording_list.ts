@@ -21,12 +21,22 @@ export interface RecordingEntry {
 
 export interface RecordingList {
   readonly recordings: readonly RecordingEntry[];
+  readonly older: number; // that were left out behind these
 }
 
 export function parseList(value: unknown): RecordingList {
   const list =
     isRecord(value) && Array.isArray(value["recordings"]) ? (value["recordings"] as unknown[]) : [];
-  return { recordings: list.map(parseEntry).filter((entry) => entry !== null) };
+  const older = isRecord(value) && typeof value["older"] === "number" ? value["older"] : 0;
+  return { recordings: list.map(parseEntry).filter((entry) => entry !== null), older };
+}
+
+/** `list`, and of `beyond` what is older than all of it. */
+export function joined(list: RecordingList, beyond: RecordingList | null): RecordingList {
+  const last = list.recordings.at(-1);
+  if (beyond === null || list.older === 0 || last === undefined) return list;
+  const rest = beyond.recordings.filter((entry) => entry.started < last.started);
+  return { recordings: [...list.recordings, ...rest], older: beyond.older };
 }
 
 /** null: it is none. */

@@ -1,6 +1,13 @@
 import { roleOf } from "../core/fragment";
 import { elapsed } from "../core/recording_words";
-import { dayWords, searched, sizeWords, type RecordingEntry } from "../core/recording_list";
+import {
+  dayWords,
+  joined,
+  searched,
+  sizeWords,
+  type RecordingEntry,
+  type RecordingList,
+} from "../core/recording_list";
 import { troubleWords } from "../rtc/session_api";
 import { button, grouped, h, setHidden, setText } from "../ui/dom";
 import type { RecordingsApi } from "./recordings_api";
@@ -14,7 +21,8 @@ export interface ListEvents {
 /** All recordings: to search, to open, to download, to delete. */
 export class ListView {
   readonly element = h("main", "library");
-  private entries: readonly RecordingEntry[] | null = null;
+  private newest: RecordingList | null = null;
+  private beyond: RecordingList | null = null; // those behind the newest, as far as somebody asked for them
   private readonly search = h("input", "field library-search", {
     type: "search",
     placeholder: "Search by name, robot, person or day",
@@ -23,6 +31,7 @@ export class ListView {
   private readonly rows = h("div", "library-rows", { role: "list" });
   private readonly note = h("p", "library-note", { role: "status" });
   private readonly count = h("span", "muted");
+  private readonly older = button("chip-button", "", () => void this.askOlder());
   private readonly trouble = h("p", "library-trouble", { role: "alert" });
   private asked: string | null = null; // id of the one that is about to be deleted
   private readonly role: unknown;
@@ -45,7 +54,7 @@ export class ListView {
       this.count,
       this.search,
     );
-    this.element.append(head, this.trouble, this.note, this.rows);
+    this.element.append(head, this.trouble, this.note, this.rows, this.older);
     this.trouble.hidden = true;
     this.draw();
     void this.refresh();
@@ -58,7 +67,9 @@ export class ListView {
 
   private async refresh(): Promise<void> {
     try {
-      this.entries = (await this.api.list()).recordings;
+      const newest = await this.api.list();
+      if (this.beyond !== null) this.beyond = this.shown; // with what the newest have pushed out
+      this.newest = newest;
       this.say(null);
     } catch (error) {
       this.say(error);
@@ -68,19 +79,39 @@ export class ListView {
     this.timer = setTimeout(() => void this.refresh(), REFRESH_MS);
   }
 
+  private get shown(): RecordingList | null {
+    return this.newest === null ? null : joined(this.newest, this.beyond);
+  }
+
+  private async askOlder(): Promise<void> {
+    const last = this.shown?.recordings.at(-1);
+    if (last === undefined) return;
+    try {
+      const more = await this.api.list(last.started);
+      this.beyond = { recordings: [...(this.beyond?.recordings ?? []), ...more.recordings], older: more.older };
+      this.say(null);
+    } catch (error) {
+      this.say(error);
+    }
+    this.draw();
+  }
+
   private say(error: unknown): void {
     setHidden(this.trouble, error === null);
     setText(this.trouble, error === null ? "" : troubleWords(error));
   }
 
   private draw(): void {
-    const { entries } = this;
+    const { shown } = this;
+    const entries = shown?.recordings ?? null;
     const found = searched(entries ?? [], this.search.value);
     setText(
       this.count,
       entries === null || entries.length === 0 ? "" : countWords(found.length, entries.length),
     );
-    setText(this.note, this.noteWords(found.length));
+    setText(this.note, this.noteWords(entries, found.length));
+    setHidden(this.older, (shown?.older ?? 0) === 0);
+    setText(this.older, `Show older ones (${grouped(shown?.older ?? 0)} more)`);
     setHidden(this.note, this.note.textContent === "");
     const state = JSON.stringify([found.map((each) => [each, [...each.marks]]), this.asked]);
     if (state === this.drawn) return; // what is focused stays so
@@ -88,9 +119,9 @@ export class ListView {
     this.rows.replaceChildren(...found.map((entry) => this.row(entry)));
   }
 
-  private noteWords(found: number): string {
-    if (this.entries === null) return this.trouble.hidden ? "Looking for recordings …" : "";
-    if (this.entries.length === 0)
+  private noteWords(entries: readonly RecordingEntry[] | null, found: number): string {
+    if (entries === null) return this.trouble.hidden ? "Looking for recordings …" : "";
+    if (entries.length === 0)
       return "Nothing has been recorded yet. Press Record on the console's page, or start it with lockstep up --record.";
     return found === 0 ? "No recording has all of these words." : "";
   }
@@ -152,7 +183,8 @@ export class ListView {
   private async delete(entry: RecordingEntry): Promise<void> {
     this.asked = null;
     try {
-      this.entries = (await this.api.delete(entry.id)).recordings;
+      this.newest = await this.api.delete(entry.id);
+      this.beyond = without(this.beyond, entry.id);
       this.say(null);
     } catch (error) {
       this.say(error);
@@ -168,6 +200,10 @@ export class ListView {
       this.say(error);
     }
   }
+}
+
+function without(list: RecordingList | null, id: string): RecordingList | null {
+  return list === null ? null : { ...list, recordings: list.recordings.filter((entry) => entry.id !== id) };
 }
 
 export function mayDownload(role: unknown): boolean {

@@ -18,8 +18,10 @@ export interface RecordingDetails {
 export class RecordingsApi {
   constructor(private readonly api: ConsoleApi) {}
 
-  async list(): Promise<RecordingList> {
-    return parseList(await this.api.json("GET", "/api/recordings", undefined, limit()));
+  /** The newest; with `before` the newest of those that began before that time, in µs since 1970. */
+  async list(before = 0): Promise<RecordingList> {
+    const path = `/api/recordings${before > 0 ? `?before=${before}` : ""}`;
+    return parseList(await this.api.json("GET", path, undefined, limit()));
   }
 
   /** `after`: only what the index has from that chunk on. */

@@ -1,6 +1,6 @@
 import { expect, it } from "vitest";
 import { avcCodec } from "../../src/core/h264";
-import { parseList, searched } from "../../src/core/recording_list";
+import { joined, parseList, searched, type RecordingList } from "../../src/core/recording_list";
 import { readReplayLink, replayHash, tokenIn } from "../../src/core/replay_link";
 import { atRate, decodeMuLaw, opusChannels } from "../../src/core/sound_packets";
 
@@ -27,6 +27,18 @@ it("a search finds recordings that have all of its words", () => {
   expect(searched(recordings, "knot  planar").map((each) => each.id)).toEqual(["two"]);
   expect(searched(recordings, "stop").map((each) => each.id)).toEqual(["one"]);
   expect(searched(recordings, "")).toHaveLength(2);
+});
+
+it("older recordings are shown behind the newest, also when newer ones push some of these out", () => {
+  const list = (older: number, ...started: number[]): RecordingList => ({
+    ...parseList({ recordings: started.map((each) => ({ id: `${each}`, started: each })), older }),
+  });
+  const ids = (found: RecordingList): string[] => found.recordings.map((each) => each.id);
+  expect(joined(list(1, 5, 4), null)).toMatchObject({ older: 1 });
+  const shown = joined(list(2, 5, 4), list(0, 3, 2));
+  expect([ids(shown), shown.older]).toEqual([["5", "4", "3", "2"], 0]);
+  expect(ids(joined(list(3, 6, 5), shown))).toEqual(["6", "5", "4", "3", "2"]);
+  expect(ids(joined(list(0, 6, 5), shown))).toEqual(["6", "5"]); // the others are deleted
 });
 
 it("the codec is read from the sequence parameter set", () => {
