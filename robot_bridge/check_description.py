@@ -113,10 +113,15 @@ def _check_counts(description: RobotDescription) -> None:
         ("layers", len(description.layers), MAX_LAYERS),
         ("bindings", sum(len(layer.bindings) for layer in description.layers), MAX_GEOMS),
         ("position limits", len(description.position_limits), MAX_LIMITS),
+        ("axes of position limits", sum(len(limit.axes) for limit in description.position_limits), MAX_GEOMS),
+        ("geofences", len(description.geofences), MAX_LIMITS),
+        ("corners of geofences", sum(len(fence.polygon) for fence in description.geofences), MAX_GEOMS),
+        ("joints of bodies", sum(len(body.joints) for body in description.bodies), MAX_GEOMS),
+        ("rays", 0 if description.ranges is None else description.ranges.count, MAX_RAYS),
         ("body twists", len(description.body_twists), MAX_LIMITS),
     )
     for kind, count, most in counts:
-        if count > most:
+        if not 0 <= count <= most:
             raise DescriptionError(f"{count} {kind}, the bound is {most}")
 
 

@@ -1,5 +1,6 @@
-"""The crowd, in a process of its own: `python -m bench.hostile.crowd LINK COUNT SEED [KIND]`.
+"""The crowd, in a process of its own: `python -m bench.hostile.crowd LINK OPERATOR COUNT SEED [KIND]`.
 
+LINK is an observer's, OPERATOR the link of somebody who publishes a camera.
 It runs with the processor time that nobody else wants (SCHED_IDLE): attackers have machines of their own.
 
 It says in a JSON line that it has begun, answers each line on standard input with what it has seen, and ends at the end
@@ -16,7 +17,7 @@ from random import Random
 import httpx
 import uvloop
 
-from bench.hostile import over_http, over_webrtc
+from bench.hostile import over_http, over_webrtc, over_whip
 from bench.hostile.target import Misbehaviour, Target
 from client.link import parse_link
 
@@ -49,17 +50,20 @@ KINDS: tuple[Misbehaviour, ...] = (
     over_http.recordings_reader,
     over_webrtc.many_sections,
     over_webrtc.stun_flood,
+    over_whip.publisher_flood,
 )
 
 
 class Crowd:
     """Members take the kinds in turn; each attacks again and again until the task is cancelled."""
 
-    def __init__(self, link: str, count: int, seed: int, kinds: tuple[Misbehaviour, ...] = KINDS) -> None:
+    def __init__(
+        self, link: str, operator: str, count: int, seed: int, kinds: tuple[Misbehaviour, ...] = KINDS
+    ) -> None:
         self.attempts: Counter[str] = Counter()
         self.failures: Counter[str] = Counter()  # attempts that ended in an error of their own
         self.seen: Counter[str] = Counter()
-        self._link = parse_link(link)
+        self._link, self._operator = parse_link(link), parse_link(operator).token
         self._members = [(kinds[number % len(kinds)], Random(seed * 1000 + number)) for number in range(count)]
 
     async def run(self) -> None:
@@ -68,7 +72,7 @@ class Crowd:
         async with httpx.AsyncClient(
             base_url=self._link.base, trust_env=False, limits=limits, timeout=10, verify=False
         ) as http:
-            target = Target(self._link.base, self._link.token, http, self.seen)
+            target = Target(self._link.base, self._link.token, self._operator, http, self.seen)
             async with asyncio.TaskGroup() as tasks:
                 for kind, random in self._members:
                     tasks.create_task(self._member(kind, target, random))
@@ -87,8 +91,8 @@ class Crowd:
         return {"attempts": dict(self.attempts), "seen": dict(self.seen), "failures": dict(self.failures)}
 
 
-async def _run(link: str, count: int, seed: int, only: str = "") -> None:
-    crowd = Crowd(link, count, seed, tuple(kind for kind in KINDS if only in ("", kind.__name__)))
+async def _run(link: str, operator: str, count: int, seed: int, only: str = "") -> None:
+    crowd = Crowd(link, operator, count, seed, tuple(kind for kind in KINDS if only in ("", kind.__name__)))
     running = asyncio.create_task(crowd.run())
     lines = asyncio.StreamReader()
     await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
@@ -108,7 +112,7 @@ def _say(what: object) -> None:
 
 def main() -> None:
     os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-    uvloop.run(_run(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), *sys.argv[4:5]))
+    uvloop.run(_run(*sys.argv[1:3], int(sys.argv[3]), int(sys.argv[4]), *sys.argv[5:6]))
 
 
 if __name__ == "__main__":

@@ -14,10 +14,11 @@ __all__ = ["Misbehaviour", "Target"]
 
 
 class Target(NamedTuple):
-    """A console, and an observer's token: the worst of the crowd are people with a link."""
+    """A console, and tokens: the worst of the crowd are people with a link."""
 
     url: str
-    token: str
+    token: str  # an observer's
+    operator: str  # an operator's, who publishes a camera
     http: httpx.AsyncClient
     seen: Counter[str]  # what the console said, by name or status
 
@@ -40,8 +41,15 @@ class Target(NamedTuple):
         return {"Authorization": f"Bearer {self.token}"}
 
     async def ask(self, method: str, path: str, content: str | bytes = b"", **headers: str) -> httpx.Response:
-        """Ask with the token, and count the answer."""
-        answer = await self.http.request(method, path, content=content, headers={**self.headers, **headers})
+        """Ask with the observer's token, and count the answer."""
+        return await self._ask(method, path, content, {**self.headers, **headers})
+
+    async def publish(self, offer: str, **headers: str) -> httpx.Response:
+        """Offer a camera with the operator's token, and count the answer."""
+        return await self._ask("POST", "/whip", offer, {"Authorization": f"Bearer {self.operator}", **headers})
+
+    async def _ask(self, method: str, path: str, content: str | bytes, headers: dict[str, str]) -> httpx.Response:
+        answer = await self.http.request(method, path, content=content, headers=headers)
         self.note(answer)
         return answer
 

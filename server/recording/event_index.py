@@ -10,11 +10,22 @@ from server.recording.errors import RecordingDamaged
 from server.recording.marks import Mark
 from server.recording.records import Whole
 
-__all__ = ["INDEX_NAME", "ChunkEntry", "EventEntry", "EventIndex", "IndexBuilder", "TopicEntry", "decode_index"]
+__all__ = [
+    "INDEX_NAME",
+    "ChunkEntry",
+    "EventEntry",
+    "EventIndex",
+    "IndexBuilder",
+    "TopicEntry",
+    "check_index",
+    "decode_index",
+]
 
 INDEX_NAME = "lockstep-index.json"
 EVENT_SPACING = 100_000  # µs between two events of the index
 MAX_MARKS = 20_000
+MAX_TOPICS = 128  # the streams of a robot, and Lockstep's own
+MAX_TOPIC = 1000  # characters
 
 
 class TopicEntry(msgspec.Struct, frozen=True):
@@ -115,6 +126,21 @@ class EventIndex(msgspec.Struct, kw_only=True):
 
 
 _decoder = msgspec.json.Decoder(EventIndex)
+
+
+def check_index(index: EventIndex) -> None:
+    """Whether a page can show it, whoever made the file. Raises RecordingDamaged."""
+    counts = {
+        "topics": (len(index.topics), MAX_TOPICS),
+        "topics with keyframes": (len(index.keyframes), MAX_TOPICS),
+        "topics that are counted": (len(index.counts), MAX_TOPICS),
+        "marks": (len(index.marks), MAX_MARKS),
+    }
+    for kind, (count, most) in counts.items():
+        if count > most:
+            raise RecordingDamaged(f"the index has {count} {kind}, the bound is {most}")
+    if any(len(each.topic) > MAX_TOPIC for each in index.topics):
+        raise RecordingDamaged(f"the index has a topic of more than {MAX_TOPIC} characters")
 
 
 def decode_index(data: bytes) -> EventIndex:

@@ -16,7 +16,7 @@ from robot_bridge.errors import DescriptionError
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.serial import is_newer
 from server.recording.errors import RecordingDamaged, RecordingTampered
-from server.recording.event_index import INDEX_NAME, EventEntry, EventIndex, decode_index
+from server.recording.event_index import INDEX_NAME, EventEntry, EventIndex, check_index, decode_index
 from server.recording.info import METADATA_NAME, RecordingInfo
 from server.recording.payload import (
     SOUND,
@@ -89,6 +89,7 @@ class RecordingReader:
         try:
             self.info = self._read_info()
             self.index = index or self._read_index() or self._scan()
+            check_index(self.index)
         except BROKEN as error:
             self._file.close()
             raise RecordingDamaged(f"{path.name}: {error or type(error).__name__}") from error

@@ -22,7 +22,13 @@ NAMED = [("http", "unauthorized"), ("http", "too_large"), ("http", "not_allowed"
 
 @pytest.mark.timeout(150)
 async def test_an_operator_drives_on_among_peers_that_misbehave(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in {"PEER_CONNECT_TIMEOUT": 5, "PEER_SILENCE": 60, "SEAT_TIMEOUT": 60, "SCENE": 0}.items():
+    for name, value in {
+        "PEER_CONNECT_TIMEOUT": 5,
+        "PEER_SILENCE": 60,
+        "SEAT_TIMEOUT": 60,
+        "SCENE": 0,
+        "WHIP": "phone",
+    }.items():
         monkeypatch.setenv(f"LOCKSTEP_{name}", str(value))
     async with (
         running_stack("planar") as stack,
@@ -33,7 +39,7 @@ async def test_an_operator_drives_on_among_peers_that_misbehave(monkeypatch: pyt
         rest = [0.0] * len(console.description.axes)
         first = last = await console.drive(rest)
         memory = memory_of(stack.console)
-        command = (sys.executable, "-m", "bench.hostile.crowd", stack.observer, str(len(KINDS)), "1")
+        command = (sys.executable, "-m", "bench.hostile.crowd", stack.observer, stack.operator, str(len(KINDS)), "1")
         async with asyncio.timeout(SECONDS):
             async with running_process(*command) as (crowd, _):
                 while not await _all_of_it_was_refused(stack):

@@ -11,11 +11,13 @@ from mcap.records import Chunk
 from typer.testing import CliRunner
 
 from robot_bridge.protocol.console import Report, StreamReport
+from robot_bridge.protocol.description import Body, BodyJoint, Geofence, RangeRing
 from server.cli import app
 from server.recording import export_csv, export_mp4
 from server.recording.errors import RecordingDamaged
-from server.recording.event_index import EventIndex, decode_index
+from server.recording.event_index import MAX_MARKS, EventIndex, TopicEntry, decode_index
 from server.recording.info import RecordingInfo
+from server.recording.marks import Mark
 from server.recording.raw_records import MAGIC, MAX_RECORD, chunk_records
 from server.recording.reader import RecordingReader
 from server.recording.records import ReportRecord, RobotRecord
@@ -23,6 +25,8 @@ from server.recording.topics import CAMERA
 from server.recording.writer import Entry, RecordingWriter
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story, own_entry, rewritten
 
+RING = RangeRing(name="r", body="base", count=3, angle_min=0.0, angle_increment=0.1, range_min=0.1, range_max=4.0)
+TURN = BodyJoint(joint="x", kind="revolute", axis=(0.0, 0.0, 1.0))
 ESCAPE = "\x1b[2J\x1b[1;1H\nverified and true\n"
 
 
@@ -114,6 +118,24 @@ def test_an_index_of_impossible_numbers_is_damaged(text: bytes) -> None:
     assert decode_index(b"{}") == EventIndex()
 
 
+@pytest.mark.parametrize(
+    ("changed", "trouble"),
+    [
+        ({"topics": [TopicEntry(1, f"/camera/{number}", "", "") for number in range(1000)]}, "1000 topics"),
+        ({"topics": [TopicEntry(1, "/camera/" + "x" * 100_000, "", "")]}, "1000 characters"),
+        ({"marks": [Mark(1, 1, "note", "x")] * (MAX_MARKS + 1)}, "20001 marks"),
+        ({"keyframes": {f"/camera/{number}": [] for number in range(1000)}}, "1000 topics with keyframes"),
+    ],
+)
+def test_an_index_that_no_page_could_show_is_damaged(changed: dict[str, object], trouble: str, tmp_path: Path) -> None:
+    writer = Story(events=10).write(tmp_path / "a.mcap", close=False)
+    hostile = msgspec.structs.replace(writer.index(), **changed)
+    writer._builder.index = hostile
+    writer.close()
+    with pytest.raises(RecordingDamaged, match=trouble):
+        RecordingReader(tmp_path / "a.mcap")
+
+
 def test_a_whole_recording_is_read_as_before(tmp_path: Path) -> None:
     Story(events=30).write(tmp_path / "a.mcap")
     with RecordingReader(tmp_path / "a.mcap") as reader:
@@ -138,6 +160,10 @@ def test_a_summary_that_is_said_to_be_nowhere_is_damage_and_no_other_error(offse
         {"label": "x" * 100_000},
         {"name": ESCAPE},
         {"axes": DESCRIPTION.axes * 10_000},
+        {"ranges": msgspec.structs.replace(RING, count=1 << 28)},
+        {"ranges": msgspec.structs.replace(RING, count=-1)},
+        {"geofences": (Geofence(name="f", label="F", kind="keep_in", polygon=((0.0, 0.0),) * 100_000),)},
+        {"bodies": (Body(name="b", parent="", joints=(TURN,) * 100_000),)},
     ],
 )
 def test_a_description_that_nobody_could_show_counts_as_damage(changed: dict[str, object], tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
 import { isRecord } from "./schema_check";
+import { shownText } from "./shown_text";
 
 /** One file of the list (docs/recording.md). Times in µs since 1970. */
 export interface RecordingEntry {
@@ -42,7 +43,7 @@ export function joined(list: RecordingList, beyond: RecordingList | null): Recor
 /** null: it is none. */
 export function parseEntry(value: unknown): RecordingEntry | null {
   if (!isRecord(value) || typeof value["id"] !== "string" || value["id"] === "") return null;
-  const text = (name: string): string => (typeof value[name] === "string" ? value[name] : "");
+  const text = (name: string): string => shownText(value[name]);
   const number = (name: string): number => (typeof value[name] === "number" ? value[name] : 0);
   const marks = isRecord(value["marks"]) ? Object.entries(value["marks"]) : [];
   return {

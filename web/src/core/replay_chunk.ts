@@ -1,4 +1,5 @@
 import { isRecord } from "./schema_check";
+import { shownText } from "./shown_text";
 
 /** One record. Times in µs since 1970. */
 export interface ReplayRecord {
@@ -52,6 +53,8 @@ export interface ReplayChunkContent {
 export const CAMERA = "/camera/";
 export const MICROPHONE = "/microphone/";
 const MOST_RECORDS = 1 << 16; // of a chunk
+const MOST_NUMBERS = 4096; // of a list: more than a robot has axes, joints or rays
+const MOST_TEXTS = 512;
 
 export class ChunkBroken extends Error {}
 
@@ -71,7 +74,7 @@ export function parseChunkBody(number: number, body: ArrayBuffer): ReplayChunkCo
     else if (topic === "/lockstep/command") commands.push(...parseCommand(json(payload), arrived));
     else if (topic === "/lockstep/seat") {
       const seat = json(payload);
-      if (isRecord(seat)) seats.push({ arrived, name: text(seat["name"]) });
+      if (isRecord(seat)) seats.push({ arrived, name: shownText(seat["name"]) });
     }
   }
   return { number, bytes: body.byteLength, media, feedback, commands, seats, broken: false };
@@ -137,7 +140,7 @@ function parseFeedback(value: unknown, arrived: number): ReplayFeedback[] {
       ranges: numbers(value["ranges"]),
       atRest: value["at_rest"] !== false,
       stopped: stop["stopped"] === true,
-      stopBy: text(stop["by"]),
+      stopBy: shownText(stop["by"]),
       faults: texts(value["faults"]),
       limits: texts(value["limits"]),
       unknown: texts(value["unknown"]),
@@ -154,7 +157,7 @@ function parseCommand(value: unknown, arrived: number): ReplayCommand[] {
       issue: numeric(value["issue"]),
       arrived,
       values: numbers(value["values"]),
-      name: text(value["name"]),
+      name: shownText(value["name"]),
     },
   ];
 }
@@ -164,7 +167,7 @@ function numeric(value: unknown): number {
 }
 
 function numbers(value: unknown): number[] {
-  return Array.isArray(value) ? value.map(numeric) : [];
+  return Array.isArray(value) ? value.slice(0, MOST_NUMBERS).map(numeric) : [];
 }
 
 function text(value: unknown): string {
@@ -172,5 +175,5 @@ function text(value: unknown): string {
 }
 
 function texts(value: unknown): string[] {
-  return Array.isArray(value) ? value.map(text) : [];
+  return Array.isArray(value) ? value.slice(0, MOST_TEXTS).map(shownText) : [];
 }

@@ -1,5 +1,6 @@
 import { eventGap, isNewer } from "./serial";
 import { isRecord } from "./schema_check";
+import { shownText } from "./shown_text";
 
 /** Where a chunk's events and times are. Times in µs since 1970. */
 export interface ReplayChunk {
@@ -145,13 +146,12 @@ function parseChunk(value: unknown): ReplayChunk[] {
 
 function parseMark(value: unknown): ReplayMark[] {
   if (!isRecord(value) || typeof value["kind"] !== "string" || !KINDS.includes(value["kind"])) return [];
-  const text = typeof value["text"] === "string" ? value["text"] : "";
   return [
     {
       event: numberOf(value["event"]),
       time: numberOf(value["time"]),
       kind: value["kind"] as MarkKind,
-      text,
+      text: shownText(value["text"]),
     },
   ];
 }

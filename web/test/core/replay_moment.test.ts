@@ -212,3 +212,26 @@ describe("sound whose codec changes", () => {
     ]);
   });
 });
+
+describe("what somebody else's file says", () => {
+  const hostile = `a\u202Eb\n${"x".repeat(100_000)}`;
+  const shown = `a b ${"x".repeat(196)}`;
+
+  it("is short, and turns and ends no line", () => {
+    const index = parseIndex({ version: 1, marks: [{ event: 1, time: 1, kind: "note", text: hostile }] });
+    expect(index?.marks[0]?.text).toBe(shown);
+    const seat = { topic: "/lockstep/seat", event: 1, arrived: 1, payload: JSON.stringify({ name: hostile }) };
+    expect(parseChunkBody(0, bodyOf([seat])).seats).toEqual([{ arrived: 1, name: shown }]);
+  });
+
+  it("has no more numbers and names than a robot has", () => {
+    const payload = JSON.stringify({
+      event: 1,
+      ranges: Array.from({ length: 100_000 }, () => 1),
+      faults: Array.from({ length: 100_000 }, () => hostile.slice(0, 10)),
+    });
+    const record = { topic: "/lockstep/feedback", event: 1, arrived: 1, payload };
+    const [feedback] = parseChunkBody(0, bodyOf([record])).feedback;
+    expect([feedback?.ranges.length, feedback?.faults.length]).toEqual([4096, 512]);
+  });
+});
