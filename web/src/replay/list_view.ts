@@ -88,7 +88,10 @@ export class ListView {
     if (last === undefined) return;
     try {
       const more = await this.api.list(last.started);
-      this.beyond = { recordings: [...(this.beyond?.recordings ?? []), ...more.recordings], older: more.older };
+      this.beyond = {
+        recordings: [...(this.beyond?.recordings ?? []), ...more.recordings],
+        older: more.older,
+      };
       this.say(null);
     } catch (error) {
       this.say(error);

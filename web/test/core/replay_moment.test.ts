@@ -220,7 +220,12 @@ describe("what somebody else's file says", () => {
   it("is short, and turns and ends no line", () => {
     const index = parseIndex({ version: 1, marks: [{ event: 1, time: 1, kind: "note", text: hostile }] });
     expect(index?.marks[0]?.text).toBe(shown);
-    const seat = { topic: "/lockstep/seat", event: 1, arrived: 1, payload: JSON.stringify({ name: hostile }) };
+    const seat = {
+      topic: "/lockstep/seat",
+      event: 1,
+      arrived: 1,
+      payload: JSON.stringify({ name: hostile }),
+    };
     expect(parseChunkBody(0, bodyOf([seat])).seats).toEqual([{ arrived: 1, name: shown }]);
   });
 
