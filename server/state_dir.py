@@ -3,6 +3,7 @@
 import fcntl
 import os
 import secrets
+import stat
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -53,7 +54,7 @@ class StateDir:
         self.path = path
         with _named(path):
             path.mkdir(mode=0o700, parents=True, exist_ok=True)
-            path.chmod(0o700)
+            _set_mode(path, 0o700)
 
     def signing_key(self) -> str:
         """Made at the first call; two consoles that start at once agree on one."""
@@ -74,7 +75,7 @@ class StateDir:
                         os.link(made, path)
                 finally:
                     os.unlink(made)
-            path.chmod(0o600)
+            _set_mode(path, 0o600)
             return path.read_bytes()
 
     def read(self, name: str) -> bytes | None:
@@ -167,6 +168,12 @@ class StateDir:
             os.unlink(name)
             raise
         return name
+
+
+def _set_mode(path: Path, mode: int) -> None:
+    """Nothing is written where it is so already: evidence is also read on a disk that cannot be written."""
+    if stat.S_IMODE(path.stat().st_mode) != mode:
+        path.chmod(mode)
 
 
 @contextmanager

@@ -104,3 +104,17 @@ def test_links_outlive_a_restart_and_a_set_secret_comes_first(tmp_path: Path) ->
     with_secret = Settings(state_dir=tmp_path / "other", secret=secret)  # type: ignore[arg-type]
     open_state(with_secret)
     assert "signing.key" not in os.listdir(tmp_path / "other")
+
+
+def test_what_is_there_is_read_on_a_disk_that_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = StateDir(tmp_path / "state").secret("a.key", lambda: b"key")
+
+    def refuse(path: Path, mode: int) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(Path, "chmod", refuse)
+    found = StateDir(tmp_path / "state")
+    assert found.secret("a.key", lambda: b"another") == made == b"key"
+    assert found.read("a.key") == b"key"
