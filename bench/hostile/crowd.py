@@ -112,7 +112,7 @@ def _say(what: object) -> None:
 
 def main() -> None:
     os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-    uvloop.run(_run(*sys.argv[1:3], int(sys.argv[3]), int(sys.argv[4]), *sys.argv[5:6]))
+    uvloop.run(_run(sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), *sys.argv[5:6]))
 
 
 if __name__ == "__main__":
