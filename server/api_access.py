@@ -24,6 +24,7 @@ Caller = Annotated[Right, Depends(authorized)]
 
 Result = TypeVar("Result")
 DEFAULT_SECONDS = 8 * 3600.0
+UNWRITTEN = "the link has ended here; that is written down when the disk takes it, and not known to a start before that"
 MAX_RECORDS = 500  # of the audit in one answer
 
 
@@ -116,7 +117,9 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     try:
         revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
     except StateUnavailable as error:
-        raise StateUnavailable(f"the link has ended here until the console starts anew; {error.detail}") from error
+        here.state.invitations.write_later(invitation_id)
+        here.console.audit.record("revocation", by, "not on the disk yet", invitation_id)
+        raise StateUnavailable(f"{UNWRITTEN}; {error.detail}") from error
     here.house.enforce(revoked, by)
     return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
 
@@ -169,7 +172,7 @@ def _info(here: Services, invitation: Invitation) -> InvitationInfo:
         by=invitation.by,
         created=invitation.created,
         expires=invitation.expires,
-        revoked=invitation.revoked_at is not None,
+        revoked=here.state.invitations.is_revoked(invitation.id),
         connected=here.house.connected(invitation.id),
         robots=list(invitation.robots),
     )

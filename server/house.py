@@ -24,7 +24,9 @@ __all__ = ["House", "HouseMetrics"]
 log = structlog.get_logger(__name__)
 
 COMMAND_LINE = Actor("command line")
+CONSOLE = Actor("console")
 CHECK_SECONDS = 0.5  # how long a link that was revoked by another process, or has expired, still works at most
+RETRY_SECONDS = 5.0  # until what the disk did not take is written again
 KEEP_SECONDS = 60.0  # between two times that the time is written down
 
 
@@ -66,6 +68,7 @@ class House:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._look_on(), name="links end")
             tasks.create_task(self._keep_time(), name="newest time")  # a disk that hangs holds up no end of a link
+            tasks.create_task(self._keep_ended(), name="revocations")
 
     async def _look_on(self) -> None:
         while True:
@@ -92,6 +95,20 @@ class House:
                     await asyncio.to_thread(store.keep_time)
             except StateDirUnusable as error:
                 log.error("what time it is cannot be written down", detail=str(error))
+            except Exception as error:
+                self.metrics.faults.caught("links", error)
+
+    async def _keep_ended(self) -> None:
+        """What the disk did not take when a link was revoked is written as soon as it does."""
+        store = self.state.invitations
+        while True:
+            await asyncio.sleep(RETRY_SECONDS)
+            if not store.unwritten:
+                continue
+            try:
+                self.enforce(await asyncio.to_thread(store.keep_ended), CONSOLE)
+            except StateDirUnusable as error:
+                log.error("links that were revoked cannot be written down", detail=str(error))
             except Exception as error:
                 self.metrics.faults.caught("links", error)
 

@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TypeVar
 
@@ -74,6 +74,7 @@ class InvitationStore:
         self._elsewhere = self._read_elsewhere()
         self._revoked = self._known.revoked()
         self._ended: set[str] = set()  # revoked by this process, whether or not the disk has taken it
+        self._unwritten: set[str] = set()  # of these, what the disk has to be asked again for
         if seen > time.time() + BEHIND_SECONDS:
             log.warning("this machine's clock is behind; links end by the newest time that was seen", seen=seen)
 
@@ -116,6 +117,22 @@ class InvitationStore:
             return False
         self._ended |= {each.id for each in ended}
         return True
+
+    def write_later(self, invitation_id: str) -> None:
+        """The disk did not take that this link was revoked: `keep_ended` is to try again."""
+        self._unwritten.add(invitation_id)
+
+    @property
+    def unwritten(self) -> bool:
+        """Whether a link was revoked that the disk does not know of yet."""
+        return bool(self._unwritten)
+
+    def keep_ended(self) -> list[Invitation]:
+        """Blocks: write down what the disk did not take; what has changed by that."""
+        wanted = frozenset(self._unwritten)
+        ended = self.update(lambda invitations: _end(invitations, wanted, self.now()))
+        self._unwritten -= wanted
+        return ended
 
     def has_ended(self, link: str, expires: float) -> bool:
         """Whether the link of this id, which expires then, is good no more."""
@@ -248,6 +265,12 @@ def _steady() -> float:
 def _end_those_of(invitations: Invitations, links: Mapping[str, float], now: float) -> list[Invitation]:
     """Revoke what was invited with `links`."""
     ours = [each.id for each in invitations.all if each.by_link in links and each.revoked_at is None]
+    return [ended for link in ours for ended in invitations.revoke(None, link, now)]
+
+
+def _end(invitations: Invitations, links: Collection[str], now: float) -> list[Invitation]:
+    """Revoke `links` themselves."""
+    ours = [each.id for each in invitations.all if each.id in links and each.revoked_at is None]
     return [ended for link in ours for ended in invitations.revoke(None, link, now)]
 
 

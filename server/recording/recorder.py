@@ -110,6 +110,7 @@ class Recorder(SessionTap):
         self._thread: RecordingThread | None = None
         self._since = 0.0
         self._failure = ""
+        self._again_at = 0.0  # s, monotonic: not before that by itself
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stopping = asyncio.Lock()
         self._ended = asyncio.Event()  # the thread ended by itself
@@ -121,11 +122,10 @@ class Recorder(SessionTap):
             self._tell_pruned(await asyncio.to_thread(self._prepare))
             ticks = 0
             while True:
-                if self._settings.automatic and self._thread is None:
+                if self._settings.automatic and self._thread is None and time.monotonic() >= self._again_at:
                     self._try_again()
-                waiting = RETRY_SECONDS if self._failure and self._thread is None else NEWS_SECONDS
                 try:
-                    async with asyncio.timeout(waiting):
+                    async with asyncio.timeout(NEWS_SECONDS):
                         await self._ended.wait()
                 except TimeoutError:
                     pass
@@ -158,6 +158,7 @@ class Recorder(SessionTap):
         try:
             self._audited("started by itself", self.start("", "").recording)
         except RecordingFailed as error:
+            self._again_at = time.monotonic() + RETRY_SECONDS
             log.error("recording does not begin", reason=error.detail)
 
     # starting and stopping
@@ -256,6 +257,7 @@ class Recorder(SessionTap):
     async def _give_up(self) -> None:
         await self.close()
         if self._failure:
+            self._again_at = time.monotonic() + RETRY_SECONDS
             self._audited("failed", self._failure)
             self._tell(self.state())
 

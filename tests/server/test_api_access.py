@@ -138,8 +138,37 @@ async def test_a_full_disk_is_said_by_name_and_a_link_ends_all_the_same(
         assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
         ended = await rig.http.get("/api/session", headers=_bearer(made["link"]))
         assert ended.json()["error"] == "link_revoked"
+        listed = (await rig.http.get("/api/invitations", headers=rig.token("supervisor"))).json()["invitations"]
+        assert [each["revoked"] for each in listed if each["id"] == made["id"]] == [True]
         monkeypatch.undo()
         assert (await _invite(rig, "operator")).status_code == 201
+
+
+async def test_a_revocation_that_the_disk_did_not_take_is_written_as_soon_as_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.house.RETRY_SECONDS", 0.01)
+    async with running_rig(state_dir=tmp_path) as rig:
+        made = (await _invite(rig, "supervisor", role="operator")).json()
+        below = await rig.http.post("/api/invitations", headers=_bearer(made["link"]), json={"role": "observer"})
+        tried: list[str] = []
+
+        def full(name: str, data: bytes) -> None:
+            tried.append(name)
+            raise StateDirUnusable(Path("state"), "No space left on device")
+
+        with monkeypatch.context() as disk:
+            disk.setattr(rig.services.state.directory, "write", full)
+            await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
+            await eventually(lambda: len(tried) >= 3)
+
+        def revoked() -> set[str]:
+            return {each.id for each in InvitationStore(StateDir(tmp_path)).known.all if each.revoked_at is not None}
+
+        await eventually(lambda: revoked() == {made["id"], below.json()["id"]})
+        assert not rig.services.state.invitations.unwritten
+        said = [each.detail for each in rig.services.audit if each.kind == "revocation"]
+        assert made["id"] in said, "who tried, at once"
 
 
 async def test_a_console_without_a_place_for_its_audit_goes_on_and_says_so(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from starlette.types import Receive, Scope, Send
 from robot_bridge.protocol.console import RecordingState, Role, SeatRequest
 from server.access import Identity
 from server.ending_response import EndingResponse
+from server.recording import recorder
 from server.recording.reader import RecordingReader
 from server.recording.service import READERS, STARTS
 from server.recording.settings import RecordingSettings
@@ -306,3 +307,22 @@ async def test_a_link_begins_only_so_many_recordings_and_others_go_on(rig: Rig) 
     assert (refused.status_code, refused.json()["error"]) == (429, "too_many_requests")
     assert (await rig.http.post("/api/recordings", headers=supervisor)).status_code == 409
     assert (await rig.http.post("/api/recordings/stop", headers=operator)).status_code == 200
+
+
+async def test_what_records_by_itself_and_fails_does_not_begin_again_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder, "RETRY_SECONDS", 1e9)
+    settings = RecordingSettings(directory=tmp_path, automatic=True, free_bytes=10**18)
+    async with running_rig(recording=settings) as rig, rig.peer("observer", "session") as peer:
+
+        def failures() -> list[str]:
+            return [each.what for each in rig.services.audit if each.kind == "recording" and each.what == "failed"]
+
+        await peer.until(lambda each: isinstance(each, RecordingState) and each.state == "failed")
+        await eventually(lambda: len(failures()) == 1)
+        await rig.http.post("/api/recordings", headers=rig.token("operator"))
+        await eventually(lambda: len(failures()) >= 2)
+        begun = [each.what for each in rig.services.audit if each.kind == "recording" and "started" in each.what]
+        assert begun == ["started by itself", "started"]
+        assert not [each for each in os.listdir(tmp_path) if each.endswith(".mcap")]
