@@ -166,7 +166,7 @@ async def test_a_revocation_that_the_disk_did_not_take_is_written_as_soon_as_it_
             return {each.id for each in InvitationStore(StateDir(tmp_path)).known.all if each.revoked_at is not None}
 
         await eventually(lambda: revoked() == {made["id"], below.json()["id"]})
-        assert not rig.services.state.invitations.unwritten
+        await eventually(lambda: not rig.services.state.invitations.unwritten)
         said = [each.detail for each in rig.services.audit if each.kind == "revocation"]
         assert made["id"] in said, "who tried, at once"
 
