@@ -174,26 +174,33 @@ class Connection:
 
     def flush(self) -> None:
         """Send what is due, hand out what happened, and set the timer anew. Call it after you used `peer` itself."""
-        if self._listener is None:
-            for event in self.peer.events():
-                self._keep(event)
-        else:
-            self._tell(self._listener)
+        self._hand_out(self.peer.events())
         self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
         self._set_timer()
         if self._ended:
             self._endpoint.forget(self)
 
-    def _tell(self, listener: Listener) -> None:
+    def hand_out_plain(self) -> None:
+        """In place of `flush` where only `Peer.receive_plain` was called."""
+        self._hand_out(self.peer.plain_packets())
+
+    def _hand_out(self, events: Sequence[PeerEvent]) -> None:
+        if self._listener is not None:
+            self._tell(self._listener, events)
+            return
+        for event in events:
+            self._keep(event)
+
+    def _tell(self, listener: Listener, events: Sequence[PeerEvent]) -> None:
         """In order, also when the listener's own doing makes further events. What it raises is a fault of its own."""
-        self._waiting.extend(self.peer.events())
+        self._waiting.extend(events)
         if self._telling:
             return
         self._telling = True
         try:
             while self._waiting:
                 event = self._waiting.popleft()
-                self._ended = isinstance(event, PeerEnded)
+                self._ended = self._ended or isinstance(event, PeerEnded)
                 try:
                     listener(event)
                 except Exception as error:
@@ -463,19 +470,26 @@ class Endpoint:
 
     def _readable(self, found: UdpSocket) -> None:
         now = self._loop.time()
-        heard: dict[Connection, None] = {}  # in order
+        heard: dict[Connection, bool] = {}  # in order; whether more than plain packets came
         for data, path in found.receive():
-            if path in self._probes:
+            if self._probes and path in self._probes:
                 self._probes[path].receive(data, now)
                 self._probed.set()
                 continue
             agent = self.port.route(data, path, now)
             connection = self._connections.get(agent) if agent is not None else None
-            if connection is not None:
+            if connection is None:
+                continue
+            if connection.peer.receive_plain(data):
+                heard.setdefault(connection, False)
+            else:
                 connection.peer.receive_datagram(data, path, now)
-                heard[connection] = None
-        for connection in heard:
-            connection.flush()
+                heard[connection] = True
+        for connection, more in heard.items():
+            if more:
+                connection.flush()
+            else:
+                connection.hand_out_plain()
 
     def _relayed(self, data: bytes, path: Path) -> None:
         now = self._loop.time()

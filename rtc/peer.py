@@ -327,6 +327,24 @@ class Peer:
         """
         self._plain_packets = True
 
+    def receive_plain(self, data: bytes) -> bool:
+        """The short way of a media datagram on a path of this peer's, after `take_plain_packets`; drain
+        `plain_packets`. False: it is another, for `receive_datagram`. No timer and nothing to send comes of it.
+        """
+        if not self._plain_packets or self._unprotect is None or self._ended:
+            return False
+        if datagram_kind(data) is not DatagramKind.RTP:
+            return False
+        plain = self._unprotect.unprotect(data)
+        if plain is not None:
+            self._events.append(PlainRtp(plain))
+        return True
+
+    def plain_packets(self) -> list[PeerEvent]:
+        """As `events`, when nothing but `receive_plain` was called since."""
+        events, self._events = self._events, []
+        return events
+
     def send_rtcp(self, packet: bytes) -> None:
         """A compound packet of the application's own. Raises PeerNotReady before media are up, SrtpPacketTooLong."""
         if self._protect is None or self._ended:

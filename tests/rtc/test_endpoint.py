@@ -13,7 +13,8 @@ from av.frame import Frame
 from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
 from rtc.endpoint import Connection, Endpoint, EndpointSettings, TooManyPeers
 from rtc.peer import OfferedMedia
-from rtc.peer_events import Connected, PacketReceived, PeerEnded, PeerEvent
+from rtc.peer_events import Connected, PacketReceived, PeerEnded, PeerEvent, PlainRtp
+from rtc.rtp.packet import RtpPacket
 from rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
 from tests.rtc.vp8 import packetise
 
@@ -249,3 +250,32 @@ async def test_addresses_that_come_later_are_used_and_those_that_are_none_left_o
     assert endpoint.counts["host_not_bound"] == 1
     endpoint.use_hosts(["127.0.0.2"])
     assert [each.base[0] for each in endpoint.candidates] == ["127.0.0.2"]
+
+
+async def test_plain_packets_come_by_a_short_way_and_everything_else_by_its_own(endpoint: Endpoint) -> None:
+    camera = LocalMedia((VP8,), "sendonly", (MID_URI,))
+    screen = LocalMedia((VP8,), "recvonly", (MID_URI,))
+    async with Endpoint([HOST]) as other:
+        watcher, sender = endpoint.connect(controlling=True), other.connect(controlling=False)
+        assert not watcher.peer.receive_plain(b"\x80\x60" + bytes(20)), "not asked for"
+        watcher.peer.take_plain_packets()
+        assert not watcher.peer.receive_plain(b"\x80\x60" + bytes(20)), "no keys yet"
+        offer = watcher.offer([OfferedMedia("camera", "video", screen)])
+        watcher.accept(sender.answer(offer, {"camera": camera}))
+        channel = watcher.open_channel("x")
+        await until(watcher, of(ChannelOpened))
+        for number in range(3):
+            sender.send_frame("camera", [b"payload"], number * 3000)
+            sender.send(channel, f"message {number}")
+        heard: list[PeerEvent] = []
+        while sum(isinstance(event, PlainRtp | ChannelMessage) for event in heard) < 6:
+            heard.append(await anext(watcher))
+        packets = [RtpPacket.parse(event.data) for event in heard if isinstance(event, PlainRtp)]
+        assert [packet.timestamp - packets[0].timestamp for packet in packets] == [0, 3000, 6000]
+        assert [event.data for event in heard if isinstance(event, ChannelMessage)] == [
+            f"message {number}" for number in range(3)
+        ]
+        assert watcher.peer.receive_plain(b"\x80\x60" + bytes(20)), "somebody else's: dropped"
+        assert watcher.peer.plain_packets() == []
+        watcher.close()
+        assert not watcher.peer.receive_plain(b"\x80\x60" + bytes(20))
