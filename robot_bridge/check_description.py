@@ -28,6 +28,7 @@ MAX_BODIES = 1024
 MAX_GEOMS = 4096
 MAX_LAYERS = 32
 MAX_LIMITS = 256
+FARTHEST = 1e6  # m, of what is drawn; other numbers of it alike
 MAX_NAME = 200  # characters, of a name or a label
 SIDES = range(1, 8193)  # pixels
 FRAME_RATES = 240.0  # Hz
@@ -76,7 +77,7 @@ def check_description(description: RobotDescription) -> None:
 
 
 def check_bounds(description: RobotDescription) -> None:
-    """Whether it can be shown: how much there is of everything, and what names hold.
+    """Whether it can be shown: how much there is of everything, how far it reaches, and what names hold.
 
     Enough for one that drives nothing any more, as of a recording; an older one may contradict what is asked for now.
 
@@ -85,6 +86,7 @@ def check_bounds(description: RobotDescription) -> None:
     """
     _check_counts(description)
     _check_texts(description)
+    _check_reach(description)
 
 
 def _check_axis(axis: Axis, hold: float) -> None:
@@ -123,6 +125,28 @@ def _check_counts(description: RobotDescription) -> None:
     for kind, count, most in counts:
         if not 0 <= count <= most:
             raise DescriptionError(f"{count} {kind}, the bound is {most}")
+
+
+def _check_reach(description: RobotDescription) -> None:
+    """Of what is drawn: beyond this nothing but numbers that are none comes of it."""
+    for body in description.bodies:
+        numbers = [*body.position, *body.orientation]
+        for joint in body.joints:
+            numbers += joint.axis
+        for geom in body.geoms:
+            numbers += (*geom.size, *geom.position, *geom.orientation, *geom.rgba)
+        _check_far(f"body {body.name}", numbers)
+    for fence in description.geofences:
+        _check_far(f"geofence {fence.name}", (number for corner in fence.polygon for number in corner))
+    if (ring := description.ranges) is not None:
+        numbers = [ring.angle_min, ring.angle_increment, ring.range_min, ring.range_max]
+        _check_far(f"ranges {ring.name}", numbers)
+
+
+def _check_far(where: str, numbers: Iterable[float]) -> None:
+    for number in numbers:
+        if not abs(number) <= FARTHEST:
+            raise DescriptionError(f"{where}: every number must be finite and at most {FARTHEST:g}, not {number:g}")
 
 
 def _check_texts(description: RobotDescription) -> None:
@@ -167,30 +191,17 @@ def _check_microphone(microphone: Microphone) -> None:
 def _check_ranges(ranges: RangeRing) -> None:
     if not 1 <= ranges.count <= MAX_RAYS:
         raise DescriptionError(f"ranges {ranges.name}: from 1 to {MAX_RAYS} rays, not {ranges.count}")
-    _check_finite(
-        f"ranges {ranges.name}", (ranges.angle_min, ranges.angle_increment, ranges.range_min, ranges.range_max)
-    )
 
 
 def _check_bodies(bodies: Sequence[Body]) -> None:
     parents = {body.name: body.parent for body in bodies}
     for body in bodies:
         where = f"body {body.name}"
-        _check_finite(where, (*body.position, *body.orientation))
-        for joint in body.joints:
-            _check_finite(where, joint.axis)
-        for geom in body.geoms:
-            _check_finite(where, (*geom.size, *geom.position, *geom.orientation, *geom.rgba))
         above, steps = body.parent, 0
         while above in parents:
             above, steps = parents[above], steps + 1
             if steps > len(bodies):
                 raise DescriptionError(f"{where} is a part of itself")
-
-
-def _check_finite(where: str, numbers: Iterable[float]) -> None:
-    if not all(map(math.isfinite, numbers)):
-        raise DescriptionError(f"{where}: every number must be finite")
 
 
 def _check_feeling(feeling: ForceFeeling) -> None:

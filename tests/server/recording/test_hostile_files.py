@@ -161,6 +161,8 @@ def test_a_summary_that_is_said_to_be_nowhere_is_damage_and_no_other_error(offse
         {"name": ESCAPE},
         {"axes": DESCRIPTION.axes * 10_000},
         {"ranges": msgspec.structs.replace(RING, count=1 << 28)},
+        {"ranges": msgspec.structs.replace(RING, angle_min=1e300)},
+        {"bodies": (Body(name="b", parent="", position=(1e300, 0.0, 0.0)),)},
         {"ranges": msgspec.structs.replace(RING, count=-1)},
         {"geofences": (Geofence(name="f", label="F", kind="keep_in", polygon=((0.0, 0.0),) * 100_000),)},
         {"bodies": (Body(name="b", parent="", joints=(TURN,) * 100_000),)},
