@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import structlog
+from aiortc import InvalidStateError
 from prometheus_client import Counter
 
 from server.rate_limits import RateLimits
@@ -34,6 +35,8 @@ class Faults:
     def uncaught(self, loop: object, context: dict[str, Any]) -> None:
         """For `loop.set_exception_handler`: what nobody awaited, and what a callback of the loop raised."""
         error = context.get("exception")
+        if isinstance(error, InvalidStateError):
+            return  # aiortc goes on connecting a peer that has ended, in a task that nobody can await; it is no fault
         if not isinstance(error, BaseException):
             error = RuntimeError(str(context.get("message", "")))
         self.caught("loop", error, what=str(context.get("message", "")))

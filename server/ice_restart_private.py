@@ -25,6 +25,7 @@ from aiortc.rtcicetransport import RTCIceTransport, candidate_to_aioice
 
 from robot_bridge.protocol.ice_consent import keep_consent, require_consent_hooks
 from server.peer_guards_private import guard_ice
+from server.to_the_end import to_the_end
 
 __all__ = ["IceSession", "LocalIce", "keep_path"]
 
@@ -112,7 +113,7 @@ class IceSession:
             connection._queue = _DataOnly(_queue_of(self._transport))
             self._next, self._candidates = connection, 0
             try:
-                await gatherer.gather()
+                await to_the_end(gatherer.gather())
                 # The offerer keeps the role it has (RFC 8445 6.1.1); a conflict would repair itself.
                 connection.ice_controlling = self._transport._connection.ice_controlling
                 connection.remote_username, connection.remote_password = username, password

@@ -44,6 +44,7 @@ from server.offer_sections import AnswerableOffer, answerable
 from server.page import takes_coding
 from server.peer_guards_private import guard_data
 from server.services import Services, authorized, services
+from server.to_the_end import to_the_end
 from server.webrtc_peer import WebRtcPeer
 
 __all__ = [
@@ -288,7 +289,7 @@ async def _answering_peer(
             line.peer = peer
         guard_data(pc, peer.transport_refused)
         with offers_fault():
-            await pc.setLocalDescription(await pc.createAnswer())
+            await to_the_end(pc.setLocalDescription(await pc.createAnswer()))
     except BaseException:
         await media.close()
         raise

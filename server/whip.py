@@ -28,6 +28,7 @@ from server.offer import MAX_SECTIONS, prepare_offer
 from server.offer_sections import AnswerableOffer, answerable
 from server.publisher import Publisher
 from server.services import Services, authorized, services
+from server.to_the_end import to_the_end
 from server.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, discard, offered_username, offers_fault, patched
 
 __all__ = ["router"]
@@ -146,7 +147,7 @@ async def _negotiate(here: Services, caller: Right, offer: str, camera: Publishe
                 await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
             publisher = _publisher(here, caller, offer, pc, own_servers, camera)
             with offers_fault():
-                await pc.setLocalDescription(await pc.createAnswer())
+                await to_the_end(pc.setLocalDescription(await pc.createAnswer()))
         caller.identity  # noqa: B018  raises when the link has ended meanwhile
     except BaseException as error:
         await discard(here, pc)

@@ -1,5 +1,6 @@
 from typing import Any
 
+from aiortc import InvalidStateError
 from prometheus_client import CollectorRegistry, Counter
 from structlog.testing import capture_logs
 
@@ -28,6 +29,12 @@ def test_every_fault_is_counted_and_a_place_that_goes_on_failing_does_not_flood_
     with capture_logs() as logs:
         faults.caught("quality", ValueError("planted"))
     assert len(logs) == 1
+
+
+def test_that_aiortc_goes_on_connecting_a_peer_that_has_ended_is_no_fault() -> None:
+    faults, registry, _ = _faults()
+    faults.uncaught(object(), {"message": "", "exception": InvalidStateError("RTCIceTransport is closed")})
+    assert _count(registry, "loop") is None
 
 
 def test_what_nobody_awaited_is_a_fault_of_the_loop() -> None:

@@ -14,7 +14,7 @@ from robot_bridge.protocol.messages import Ping, Pong
 from server.data_transport_private import tune_data_transport
 from server.offer import parse_fragment
 from tests.server.offers import offer, section
-from tests.server.rig import PATIENCE, Rig, TestPeer, running_console, running_rig
+from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_console, running_rig
 
 SDP = {"Content-Type": "application/sdp"}
 FRAGMENT = {"Content-Type": "application/trickle-ice-sdpfrag"}
@@ -345,3 +345,27 @@ async def test_whoever_wants_all_streams_is_told_when_an_offer_has_too_few_secti
         assert (await _post(rig, missing)).status_code == 201
         assert (await _post(rig, enough, "/whep?sections=all")).status_code == 201
         assert (await _post(rig, enough, "/whep?sections=some")).status_code == 422
+
+
+@pytest.mark.parametrize("path", ["/whep", "/whip"])
+async def test_an_offer_that_cannot_be_answered_in_time_leaves_no_socket_open(
+    path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running_rig(whip="phone") as rig:
+        loop, opened = asyncio.get_running_loop(), list[asyncio.BaseTransport]()
+        create = loop.create_datagram_endpoint
+
+        async def slowly(*what: Any, **more: Any) -> Any:
+            made = await create(*what, **more)
+            opened.append(made[0])
+            await asyncio.sleep(0.2)  # a busy machine
+            return made
+
+        pictures = section("0") if path == "/whep" else section("0").replace("recvonly", "sendonly")
+        monkeypatch.setattr(loop, "create_datagram_endpoint", slowly)
+        monkeypatch.setattr(f"server.{path[1:]}.NEGOTIATION_TIMEOUT", 0.1)
+        headers = {**rig.token("operator"), "Content-Type": "application/sdp"}
+        answer = await rig.http.post(path, content=offer(pictures), headers=headers)
+        assert (answer.status_code, answer.json()["error"]) == (400, "bad_sdp")
+        assert opened
+        await eventually(lambda: all(each.is_closing() for each in opened))

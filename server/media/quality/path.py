@@ -180,7 +180,7 @@ class PathController:
 
     def assume(self, rate: float, now: float) -> None:
         """Try a rate that others are served with."""
-        self.rate = rate
+        self.rate = max(self.limits.minimum, rate)  # a peer without a camera needs nothing, and may get one
         self._raised_at = self._lowered_at = self._sign_at = now
 
     def _silent(self, now: float) -> bool:

@@ -197,3 +197,9 @@ def test_no_report_breaks_it(inputs: list[tuple[str, float]]) -> None:
         path.decide(now)
         assert LIMITS.minimum <= path.rate <= LIMITS.maximum
         assert math.isfinite(path.paused_until)
+
+
+def test_a_peer_that_had_no_camera_when_it_stepped_back_is_not_left_without_a_rate() -> None:
+    path = PathController(LIMITS, 0.0)
+    path.assume(0.0, 1.0)  # what no cameras need
+    assert path.rate == LIMITS.minimum > 0
