@@ -71,6 +71,7 @@ class Allocation:
         self._peers: dict[Address, _Peer] = {}
         self._by_channel: dict[int, _Peer] = {}
         self._refresh_at: float | None = None
+        self._lifetime = self._settings.lifetime  # s, that the server has given
         self._out: list[bytes] = []
         self._received: list[tuple[bytes, Address]] = []
         self._events: list[Allocated | AllocationEnded] = []
@@ -174,7 +175,7 @@ class Allocation:
         self._requests.handle_timer(now)
         if self._refresh_at is not None and now >= self._refresh_at:
             self._refresh_at = None
-            self._requests.begin(Method.REFRESH, [(Attribute.LIFETIME, self._settings.lifetime.to_bytes(4))], now)
+            self._requests.begin(Method.REFRESH, [(Attribute.LIFETIME, self._lifetime.to_bytes(4))], now)
         for peer in self._peers.values():
             if peer.bind_at is not None and now >= peer.bind_at:
                 self._bind(peer, now)
@@ -213,8 +214,9 @@ class Allocation:
 
     def _note_lifetime(self, answer: Answer, now: float) -> None:
         given = answer.attributes.get(Attribute.LIFETIME, b"")
-        lifetime = int.from_bytes(given) if len(given) == 4 else self._settings.lifetime
-        self._refresh_at = now + max(1.0, self._settings.refresh_share * lifetime)
+        # Coturn bounds it in the first answer only: who asks for more later is told more than is meant.
+        self._lifetime = min(int.from_bytes(given), self._lifetime) if len(given) == 4 else self._lifetime
+        self._refresh_at = now + max(1.0, self._settings.refresh_share * self._lifetime)
 
     def _refresh_answered(self, answer: Answer, now: float) -> None:
         if answer.error is None:

@@ -22,6 +22,7 @@ class TurnServer:
         self.channels: dict[int, Address] = {}
         self.methods: list[int] = []
         self.relayed: list[tuple[bytes, Address]] = []  # what the client has sent, and to whom
+        self.asked: list[int] = []  # s, that allocations and refreshes have asked for
         self.closed = False
 
     def answer(self, message: bytes) -> list[bytes]:
@@ -50,8 +51,10 @@ class TurnServer:
         values: list[tuple[int, bytes]] = []
         if method in (Method.ALLOCATE, Method.REFRESH):
             asked = int.from_bytes(attributes[Attribute.LIFETIME])
+            self.asked.append(asked)
             self.closed = asked == 0
-            values.append((Attribute.LIFETIME, min(asked, self.lifetime).to_bytes(4)))
+            given = min(asked, self.lifetime) if method == Method.ALLOCATE else asked  # as coturn does
+            values.append((Attribute.LIFETIME, given.to_bytes(4)))
         if method == Method.ALLOCATE:
             values.append((Attribute.XOR_RELAYED_ADDRESS, pack_address(RELAYED, transaction)))
             values.append((Attribute.XOR_MAPPED_ADDRESS, pack_address(MAPPED, transaction)))
