@@ -27,6 +27,10 @@ from server.media.stream import Encoded, Stream
 __all__ = ["VideoStream"]
 
 PACKETISE = {"H264": packetise_h264, "VP8": packetise_vp8}
+QUIET_SECONDS, QUIET_PICTURES = (
+    2.0,
+    3,
+)  # without a picture, and at least so many in a row missing: the camera gives none
 
 
 class SourcePicture:
@@ -91,6 +95,7 @@ class VideoStream(Stream[PictureJob]):
         self.frame_rate = min(camera.frame_rate, settings.video_frames_per_second or camera.frame_rate)
         self.size = camera.width, camera.height  # of the newest picture
         self.gives: str | None = None  # the codec that comes; None before the first picture
+        self._came_at: float | None = None  # the newest picture, on the clock of `feed`
         super().__init__(camera.name, camera.label, settings, fan_out, metrics)
         self._clock = PictureClock()
         self._pace = FramePace(settings.video_frames_per_second)
@@ -110,8 +115,14 @@ class VideoStream(Stream[PictureJob]):
     def full_plan(self) -> PicturePlan:
         return PicturePlan(self._settings.video_bitrate_bps, self.frame_rate)
 
+    def is_giving(self, now: float) -> bool:
+        """Whether pictures come. One that gives none, or none any more, needs no share of a path."""
+        patience = max(QUIET_SECONDS, QUIET_PICTURES / self.frame_rate)
+        return self._came_at is not None and now - self._came_at < patience
+
     def feed(self, media: Media, now: float, capture_time: float) -> None:
         self.gives = media.codec
+        self._came_at = now
         super().feed(media, now, capture_time)
 
     def _enqueue(self, media: Media, now: float, capture_time: float) -> None:

@@ -174,7 +174,7 @@ class QualityDesk:
         peer.tier = peer.choice.decide(peer.path, self._needs(peer), now)
 
     def _needs(self, peer: PeerQuality) -> float:
-        whole = len(peer.cameras) * float(self._settings.video_bitrate_bps)
+        whole = len(_giving(_streams([peer]), self._clock())) * float(self._settings.video_bitrate_bps)
         return whole / self._crowd.divisor if peer.in_crowd else whole
 
     def _plan_operator(self, leaders: list[PeerQuality], now: float) -> None:
@@ -211,15 +211,24 @@ class QualityDesk:
             self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now, self._low_divisor)
 
     def _plan(self, tier: Tier, streams: list[VideoStream], total_bps: float, now: float, divisor: int = 1) -> None:
-        """`divisor`: the tier gets one picture of so many, at most."""
-        maximum = float(self._settings.video_bitrate_bps)
-        needs = [CameraNeed(stream.size[0] * stream.size[1] * stream.frame_rate, maximum) for stream in streams]
-        for stream, bps in zip(streams, share_out(total_bps, needs), strict=True):
+        """`divisor`: the tier gets one picture of so many, at most.
+
+        A camera that gives nothing keeps the plan that it would have, so that it begins with no more than its share;
+        the others have all of it until then.
+        """
+        shares = self._shares(total_bps, streams) | self._shares(total_bps, _giving(streams, now))
+        for stream, bps in shares.items():
             ladder = self._ladders.setdefault((tier, stream.name), PictureLadder())
             plan = ladder.plan(bps, stream.frame_rate / divisor, stream.size, now)
             self._plans[tier, stream.name] = plan
             for output in stream.outputs_of(tier):
                 output.plan = plan
+
+    def _shares(self, total_bps: float, streams: list[VideoStream]) -> dict[VideoStream, float]:
+        """Bits per second of each of these cameras, the main one first."""
+        maximum = float(self._settings.video_bitrate_bps)
+        needs = [CameraNeed(stream.size[0] * stream.size[1] * stream.frame_rate, maximum) for stream in streams]
+        return dict(zip(streams, share_out(total_bps, needs), strict=True))
 
     def _settle(self, peer: PeerQuality, tier: Tier, encoded_as: PictureTier) -> None:
         peer.tier = tier
@@ -295,3 +304,8 @@ class QualityDesk:
 def _streams(peers: Iterable[PeerQuality]) -> list[VideoStream]:
     """The cameras of these peers, the main one first."""
     return list({camera.stream: None for peer in peers for camera in peer.cameras})
+
+
+def _giving(streams: list[VideoStream], now: float) -> list[VideoStream]:
+    """Those that give pictures; all where none does, as before the first picture."""
+    return [stream for stream in streams if stream.is_giving(now)] or streams

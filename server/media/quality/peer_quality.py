@@ -113,10 +113,14 @@ class PeerQuality:
         self.path.estimated(WIRE_SHARE * sum(self._estimates.values()), self._clock())
 
     def report(self, report: Report, now: float) -> None:
-        """The client's own report. Its gaps count for the main camera."""
+        """The client's own report. Its gaps count for the main camera, or the first that gives pictures.
+
+        The gap of one that gives none grows with every event, which says nothing of the path.
+        """
         if not self.cameras:
             return
-        main = self.cameras[0].stream.name
+        streams = [camera.stream for camera in self.cameras]
+        main = next((stream.name for stream in streams if stream.is_giving(now)), streams[0].name)
         for stream in report.streams:
             if stream.stream != main or stream.stamp == 0 or report.event == 0:
                 continue

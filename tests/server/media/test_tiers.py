@@ -229,3 +229,75 @@ async def test_thumbnails_do_not_lower_the_tier_of_who_watches_over_a_bad_path()
             desk(plane).tick()
         assert bad.media.tier == "low"
         assert desk(plane)._plans["low", "camera0"].bitrate_bps > LOW_FLOOR_BPS
+
+
+class Later:
+    """The desk's clock, set on by hand."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def bits(plane: MediaPlane, tier: str) -> list[int]:
+    """Bits per second that the tier's plans give to two cameras."""
+    desk(plane).tick()
+    return [desk(plane)._plans[tier, name].bitrate_bps for name in ("camera0", "camera1")]
+
+
+async def test_the_share_of_a_camera_that_gives_nothing_is_the_others_until_it_gives() -> None:
+    async with (
+        running_plane(description(cameras=2)) as plane,
+        viewing(plane, ["video", "video"], priority=True) as viewer,
+    ):
+        clock = Later()
+        desk(plane)._clock = clock
+        viewer.media.quality.path.rate = 300_000
+        shared = bits(plane, "operator")
+        assert sum(shared) == 300_000, "before the first picture each has its own"
+        plane.feed(noise(1, clock.now), clock.now)
+        assert bits(plane, "operator") == [300_000, shared[1]], "the other begins with no more than its share"
+        plane.feed(noise(2, clock.now, "camera1"), clock.now)
+        assert bits(plane, "operator") == shared
+        clock.now += 1.9
+        plane.feed(noise(3, clock.now, "camera1"), clock.now)
+        assert bits(plane, "operator") == shared
+        clock.now += 0.2
+        assert bits(plane, "operator") == [shared[0], 300_000], "also the main camera's, once it gives none any more"
+
+
+async def test_an_observers_path_need_not_carry_a_camera_that_gives_nothing() -> None:
+    async with (
+        running_plane(description(cameras=2), video_bitrate_bps=400_000) as plane,
+        viewing(plane, ["video", "video"]) as viewer,
+    ):
+        clock = Later()
+        desk(plane)._clock = clock
+        quality = viewer.media.quality
+        quality.path.rate = 400_000
+        plane.feed(noise(1, clock.now), clock.now)
+        for _ in range(11):
+            desk(plane).tick()
+        assert quality.tier == "high"
+        plane.feed(noise(2, clock.now, "camera1"), clock.now)
+        for _ in range(11):
+            desk(plane).tick()
+        assert quality.tier == "low"
+
+
+async def test_the_gap_of_a_camera_that_gives_nothing_says_nothing_of_the_path() -> None:
+    async with (
+        running_plane(description(cameras=2)) as plane,
+        viewing(plane, ["video", "video"], priority=True) as viewer,
+    ):
+        path = cast(Any, viewer.media.quality.path)
+        plane.feed(noise(1, 1.0), 1.0)
+        for event in range(10, 60, 10):
+            now = 10.0 + event
+            plane.feed(noise(event, now, "camera1"), now)
+            old = StreamReport(stream="camera0", carrier="none", stamp=1, tolerance=4, lag=0)
+            new = StreamReport(stream="camera1", carrier="none", stamp=event, tolerance=4, lag=0)
+            viewer.media.report(Report(event=event, streams=[old, new]), now)
+        assert path._lag == 0
