@@ -8,10 +8,27 @@ export interface SoundBacklog {
   skipTo: number | null; // RTP timestamp before which sound is left out; null: nothing is
 }
 
-const MOST_MS = 250;
+export const MOST_MS = 250;
 /** After an outage the newest sound is far ahead for a moment, until the jitter buffer goes on with it. */
 const PATIENCE_MS = 300;
 const KEEP_MS = 40;
+
+/** Frames of one stream, as they came to the decoder. */
+export interface Arrivals {
+  newest: number | null; // RTP timestamp of the frame that arrived last
+  queued: number | null; // of the last that went on to the decoder
+  dropped: number; // thrown away before decoding
+}
+
+export function createArrivals(): Arrivals {
+  return { newest: null, queued: null, dropped: 0 };
+}
+
+export function noteArrival(arrivals: Arrivals, rtpTimestamp: number, dropped: boolean): void {
+  arrivals.newest = rtpTimestamp;
+  if (dropped) arrivals.dropped += 1;
+  else arrivals.queued = rtpTimestamp;
+}
 
 export function createSoundBacklog(): SoundBacklog {
   return { overSinceMs: null, skipTo: null };
@@ -22,24 +39,32 @@ export function rtpGap(newer: number, older: number): number {
   return (newer - older) | 0;
 }
 
-/** Takes the newest sound that arrived and the one being played; says from where to go on, or null: leave nothing out. */
+/** How much sound waits behind what plays. `queued`: the last that went on to the decoder. */
+export function waitingMs(queued: number, playing: number, clockRate: number): number {
+  return (rtpGap(queued, playing) / clockRate) * 1000;
+}
+
+/**
+ * Takes the last sound that went on to the decoder and the one being played; says from where to go on, or null: leave
+ * nothing out. What was dropped before the decoder does not wait, else what comes next would be left out for it as well.
+ */
 export function skipTarget(
   backlog: SoundBacklog,
-  newest: number,
+  queued: number,
   playing: number,
   clockRate: number,
   now: number,
 ): number | null {
   if (backlog.skipTo !== null && rtpGap(backlog.skipTo, playing) > 0) return null;
   backlog.skipTo = null;
-  const waiting = rtpGap(newest, playing);
-  if ((waiting / clockRate) * 1000 <= MOST_MS) {
+  const waiting = rtpGap(queued, playing);
+  if (waitingMs(queued, playing, clockRate) <= MOST_MS) {
     backlog.overSinceMs = null;
     return null;
   }
   backlog.overSinceMs ??= now;
   if (now - backlog.overSinceMs < PATIENCE_MS) return null;
   backlog.overSinceMs = null;
-  backlog.skipTo = (newest + waiting - (KEEP_MS * clockRate) / 1000) >>> 0;
+  backlog.skipTo = (queued + waiting - (KEEP_MS * clockRate) / 1000) >>> 0;
   return backlog.skipTo;
 }

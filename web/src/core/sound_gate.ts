@@ -1,4 +1,5 @@
 import { judge } from "./media_gate";
+import { MOST_MS } from "./sound_backlog";
 import {
   UNMARKED,
   ageOf,
@@ -12,6 +13,8 @@ import {
 
 /** When no new segment came for this long, what plays is the decoder's concealment: its own invention. */
 const CONCEALED_MS = 200;
+/** A browser that has not worked off the sound of its start by then is not about to. */
+const START_MS = 5000;
 
 /** The gate of one audio stream. A segment counts by the verdict at its start. */
 export interface SoundGate {
@@ -19,15 +22,21 @@ export interface SoundGate {
   playing: number | null; // RTP timestamp of the segment being played
   playingSinceMs: number;
   judged: boolean; // whether that segment is counted
+  starting: boolean; // nothing was heard yet, and the browser plays what waited while it opened its sound device
+  playsSinceMs: number | null; // anything at all
 }
 
+const NOT_STARTED = { starting: true, playsSinceMs: null };
+
 export function createSoundGate(): SoundGate {
-  return { counts: createCounts(), playing: null, playingSinceMs: 0, judged: false };
+  return { counts: createCounts(), playing: null, playingSinceMs: 0, judged: false, ...NOT_STARTED };
 }
 
 /**
  * Takes the segment being played; says whether it may be heard now.
  * `found` is undefined while nothing is known of it. `audible`: whether sound is on; silence renders nothing.
+ * `waiting`: ms of sound that arrived and waits behind it. What is too old because the browser began late is its start,
+ * and no lag of the path: it is not heard, and not counted.
  */
 export function observeSound(
   gate: SoundGate,
@@ -36,8 +45,10 @@ export function observeSound(
   context: GateContext,
   audible: boolean,
   now: number,
+  waiting: number,
 ): boolean {
   const { counts } = gate;
+  gate.playsSinceMs ??= now;
   if (gate.playing !== rtpTimestamp) {
     gate.playing = rtpTimestamp;
     gate.playingSinceMs = now;
@@ -54,6 +65,8 @@ export function observeSound(
     ageOf(mark, context),
   );
   if (stamp !== null) counts.stamp = stamp;
+  gate.starting &&= verdict === "discard" && waiting > MOST_MS && now - gate.playsSinceMs < START_MS;
+  if (gate.starting) return false;
   noteSeen(counts, gap);
   counts.gap = gap;
   if (!gate.judged && audible) {

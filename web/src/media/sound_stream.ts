@@ -1,6 +1,6 @@
 import { judge } from "../core/media_gate";
 import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../core/medium_counts";
-import { createSoundBacklog, skipTarget } from "../core/sound_backlog";
+import { createSoundBacklog, skipTarget, waitingMs } from "../core/sound_backlog";
 import { createSoundGate, observeSound } from "../core/sound_gate";
 import { findMark } from "../core/stamp_book";
 import type { Section } from "../rtc/section";
@@ -16,6 +16,7 @@ export class SoundStream {
   isOpen = false;
   private readonly output: SoundOutput;
   private readonly backlog = createSoundBacklog();
+  private droppedAtStart = 0; // before decoding, to begin with the newest
 
   constructor(
     readonly info: StreamInfo,
@@ -34,12 +35,25 @@ export class SoundStream {
     const { stamps } = this.section;
     const mark = playing === undefined || stamps === null ? UNMARKED : findMark(stamps.book, playing);
     const before = this.gate.counts.rendered;
-    if (playing !== undefined) this.catchUp(playing);
-    const passes =
-      playing !== undefined && observeSound(this.gate, playing, mark, context, audible, performance.now());
+    const passes = playing !== undefined && this.judge(playing, mark, context, audible, performance.now());
     if (this.gate.counts.rendered > before) this.note(mark ?? UNMARKED, context);
     this.isOpen = passes && audible;
     this.output.open(this.isOpen);
+  }
+
+  private judge(
+    playing: number,
+    mark: FrameMark | undefined,
+    context: GateContext,
+    audible: boolean,
+    now: number,
+  ): boolean {
+    const queued = this.section.stamps?.queued ?? null;
+    if (queued !== null) this.catchUp(playing, queued, now);
+    const waiting = queued === null ? 0 : waitingMs(queued, playing, this.clockRate());
+    const passes = observeSound(this.gate, playing, mark, context, audible, now, waiting);
+    if (this.isStarting()) this.droppedAtStart = this.section.stamps?.dropped ?? 0;
+    return passes;
   }
 
   private note(mark: FrameMark, context: GateContext): void {
@@ -57,22 +71,34 @@ export class SoundStream {
     noteSeen(this.gate.counts, judge(feedback, mark.stamp, tolerance, gate, null).gap);
   }
 
-  private catchUp(playing: number): void {
+  private catchUp(playing: number, queued: number, now: number): void {
     const { stamps } = this.section;
-    if (this.reader === null || stamps === null || stamps.newest === null) return;
-    const clockRate = this.info.codec === "PCMU" ? 8000 : 48_000;
-    const before = skipTarget(this.backlog, stamps.newest, playing, clockRate, performance.now());
+    if (this.reader === null || stamps === null) return;
+    const before = skipTarget(this.backlog, queued, playing, this.clockRate(), now);
     if (before !== null) this.reader.skip(stamps, before);
+  }
+
+  private clockRate(): number {
+    return this.info.codec === "PCMU" ? 8000 : 48_000;
+  }
+
+  /** Whether the browser still plays what waited while it opened its sound device. */
+  isStarting(): boolean {
+    return this.gate.starting && this.gate.playing !== null;
   }
 
   /** Put to the gate, and dropped before. */
   received(): number {
-    return this.gate.counts.received + (this.section.stamps?.dropped ?? 0);
+    return this.gate.counts.received + this.dropped();
   }
 
   /** Discarded at the gate, and before decoding. */
   discarded(): number {
-    return this.gate.counts.discarded + (this.section.stamps?.dropped ?? 0);
+    return this.gate.counts.discarded + this.dropped();
+  }
+
+  private dropped(): number {
+    return (this.section.stamps?.dropped ?? 0) - this.droppedAtStart;
   }
 
   level(): number {

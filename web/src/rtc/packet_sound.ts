@@ -2,7 +2,7 @@ import { decodeMuLaw, opusChannels } from "../core/sound_packets";
 import { splitTrailer } from "../core/trailer";
 import { UNMARKED, type FrameMark } from "../core/medium_counts";
 import { createStampBook, noteMark } from "../core/stamp_book";
-import { rtpGap } from "../core/sound_backlog";
+import { createArrivals, rtpGap } from "../core/sound_backlog";
 import type { PacketPlayer, Section } from "./section";
 import type { ReceiverStamps } from "./stamp_reader";
 
@@ -25,8 +25,7 @@ export class PacketSound implements Section, PacketPlayer {
   readonly source = this;
   readonly stamps: ReceiverStamps = {
     book: createStampBook(BOOK_LIMIT),
-    newest: null,
-    dropped: 0,
+    ...createArrivals(),
     onstamp: null,
   };
   private context: AudioContext | null = null; // null before somebody listens
@@ -114,6 +113,7 @@ export class PacketSound implements Section, PacketPlayer {
     const node = new AudioBufferSourceNode(this.context, { buffer });
     node.connect(this.output);
     node.start(last);
+    this.stamps.queued = time;
     this.segments.push({ time, start: last, end: last + buffer.duration });
   }
 }

@@ -1,3 +1,4 @@
+import { createArrivals, noteArrival, type Arrivals } from "../core/sound_backlog";
 import { createStampBook, noteMark, type StampBook } from "../core/stamp_book";
 import StampWorker from "./stamp_worker?worker&inline"; // a request of its own would cost a round trip
 import { isFrameNote, type SoundContext, type SoundSkip, type TransformOptions } from "./stamp_messages";
@@ -5,10 +6,8 @@ import { isFrameNote, type SoundContext, type SoundSkip, type TransformOptions }
 const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
 
 /** Stamps of one receiver's frames. */
-export interface ReceiverStamps {
+export interface ReceiverStamps extends Arrivals {
   readonly book: StampBook;
-  newest: number | null; // RTP timestamp of the frame that arrived last
-  dropped: number; // sound thrown away before decoding
   onstamp: (() => void) | null;
 }
 
@@ -36,8 +35,7 @@ export class StampReader {
     const options: TransformOptions = { receiver: this.nextReceiver++, kind, trailer };
     const stamps: ReceiverStamps = {
       book: createStampBook(BOOK_LIMIT),
-      newest: null,
-      dropped: 0,
+      ...createArrivals(),
       onstamp: null,
     };
     this.receivers.set(options.receiver, stamps);
@@ -71,8 +69,7 @@ export class StampReader {
     const stamps = this.receivers.get(data.receiver);
     if (stamps === undefined) return;
     noteMark(stamps.book, data.rtpTimestamp, data.mark);
-    stamps.newest = data.rtpTimestamp;
-    if (data.dropped) stamps.dropped += 1;
+    noteArrival(stamps, data.rtpTimestamp, data.dropped);
     stamps.onstamp?.();
   }
 }

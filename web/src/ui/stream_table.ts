@@ -73,7 +73,8 @@ function createRow(): Row {
       setText(codec, stream.info.codec);
       setText(picture, quality);
       setHidden(picture, quality === "");
-      setText(gap, found.gap === null ? "–" : `${found.gap} of ${tolerance}`);
+      const isStarting = "isStarting" in stream && stream.isStarting();
+      setText(gap, isStarting ? "starting" : found.gap === null ? "–" : `${found.gap} of ${tolerance}`);
       bar.style.setProperty(
         "--share",
         (tolerance === 0 ? Number(size > 0) : Math.min(1, size / tolerance)).toFixed(2),

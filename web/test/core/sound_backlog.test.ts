@@ -1,5 +1,11 @@
 import { describe, expect, it } from "vitest";
-import { createSoundBacklog, rtpGap, skipTarget } from "../../src/core/sound_backlog";
+import {
+  createArrivals,
+  createSoundBacklog,
+  noteArrival,
+  rtpGap,
+  skipTarget,
+} from "../../src/core/sound_backlog";
 
 const RATE = 48_000;
 const MS = RATE / 1000;
@@ -40,5 +46,19 @@ describe("the sound backlog", () => {
     skipTarget(backlog, 500 * MS, playing, RATE, 0);
     expect(skipTarget(backlog, 500 * MS, playing, RATE, 300)).toBe((500 + 1000 - 40) * MS);
     expect(rtpGap(0, 2 ** 32 - 1)).toBe(1);
+  });
+
+  it("leaves nothing more out for sound that was dropped as too old before the decoder", () => {
+    const backlog = createSoundBacklog();
+    const arrivals = createArrivals();
+    const skips: (number | null)[] = [];
+    for (let now = 0; now < 3000; now += 20) {
+      const tooOld = now > 1000 && now < 2000;
+      noteArrival(arrivals, (now + 40) * MS, tooOld);
+      const playing = tooOld ? 1000 : now;
+      skips.push(skipTarget(backlog, arrivals.queued ?? 0, playing * MS, RATE, now));
+    }
+    expect(arrivals.dropped).toBe(49);
+    expect(skips.every((skip) => skip === null)).toBe(true);
   });
 });

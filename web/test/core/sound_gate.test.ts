@@ -20,9 +20,10 @@ function observeSound(
   context: GateContext,
   audible: boolean,
   now: number,
+  waiting = 0,
 ): boolean {
   const mark: FrameMark | undefined = stamp === undefined ? undefined : { stamp, capturedMs: 10_000 - rtp };
-  return observe(of, rtp, mark, context, audible, now);
+  return observe(of, rtp, mark, context, audible, now, waiting);
 }
 
 describe("the sound gate", () => {
@@ -79,5 +80,28 @@ describe("the sound gate", () => {
     expect(observeSound(gate, 300, 1, contextOf(100, "age"), true, 0)).toBe(true);
     expect(observeSound(gate, 960, 100, contextOf(100, "age"), true, 0)).toBe(false);
     expect(meanGap(createSoundGate().counts)).toBeNull();
+  });
+
+  it("takes what waited while the browser opened its sound device for no lag, and does not let it be heard", () => {
+    for (let now = 0; now < 2000; now += 20)
+      expect(observeSound(gate, now, 1, contextOf(17), true, now, 900)).toBe(false);
+    expect(gate.starting).toBe(true);
+    expect(gate.counts).toMatchObject({ gap: null, lag: 0, received: 0, discarded: 0 });
+    expect(observeSound(gate, 2000, 16, contextOf(17), true, 2000, 900)).toBe(true);
+    expect(gate.starting).toBe(false);
+    expect(observeSound(gate, 2020, 1, contextOf(17), true, 2020, 900)).toBe(false);
+    expect(gate.counts).toMatchObject({ gap: 16, received: 2, rendered: 1, discarded: 1 });
+  });
+
+  it("counts what is too old from the first where nothing waits: that lag is the path's", () => {
+    observeSound(gate, 960, 1, contextOf(17), true, 0, 100);
+    expect(gate.starting).toBe(false);
+    expect(gate.counts).toMatchObject({ gap: 16, discarded: 1 });
+  });
+
+  it("counts what is too old when the start does not end", () => {
+    for (let now = 0; now <= 5000; now += 100) observeSound(gate, now, 1, contextOf(17), true, now, 900);
+    expect(gate.starting).toBe(false);
+    expect(gate.counts).toMatchObject({ gap: 16, discarded: 1 });
   });
 });
