@@ -13,7 +13,8 @@ and hand out what `outcomes` returns.
   covers the loss of the command and, being answered from the stored feedback, the loss of the answer too. On a clean
   path nothing is copied.
 - Losses come in a row. When all were lost on such a path, the first repeat comes early, and each repeat is a salvo of
-  `SALVO` copies, which ends with the answer: single repeats would wait out a row of lost packets one by one.
+  `SALVO` copies, which ends with the answer: single repeats would wait out a row of lost packets one by one. A repeat
+  that leaves before an answer can have come, on a path longer than the interval, is single.
 """
 
 from collections import deque
@@ -296,7 +297,7 @@ class Pilot:
             wait = self._wait(flight.sends)
             flight.repeat_at = now + wait
             flight.echo_at, flight.echoes_left = NEVER, 0
-            if now < self._lossy_until and wait >= SALVO_LEAST:
+            if now < self._lossy_until and wait >= SALVO_LEAST and self._could_be_answered(flight, now):
                 flight.echo_at, flight.echoes_left, flight.spacing = now + SALVO_SPACING, SALVO - 1, SALVO_SPACING
         while now >= flight.echo_at:
             copies += 1
@@ -310,6 +311,10 @@ class Pilot:
         values = self._values_for(want)
         again = Command(event=flight.command.event, issue=flight.issue, values=values, nonce=self._nonce)
         return [again] * copies
+
+    def _could_be_answered(self, flight: _Flight, now: float) -> bool:
+        """Else a repeat says nothing of losses, and a salvo would fill the window that SCTP has after one."""
+        return not self._pings or now - flight.first_sent_at >= min(self._pings)
 
     @property
     def _nonce(self) -> int:

@@ -68,6 +68,8 @@ class PeerStreams(Protocol):
     def loss(self) -> float | None: ...
     @property
     def queues(self) -> bool: ...
+    @property
+    def round_trip_ms(self) -> float | None: ...
 
     def report(self, report: Report, now: float) -> None: ...
     def drives(self, holds_seat: bool) -> None: ...
@@ -217,6 +219,11 @@ class Peer(ABC):
         if "control" in self._writers:
             with self.contained("message out"):
                 self._writers["control"].send_newest(text)
+
+    @property
+    def round_trip(self) -> float:
+        """Seconds, of RTCP; 0 before the first that was measured."""
+        return (self._media.round_trip_ms or 0.0) / 1000
 
     def may_be_answered_again(self) -> bool:
         """Whether a repeat of its command is answered now; if so, it counts."""

@@ -14,7 +14,7 @@ it asks for it (CLAIMANT), or somebody else's (OTHER):
 | no answer for `claim_seconds` | – | – | refused declined | – |
 | release | – | leaves | withdraws | – |
 | disconnected | – | leaves | withdraws | – |
-| heartbeat lost for `heartbeat_seconds` | – | leaves | – | – |
+| heartbeat lost for `heartbeat_seconds` and four round trips | – | leaves | – | – |
 | idle for `idle_seconds` | – | leaves | – | – |
 
 *Seated* while somebody else holds it, and *leaves*, rest the robot. Whoever leaves makes room for the claim that has
@@ -23,6 +23,10 @@ waited longest; without one the seat is free. A claim is put to whoever holds th
 Before the table is asked: a role that may not drive is refused `not_allowed`, and so is take by anyone but a
 supervisor; a grant or decline by another than the holder is refused `no_seat`; a claim too many, or soon after a
 decline, is refused.
+
+A lost packet silences a browser's data channels for a round trip or two, and once more until SCTP has told the other
+side what it gave up, so that a silence has to be longer on a longer path. The robot does not wait for it: without
+commands it rests within its `hold`.
 
 A new holder has to send a neutral command before a moving one (`may_move`): a stick that is held while the seat
 changes hands moves nothing.
@@ -39,6 +43,7 @@ __all__ = ["TABLE", "ControlSeat", "Move", "SeatInput", "SeatOutcome", "SeatRefu
 
 COUNTDOWN = 30.0  # s before the idle release that everyone is told of
 MAX_CLAIMS = 8
+ROUND_TRIPS, MOST_ROUND_TRIPS = 4, 5.0  # that a silence may last longer on a long path, and in s
 DECLINED_FOR = 5.0  # s after a decline in which the same peer cannot claim again
 
 
@@ -94,7 +99,7 @@ class SeatOutcome(NamedTuple):
 class SeatTimes(NamedTuple):
     """Seconds."""
 
-    heartbeat: float = 3.0  # of silence
+    heartbeat: float = 3.0  # of silence, and some round trips of the holder's path
     idle: float = 300.0  # without an intention to move
     claim: float = 60.0  # until a claim counts as declined
 
@@ -135,6 +140,7 @@ class ControlSeat:
         self.why = ""
         self._times = times
         self._heard_at = 0.0
+        self._round_trip = 0.0  # s, of the holder
         self._moved_at = 0.0
         self._counting = False  # everyone was told of the idle countdown
         self._proven = False  # a neutral command of the holder was executed since one was needed
@@ -190,9 +196,10 @@ class ControlSeat:
         self._declined.pop(peer, None)
         return self._step(peer, SeatInput.GONE, now)
 
-    def heard(self, peer: str, now: float) -> None:
+    def heard(self, peer: str, now: float, round_trip: float = 0.0) -> None:
+        """`round_trip`: s, of the path to `peer` as it was measured last; 0 before."""
         if self.holds(peer):
-            self._heard_at = now
+            self._heard_at, self._round_trip = now, round_trip
 
     def neutral(self, peer: str) -> None:
         self._proven = self._proven or self.holds(peer)
@@ -207,7 +214,7 @@ class ControlSeat:
 
     def expire(self, now: float) -> Iterator[SeatOutcome]:
         """What has run out, one after the other; act on each before the next."""
-        if self.holder and now - self._heard_at >= self._times.heartbeat:
+        if self.holder and now - self._heard_at >= self._patience():
             yield self._step(self.holder, SeatInput.SILENT, now)
         if self.holder and now >= self._idle_at():
             yield self._step(self.holder, SeatInput.IDLE, now)
@@ -216,6 +223,10 @@ class ControlSeat:
         if self.holder and not self._counting and now >= self._idle_at() - COUNTDOWN:
             self._counting = True
             yield SeatOutcome(changed=True)
+
+    def _patience(self) -> float:
+        """Seconds of silence after which the holder is gone."""
+        return self._times.heartbeat + min(ROUND_TRIPS * self._round_trip, MOST_ROUND_TRIPS)
 
     # the moves
 
@@ -246,6 +257,7 @@ class ControlSeat:
         rest = bool(self.holder)
         self.holder, self.why = peer, (SeatInput.REQUEST if what is SeatInput.REQUEST_IF_FREE else what).value
         self._heard_at = self._moved_at = now
+        self._round_trip = 0.0
         self._counting = self._proven = False
         self._claims.pop(peer, None)
         return SeatOutcome(rest=rest, changed=True)

@@ -84,7 +84,7 @@ class SeatKeeper:
         return sum(each is not None and each.identity.token_id == link for each in asking) >= LINK_CLAIMS
 
     def heard(self, peer: Peer) -> None:
-        self.rules.heard(peer.id, time.monotonic())
+        self.rules.heard(peer.id, time.monotonic(), peer.round_trip)
 
     def moved(self, peer: Peer) -> None:
         """A moving command of `peer` passed."""

@@ -86,6 +86,18 @@ def test_on_a_lossy_path_each_repeat_is_a_salvo_that_ends_with_the_answer() -> N
     assert command not in pilot.due(5.0)
 
 
+def test_a_repeat_that_leaves_before_an_answer_can_have_come_is_single() -> None:
+    pilot = new_pilot()
+    pilot.ping_answered(0.6)
+    pilot.loss(0.0)
+    command = flying(pilot)
+    pilot.due(4 * ECHO)
+    assert pilot.due(0.5) == [command], "the interval is half a second at most"
+    assert pilot.due(0.55) == []
+    assert pilot.due(1.0) == [command], "no answer came in a round trip"
+    assert pilot.due(1.0 + 1.5 * SALVO_SPACING) == [command]
+
+
 def test_with_a_short_interval_there_is_no_salvo() -> None:
     pilot = new_pilot()
     for event in range(2, 20):

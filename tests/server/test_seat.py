@@ -172,6 +172,24 @@ def test_who_speaks_in_time_keeps_the_seat() -> None:
     assert _expire(seat, 19 * 2.7 + 3.0).rest
 
 
+def test_on_a_long_path_silence_is_longer_by_four_round_trips_and_ends_all_the_same() -> None:
+    seat = _seat(Standing.HOLDER)
+    seat.heard("me", 1.0, 0.6)
+    assert _expire(seat, 1.0 + 5.39) == SeatOutcome()
+    assert _expire(seat, 1.0 + 5.41).rest
+    seat = _seat(Standing.HOLDER)
+    seat.heard("me", 1.0, 60.0)
+    assert _expire(seat, 1.0 + 7.9) == SeatOutcome()
+    assert _expire(seat, 1.0 + 8.1).rest
+
+
+def test_the_next_holder_is_not_given_the_path_of_the_last() -> None:
+    seat = _seat(Standing.HOLDER)
+    seat.heard("me", 1.0, 0.6)
+    seat.take("other", "supervisor", 2.0)
+    assert _expire(seat, 2.0 + 3.0).rest
+
+
 def test_the_words_of_others_do_not_keep_the_seat() -> None:
     seat = _seat(Standing.HOLDER)
     seat.heard("other", TIMES.heartbeat)

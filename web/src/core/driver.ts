@@ -58,8 +58,8 @@ export interface Intention {
  *
  * While the path loses packets every command is followed by copies until its answer: a copy covers the loss of the
  * command and, being answered from the stored feedback, the loss of the answer too. When all were lost, the first
- * repeat comes early, and each repeat is a salvo: single repeats would wait out a row of lost packets one by one. On a
- * clean path nothing is copied.
+ * repeat comes early, and each repeat is a salvo: single repeats would wait out a row of lost packets one by one. A
+ * repeat that leaves before an answer can have come is single. On a clean path nothing is copied.
  */
 export interface Driver {
   readonly gate: CommandGate;
@@ -280,9 +280,17 @@ function noteSending(driver: Driver, sends: number, now: number): void {
     if (sends === 1) {
       driver.echoesLeft = ECHOES;
       if (earlyMs >= SALVO_LEAST_MS) driver.repeatAtMs = now + Math.max(least, earlyMs);
-    } else if (waitMs >= SALVO_LEAST_MS) driver.echoesLeft = SALVO - 1;
+    } else if (waitMs >= SALVO_LEAST_MS && couldBeAnswered(driver, now)) driver.echoesLeft = SALVO - 1;
   }
   driver.echoAtMs = driver.echoesLeft === 0 ? Infinity : now + echoSpacing(driver);
+}
+
+/**
+ * On a path longer than the interval the first repeats say nothing of losses. Salvos of them would fill the window that
+ * SCTP has after a loss (RFC 9260 7.2.3: one packet), and what follows, heartbeats too, would wait behind them.
+ */
+function couldBeAnswered({ gate, pings }: Driver, now: number): boolean {
+  return pings.length === 0 || now - gate.lastSentMs >= Math.min(...pings);
 }
 
 function noteEcho(driver: Driver): void {

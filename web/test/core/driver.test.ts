@@ -6,6 +6,7 @@ import {
   driverDisarm,
   driverFeedback,
   driverLoss,
+  driverPingAnswered,
   driverRefusal,
   driverRelease,
   driverSilence,
@@ -84,6 +85,17 @@ describe("commands", () => {
     expect(driverStep(driver, MOVING, true, 207)).toHaveLength(2);
     driverFeedback(driver, feedbackOf(2), true, 208);
     expect(commands(driverStep(driver, DISARMED, true, 500))).toEqual([]);
+  });
+
+  it("are repeated one by one until a round trip has passed, and then as salvos", () => {
+    driverPingAnswered(driver, 600);
+    driverLoss(driver, 0);
+    const sent = driverStep(driver, MOVING, true, 0);
+    for (const copyMs of [20, 40, 60]) expect(driverStep(driver, MOVING, true, copyMs)).toEqual(sent);
+    expect(driverStep(driver, MOVING, true, 500)).toEqual(sent);
+    expect(driverStep(driver, MOVING, true, 550)).toEqual([]);
+    expect(driverStep(driver, MOVING, true, 1000)).toEqual(sent);
+    expect(driverStep(driver, MOVING, true, 1007)).toHaveLength(2);
   });
 
   it("do not go while nothing could execute them", () => {
