@@ -173,6 +173,7 @@ class _NoMedia:
     tier: Tier | None = None
     loss: float | None = None
     queues = False
+    round_trip_ms: float | None = None
 
     @property
     def streams(self) -> list[StreamInfo]:
