@@ -37,12 +37,13 @@ async def far_console(profile: Profile | str, robot: str) -> AsyncIterator[tuple
 @asynccontextmanager
 async def far_baseline(profile: Profile | str, robot: str) -> AsyncIterator[tuple[Namespaces, str]]:
     """The same pictures from plain aiortc, and the link of a bare page."""
-    bridge = (sys.executable, "-m", "robot_bridge", robot, "--port", "0", "--json")
-    async with Namespaces(profile) as network:
-        # Both are of one network; the link between them passes nothing of it.
-        found = await _started(network, bridge)
-        ready = await _started(network, (sys.executable, "-m", "bench.baseline_server", found["robot"], ROBOT_ADDRESS))
-        yield network, ready["console"]
+    with tempfile.TemporaryDirectory() as state:
+        bridge = (sys.executable, "-m", "robot_bridge", robot, "--port", "0", "--json", "--state-dir", state)
+        async with Namespaces(profile) as network:
+            # Both are of one network; the link between them passes nothing of it.
+            found = await _started(network, bridge)
+            server = (sys.executable, "-m", "bench.baseline_server", found["robot"], ROBOT_ADDRESS)
+            yield network, (await _started(network, server))["console"]
 
 
 async def open_far(network: Namespaces, link: str, expression: str, count: int) -> list[dict[str, Any]]:

@@ -79,8 +79,9 @@ async def running_bridge(robot: str, *, is_logged: bool = True) -> AsyncIterator
     with TemporaryDirectory(prefix="lockstep-bench-") as directory:
         log = Path(directory) / "events.jsonl"
         command = (sys.executable, "-m", "robot_bridge", robot, "--port", "0", "--event-strip", "--json")
+        state = ("--state-dir", str(Path(directory) / "bridge"))
         logging = ("--event-log", str(log)) if is_logged else ()
-        async with running_process(*command, *logging) as (process, ready):
+        async with running_process(*command, *state, *logging) as (process, ready):
             yield Bridge(robot, process, ready["robot"], log)
 
 

@@ -79,7 +79,7 @@ class Bridge:
             first_event=settings.first_event,
             start_warning=self.description.start_warning,
         )
-        self._keeper = StopKeeper(settings.state_dir)
+        self._keeper = StopKeeper(settings.state_dir, settings.older_state_dirs)
         self._resetting: tuple[LinkPeer, Reset] | None = None  # who waits for a reset to be on the disk
         self._lockout = None if settings.lockout_file is None else LockoutFile(settings.lockout_file)
         self._signal = StartSignal(self.description)

@@ -35,6 +35,7 @@ from robot_bridge.robots.base import Robot
 from robot_bridge.robots.registry import create_robot, robot_names
 from robot_bridge.service_manager import ServiceManager
 from robot_bridge.settings import BridgeSettings
+from robot_bridge.state_place import default_place, older_places
 
 __all__ = ["main", "robot_app", "run"]
 
@@ -61,8 +62,8 @@ def run(
     state_dir: Annotated[
         Path | None,
         typer.Option(
-            help="Directory of this bridge alone that keeps a latched STOP over restarts; by default one below "
-            "~/.local/state/lockstep/bridges for each robot and port. With --port 0 there is none by default.",
+            help="Directory of this robot alone that keeps a latched STOP over restarts; by default one of the robot's "
+            "name below ~/.local/state/lockstep/stops. Two robots of the same name need one each.",
         ),
     ] = None,
     lockout_file: Annotated[
@@ -98,20 +99,24 @@ def run(
 ) -> None:
     """Run a robot and its bridge until interrupted."""
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    file = ros2 or mjcf
+    known_as = (name,) if file is None else (file.stem, name)
+    place = state_dir or default_place(known_as[0])
     try:
         settings = BridgeSettings(
             host=host,
             port=port,
             event_log=event_log,
             lockout_file=lockout_file,
-            state_dir=state_dir or _default_state_dir(ros2, mjcf, name, port),
+            state_dir=place,
+            older_state_dirs=older_places(place, known_as),
             secret=_secret(link_secret_file),
             tls=_tls(link_tls_cert, link_tls_key, link_tls_ca),
             insecure=insecure_link,
             operator_grace=operator_grace,
             event_strip=event_strip,
         )
-        _warn_of_state(settings.state_dir)
+        _warn_of_state(place)
         check_link(settings)  # before the robot is made, which can take long
         label, make = _choice(name, ros2, mjcf)
         uvloop.run(_serve(label, make, settings, as_json))
@@ -123,24 +128,10 @@ def run(
         raise typer.Exit(EXIT_FAILED) from error
 
 
-def _default_state_dir(ros2: Path | None, mjcf: Path | None, name: str, port: int) -> Path | None:
-    """By the XDG base directory specification. A bridge on any free port is another one each time: it has none."""
-    if port == 0:
-        return None
-    base = os.environ.get("XDG_STATE_HOME", "")
-    file = ros2 or mjcf
-    own = f"{name if file is None else file.stem}-{port}"
-    return (Path(base) if os.path.isabs(base) else Path("~/.local/state").expanduser()) / "lockstep" / "bridges" / own
-
-
-def _warn_of_state(directory: Path | None) -> None:
+def _warn_of_state(directory: Path) -> None:
     """Where a latched stop does not last."""
-    if directory is None:
-        _logger.warning(
-            "a latched STOP is kept in memory only, and lost when this bridge ends: with --port 0 this may be any of "
-            "several bridges, so it has no state directory by default; give it one with --state-dir"
-        )
-    elif is_in_memory(directory if directory.exists() else directory.parent):
+    there = next(each for each in (directory, *directory.parents) if each.exists())
+    if is_in_memory(there):
         _logger.warning("a latched STOP is lost when this machine is switched off: %s is in memory", directory)
 
 

@@ -16,6 +16,7 @@ class BridgeSettings:
     port: int = 5600  # 0: any free one
     event_log: Path | None = None  # JSON lines of all that happened to events; None writes nothing
     state_dir: Path | None = None  # keeps the latched stop over restarts; None: in memory only, and feedback says so
+    older_state_dirs: tuple[Path, ...] = ()  # what is in these holds where `state_dir` is new
     lockout_file: Path | None = None  # while it exists, nobody drives; None: there is none
     first_event: int = FIRST_EVENT  # tests start near the wrap
     max_links: int = 32  # admitted ones

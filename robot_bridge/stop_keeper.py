@@ -6,7 +6,7 @@ answer says so.
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
@@ -45,8 +45,9 @@ class _Waiting(NamedTuple):
 class StopKeeper:
     """`open` before the first message, `changed` after whatever may have changed the latch, `close` at the end."""
 
-    def __init__(self, directory: Path | None) -> None:
-        self._store = None if directory is None else StopStore(directory)
+    def __init__(self, directory: Path | None, older: Sequence[Path] = ()) -> None:
+        """`older`: directories whose latch holds where `directory` is new."""
+        self._store = None if directory is None else StopStore(directory, older)
         self._latch = StopLatch()
         self._written: Written = lambda version, error: None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="stop-disk")

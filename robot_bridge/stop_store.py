@@ -9,6 +9,7 @@ docs/robot-link.md, "On the robot's disk", says what follows from them.
 import fcntl
 import os
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -56,6 +57,7 @@ class Found(NamedTuple):
     trouble: str = ""  # why it is unreadable, in words; "" when it is missing
     reserved: int = 0  # 0: unknown
     note: str = ""  # what the bridge before said of its end; "" when it said nothing
+    older: "tuple[Found, ...]" = ()  # what is in the directories that a new one takes the place of
 
 
 class Start(NamedTuple):
@@ -78,6 +80,8 @@ def start_of(found: Found, wall_microseconds: int) -> Start:
     directory that was deleted, restored from a backup, or damaged, and a bridge that did not end in order.
     """
     clock = max(0, min(wall_microseconds, LATEST_CLOCK))
+    if not found.used and found.older:
+        return _start_of_all([start_of(each, wall_microseconds) for each in found.older])
     if found.kept is None:
         if not found.used:
             return Start(StopRecord(), clock, "")
@@ -92,6 +96,13 @@ def start_of(found: Found, wall_microseconds: int) -> Start:
     return Start(record, numbers_after, reason)
 
 
+def _start_of_all(starts: Sequence[Start]) -> Start:
+    """Stopped when one of them is."""
+    held = [start for start in starts if start.record.stopped or start.stop_reason]
+    newest = max(held or starts, key=lambda start: start.record.number)
+    return newest._replace(numbers_after=max(max(each.numbers_after, each.record.number) for each in starts))
+
+
 class StopStore:
     """Owns a state directory; no other bridge may use it meanwhile.
 
@@ -100,25 +111,34 @@ class StopStore:
         StateDirUnusable: it cannot be made, read or written.
     """
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, older: Sequence[Path] = ()) -> None:
+        """`older`: directories that a new one takes the place of; they are read, and stay as they are."""
         self._directory = directory
+        self._older = older
         self._lock = -1  # descriptor of `numbers.json`
 
     def open(self) -> Found:
-        """Take the directory and read it."""
+        """Take the directory and read it, and the older ones where it is new."""
         try:
+            older = () if self._is_used() else tuple(map(_look_into, self._older))
             self._directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-            used = (self._directory / NUMBERS_FILE).exists() or (self._directory / STOP_FILE).exists()
+            used = self._is_used()
             self._lock = os.open(self._directory / NUMBERS_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             self.close()
-            raise StateDirInUse(f"{self._directory}: another bridge keeps its stop here") from error
+            raise StateDirInUse(
+                f"{self._directory}: another bridge keeps its stop here. A robot has one bridge at a time; of two "
+                "robots of the same name one needs a directory of its own, --state-dir DIR"
+            ) from error
         except OSError as error:
             self.close()
             raise StateDirUnusable(f"{self._directory}: {error.strerror or error}") from error
         kept, trouble = self._read()
-        return Found(used, kept, trouble, self._read_reserved(), self._read_note())
+        return Found(used, kept, trouble, self._read_reserved(), self._read_note(), older)
+
+    def _is_used(self) -> bool:
+        return (self._directory / NUMBERS_FILE).exists() or (self._directory / STOP_FILE).exists()
 
     def write(self, kept: Kept) -> None:
         """Replace the latch in one step; when this returns it has reached the disk.
@@ -202,6 +222,15 @@ class StopStore:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+
+def _look_into(directory: Path) -> Found:
+    """What is in an older directory, which no bridge may use meanwhile."""
+    store = StopStore(directory)
+    try:
+        return store.open()
+    finally:
+        store.close()
 
 
 def write_all(descriptor: int, data: bytes) -> None:

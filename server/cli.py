@@ -179,6 +179,7 @@ def up(
         state_dir=state_dir,
         **network,
     )
+    file = ros2 or mjcf
     options = [] if ros2 is None else ["--ros2", str(ros2)]
     options += [] if mjcf is None else ["--mjcf", str(mjcf)]
     options += ["--event-strip"] if event_strip else []
@@ -192,7 +193,8 @@ def up(
     if unknown:
         raise _usage(f"no robot {unknown[0]!r}; there are {', '.join(robot_names())}")
     for number, (name, kind) in enumerate(kinds.items()):
-        own = ["--state-dir", str(own_state_dir(settings.state_dir or default_state_dir(), name, kind, settings.port))]
+        called = name or (kind if file is None else file.stem)
+        own = ["--state-dir", str(own_state_dir(settings.state_dir or default_state_dir(), called))]
         own += [] if event_log is None else ["--event-log", str(own_event_log(event_log, name))]
         port_of_bridge = robot_port + number if robot_port else 0
         bridges[name] = BridgeProcess(

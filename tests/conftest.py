@@ -3,7 +3,6 @@
 What takes long runs first, files that need a browser between those that do not: these compute while the others wait.
 """
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,10 +49,7 @@ def _places(items: list[pytest.Item]) -> dict[Path, float]:
 
 @pytest.fixture(autouse=True, scope="session")
 def own_state_directory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    before = os.environ.get("LOCKSTEP_STATE_DIR")
-    os.environ["LOCKSTEP_STATE_DIR"] = str(tmp_path_factory.mktemp("state"))
-    yield
-    if before is None:
-        del os.environ["LOCKSTEP_STATE_DIR"]
-    else:
-        os.environ["LOCKSTEP_STATE_DIR"] = before
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LOCKSTEP_STATE_DIR", str(tmp_path_factory.mktemp("state")))
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state-home")))  # of bridges
+        yield

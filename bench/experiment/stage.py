@@ -45,7 +45,8 @@ async def running_stage(
             "LOCKSTEP_SCENE": "false",
         }
         robot_command = (lockstep, "robot", robot, "--port", "0", "--event-log", str(log), "--event-strip", "--json")
-        async with running_process(*robot_command) as (bridge, ready):
+        state = ("--state-dir", str(Path(directory) / "bridge"))
+        async with running_process(*robot_command, *state) as (bridge, ready):
             host, _, port = ready["robot"].removeprefix("tcp://").rpartition(":")
             async with NetworkProcess(profile, robot=(host, int(port)) if robot_link else None, seed=seed) as network:
                 address = network.robot_address or ready["robot"]

@@ -41,9 +41,12 @@ def _free(kind: str, numbers: Counter[str], taken: set[str]) -> str:
             return name
 
 
-def own_state_dir(state_dir: Path, robot: str, kind: str, port: int) -> Path:
-    """Where the bridge of a simulated robot keeps its stop. `port`: of the console, so that two have one each."""
-    return state_dir / "bridges" / f"{robot or kind}-{port}"
+def own_state_dir(state_dir: Path, robot: str) -> Path:
+    """Where a robot's bridge keeps its stop: with the robot, whatever port the console has.
+
+    `robot`: its name, or what it is called that has none: its kind, or the file that describes it.
+    """
+    return state_dir / "stops" / robot
 
 
 def own_event_log(path: Path, robot: str) -> Path:

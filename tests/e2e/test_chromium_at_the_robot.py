@@ -37,7 +37,8 @@ async def console_with_a_switch(directory: Path) -> AsyncIterator[tuple[Stack, P
     """`lockstep robot --lockout-file` and `lockstep serve`, as on two machines; and the switch."""
     switch, log = directory / "locked", directory / "events.jsonl"
     lockstep = str(Path(sys.executable).with_name("lockstep"))
-    options = ("--port", "0", "--json", "--lockout-file", str(switch), "--event-log", str(log))
+    state = ("--state-dir", str(directory / "bridge"))
+    options = ("--port", "0", "--json", "--lockout-file", str(switch), "--event-log", str(log), *state)
     async with (
         running_process(lockstep, "robot", "planar", *options) as (_, ready),
         running_console(directory, ready["robot"], log) as stack,

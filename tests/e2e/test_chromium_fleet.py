@@ -99,7 +99,7 @@ async def test_every_robot_has_a_live_tile_behind_its_gate_that_leads_to_its_pag
 async def test_stop_all_says_which_robot_is_stopped_and_has_not_saved_that(
     fleet: Stack, chromium: Browser, tmp_path: Path
 ) -> None:
-    (place,) = tmp_path.glob("**/bridges/left-*")  # noqa: ASYNC240
+    (place,) = tmp_path.glob("**/stops/left")  # noqa: ASYNC240
     (place / "stop.new").mkdir()  # where the bridge writes its stop
     async with open_page(chromium, fleet.observer) as page:
         await until(page, "s.robots.length === 3 && s.robots.every((x) => x.state === 'free')")

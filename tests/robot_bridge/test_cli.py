@@ -3,6 +3,8 @@ import json
 import os
 import signal
 import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,10 @@ from robot_bridge.link_client import RobotLink
 from robot_bridge.link_tls import LinkTls
 from robot_bridge.protocol.errors import LinkRefused
 from robot_bridge.protocol.link_secret import LinkSecret
+from robot_bridge.protocol.messages import Feedback, Stop, StopTaken
 from robot_bridge.robots.base import Robot
+from robot_bridge.stop_latch import StopRecord
+from robot_bridge.stop_store import Kept, StopStore
 from tests.support.certificates import Authority
 
 
@@ -43,8 +48,6 @@ async def test_it_prints_its_address_once_ready_and_leaves_cleanly(how: signal.S
     assert process.returncode == 0, err.decode()
     assert out == b""
     assert b"Traceback" not in err
-    assert b"a latched STOP is kept in memory only" in err, "said plainly, and why"
-    assert b"--state-dir" in err
     assert json.loads(log.read_text().splitlines()[0])["kind"] == "start"
 
 
@@ -63,6 +66,67 @@ async def test_what_is_printed_after_the_address_holds_up_nothing_when_nobody_re
     finally:
         process.terminate()
         await process.wait()
+
+
+@asynccontextmanager
+async def planar_bridge(*options: str) -> AsyncIterator[tuple[str, int]]:
+    """`lockstep robot planar` on any free port, and its address."""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "robot_bridge", "planar", "--port", "0", "--json", *options),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    try:
+        assert process.stdout is not None
+        async with asyncio.timeout(20):
+            line = json.loads(await process.stdout.readline())
+        yield "127.0.0.1", int(line["robot"].rpartition(":")[2])
+    finally:
+        process.terminate()
+        await process.wait()
+
+
+async def test_the_same_robot_on_any_free_port_has_the_same_latch(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    async with planar_bridge() as address, RobotLink(*address, "operator") as link:
+        link.send(Stop(press="ab" * 16, reason="smoke"))
+        while not isinstance(taken := await anext(link), StopTaken):
+            pass
+        assert taken.kept, "on the disk, although nothing named a directory"
+    async with planar_bridge() as address, RobotLink(*address, "operator") as link:
+        while not isinstance(feedback := await anext(link), Feedback):
+            pass
+        assert (feedback.stop.stopped, feedback.stop.number, feedback.stop.reason) == (True, taken.number, "smoke")
+
+
+async def test_a_second_bridge_of_the_same_robot_is_refused_and_told_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    async with planar_bridge():
+        command = (sys.executable, "-m", "robot_bridge", "planar", "--port", "0")
+        second = await asyncio.create_subprocess_exec(*command, stderr=asyncio.subprocess.PIPE)
+        async with asyncio.timeout(20):
+            _, said = await second.communicate()
+        assert second.returncode == 1
+        assert b"planar: another bridge keeps its stop here" in said
+        assert b"--state-dir DIR" in said
+        async with planar_bridge("--state-dir", str(tmp_path / "second")):
+            pass
+
+
+async def test_a_stop_that_was_kept_by_port_before_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    older = StopStore(tmp_path / "lockstep" / "bridges" / "planar-5600")
+    older.open()
+    older.write(Kept(latch=StopRecord(stopped=True, reason="smoke", number=41), ended=True))
+    older.close()
+    async with planar_bridge() as address, RobotLink(*address, "operator") as link:
+        while not isinstance(feedback := await anext(link), Feedback):
+            pass
+        assert (feedback.stop.stopped, feedback.stop.number, feedback.stop.reason) == (True, 41, "smoke")
 
 
 @pytest.mark.parametrize("state", [[], ["--state-dir", "DIR"]])

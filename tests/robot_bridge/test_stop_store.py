@@ -13,8 +13,8 @@ STOPPED = StopRecord(stopped=True, by="Ada", reason="smoke", number=41, press="a
 WALL = 1_000  # a clock that was set back: numbers on the disk are above it
 
 
-def found(directory: Path) -> Found:
-    store = StopStore(directory)
+def found(directory: Path, *older: Path) -> Found:
+    store = StopStore(directory, older)
     try:
         return store.open()
     finally:
@@ -183,3 +183,47 @@ def test_a_full_disk_leaves_the_older_reserve(tmp_path: Path, monkeypatch: pytes
     assert found(tmp_path).reserved == kept > 5
     kept_in(tmp_path, STOPPED)
     assert found(tmp_path).reserved > kept, "the next one is read in its place"
+
+
+def test_a_stop_in_an_older_directory_holds_in_the_new_one_that_takes_its_place(tmp_path: Path) -> None:
+    kept_in(tmp_path / "older", STOPPED)
+    start = start_of(found(tmp_path / "new", tmp_path / "older"), WALL)
+    assert (start.record, start.stop_reason) == (STOPPED, "")
+    assert start.numbers_after >= STOPPED.number
+
+
+@pytest.mark.parametrize("others", [0, 90])
+def test_of_several_older_directories_one_that_is_stopped_is_enough(tmp_path: Path, others: int) -> None:
+    kept_in(tmp_path / "one", StopRecord(number=others))
+    kept_in(tmp_path / "two", STOPPED)
+    kept_in(tmp_path / "three", StopRecord(number=others + 1))
+    start = start_of(found(tmp_path / "new", *(tmp_path / each for each in ("one", "two", "three"))), WALL)
+    assert start.record == STOPPED
+    assert start.numbers_after > others, "no number is given twice"
+
+
+@pytest.mark.parametrize("harm", ["killed", "unreadable"])
+def test_an_older_directory_that_was_not_left_in_order_means_stopped(tmp_path: Path, harm: str) -> None:
+    kept_in(tmp_path / "older", StopRecord(number=7), ended=harm != "killed")
+    if harm == "unreadable":
+        (tmp_path / "older" / "stop.json").write_bytes(b"{")
+    assert start_of(found(tmp_path / "new", tmp_path / "older"), WALL).stop_reason
+
+
+def test_older_directories_that_are_released_stop_nothing_and_are_looked_at_once(tmp_path: Path) -> None:
+    kept_in(tmp_path / "older", StopRecord(number=7))
+    start = start_of(found(tmp_path / "new", tmp_path / "older"), WALL)
+    assert (start.record.number, start.stop_reason) == (7, "")
+    kept_in(tmp_path / "new", StopRecord(number=8))
+    kept_in(tmp_path / "older", STOPPED)
+    start = start_of(found(tmp_path / "new", tmp_path / "older"), WALL)
+    assert (start.record.number, start.record.stopped, start.stop_reason) == (8, False, "")
+
+
+def test_an_older_directory_that_a_bridge_uses_is_not_taken_over_and_nothing_is_made(tmp_path: Path) -> None:
+    running = StopStore(tmp_path / "older")
+    running.open()
+    with pytest.raises(StateDirInUse, match="older: another bridge keeps its stop here"):
+        found(tmp_path / "new", tmp_path / "older")
+    running.close()
+    assert not (tmp_path / "new").exists(), "the next bridge looks again"

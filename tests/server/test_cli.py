@@ -199,6 +199,29 @@ def test_robots_that_cannot_be_meant_are_refused_by_name(arguments: tuple[str, .
     assert (asked.exit_code, name in asked.stderr) == (2, True)
 
 
+@pytest.mark.parametrize(
+    ("robots", "places"),
+    [
+        ((), ["mobile-manipulator"]),
+        (("--robot", "planar"), ["planar"]),
+        (("--robot", "planar", "--robot", "left=planar"), ["planar", "left"]),
+        (("--ros2", "robots/crane.yaml"), ["crane"]),
+        (("--mjcf", "arm.xml"), ["arm"]),
+    ],
+)
+def test_each_robot_of_up_has_its_latch_by_its_name_whatever_the_port(
+    robots: tuple[str, ...], places: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[list[str]] = []
+    monkeypatch.setattr("server.cli.BridgeProcess", lambda kind, host, port, options, *more: given.append(options))
+    monkeypatch.setattr("server.cli._run", lambda *more: None)
+    for port in ("8000", "9000"):
+        asked = CliRunner().invoke(app, ["up", *robots, "--port", port, "--state-dir", str(tmp_path)])
+        assert asked.exit_code == 0, asked.output
+    found = [options[options.index("--state-dir") + 1] for options in given]
+    assert found == [str(tmp_path / "stops" / each) for each in places] * 2
+
+
 @pytest.mark.parametrize("robots", [["tractor"], ["left=planar", "right=tractor"]])
 def test_up_names_the_robots_there_are_when_one_is_unknown(robots: list[str]) -> None:
     asked = CliRunner().invoke(app, ["up", *(word for robot in robots for word in ("--robot", robot))])

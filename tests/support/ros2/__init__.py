@@ -123,7 +123,8 @@ async def running_ros_bridge(directory: Path, robot: RosRobot, settings: Path) -
     """In the environment of the robot's ROS installation, which has nothing of the console's."""
     event_log = directory / "bridge.jsonl"
     command = (ros_python(), "-m", "robot_bridge", "--ros2", str(settings), "--port", "0", "--json")
-    async with running_process(*command, "--event-log", str(event_log), environment=robot.environment) as (
+    state = ("--state-dir", str(directory / "bridge-state"))
+    async with running_process(*command, *state, "--event-log", str(event_log), environment=robot.environment) as (
         process,
         ready,
     ):
