@@ -172,6 +172,8 @@ class EventCore:
         if moving and (reason := self._interlock.refuses(now)) is not None:
             return self._refuse(command, reason)
         self._interlock.executed(moving=moving, spell=issued.spell, now=now)
+        if not self._interlock.needed:
+            self._latch.may_move()
         self._pending = command.event
         self._rested = None  # every event it could void is now behind; a stale mark must not survive the wrap
         return Executed(command.event, command.values)

@@ -1,9 +1,9 @@
 """The latched stop: its numbers, the presses behind them, and which reset releases it. No I/O, no clock.
 
-Call `stop`, `reset`, `lock_out` and `let_in` in any order, and `shown` with every stop state that was fed back, twice a
-second at least. Where the latch is kept on a disk, whatever changes it raises `version`: write `record` away from the
-loop, and call `written` with the version that was written, or could not be. Without a disk a reset takes effect at once
-and nothing is kept.
+Call `stop`, `reset`, `lock_out` and `let_in` in any order, `may_move` when the robot may move again, and `shown` with
+every stop state that was fed back, twice a second at least. Where the latch is kept on a disk, whatever changes it
+raises `version`: write `record` away from the loop, and call `written` with the version that was written, or could not
+be. Without a disk a reset takes effect at once and nothing is kept.
 Rules and reasons: docs/robot-link.md, "Stop and reset".
 """
 
@@ -32,7 +32,7 @@ __all__ = [
 
 LEAST_STOP = 1.0  # s between the newest stop and the first reset that may release it
 HELD_UP = 1.5  # s without a feedback: a reset that comes then may have waited for as long as the bridge was held up
-MAX_PRESSES = 256  # remembered; a repeat of a forgotten one counts as a new stop, which is the safe side
+MAX_PRESSES = 256  # remembered until the robot may move; a forgotten one counts as a new stop, which is the safe side
 MAX_NUMBER = 2**53 - 1
 TEXT = 500  # characters of `by` and `reason`, as on the link
 OVERTAKEN = "a newer stop came"
@@ -145,7 +145,7 @@ class StopLatch:
         )
 
     def stop(self, press: str, by: str, reason: str, now: float) -> StopGiven:
-        """Anybody's. A press that is known, reset or not, is no new stop; "" is never known."""
+        """Anybody's. A press that is known is no new stop, also when it was reset; "" is never known."""
         if press and press in self._presses:
             return StopGiven(self._presses[press], is_new=False, latched=False)
         number = self._next_number()
@@ -163,6 +163,14 @@ class StopLatch:
         )
         self.version += 1
         return StopGiven(number, is_new=True, latched=latched, overtaken=overtaken)
+
+    def may_move(self) -> None:
+        """The robot may move from now on: whatever press comes now is a new stop, be its id a known one or not.
+
+        So no choice of an id keeps a stop from stopping. What is on the disk may still have them: a bridge that starts
+        does not move before this is called again.
+        """
+        self._presses.clear()
 
     def shown(self, state: StopState, now: float) -> None:
         """A feedback says this now."""

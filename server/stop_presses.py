@@ -157,6 +157,10 @@ class StopPresses:
         """The bridge's answer; None: there was none, or it was long ago."""
         return self._taken.get(press)
 
+    def forget(self, press: str) -> None:
+        """What became of it: its id stands for a new press from now on, unless it is pending."""
+        self._taken.pop(press, None)
+
     def press(self, press: Press, *, hold: bool = False) -> PressOutcome:
         """Somebody pressed, or what somebody pressed came once more. `hold`: its link presses too fast."""
         known = self._taken.get(press.id)

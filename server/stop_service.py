@@ -182,6 +182,8 @@ class StopService:
         if by.link and self._silenced.holds(by.link, time.monotonic()):
             self._audit.refused(by, "silenced")
             raise Silenced(SILENCED)
+        if (taken := self._presses.outcome(press.id)) is not None and self._is_released(taken):
+            self._presses.forget(press.id)  # the robot may move: it says whether this is a repeat or a new stop
         rate = self._link_repeats if self._presses.knows(press.id) else self._link_presses
         too_fast = bool(by.link) and not rate.spend(by.link, time.monotonic())
         outcome = self._presses.press(press, hold=too_fast)
@@ -249,12 +251,15 @@ class StopService:
         except TimeoutError:
             taken = None
         if taken is not None:
-            held = self._clock.stop
-            return StopOutcome(press, taken, released=not held.stopped and held.number >= taken.number)
+            return StopOutcome(press, taken, released=self._is_released(taken))
         self._keeper.keep(*(each for each in self._presses.pending if each.id == press))
         kept = await self._keeper.kept_words(press)
         why = "the robot has not confirmed it" if self._robot.up else "the robot cannot be told now"
         return StopOutcome(press, self._presses.outcome(press), f"{why}; {kept}")
+
+    def _is_released(self, taken: StopTaken) -> bool:
+        held = self._clock.stop
+        return not held.stopped and held.number >= taken.number
 
     def _robot_may_answer(self, press: str) -> bool:
         return self._robot.up or press not in self._late
@@ -319,8 +324,9 @@ class StopService:
             self._deadlines.pop(press.id, None)
             late = press.id in self._late
             self._late.discard(press.id)
-            on_disk = "" if answer.kept else ", not on the robot's disk"
-            self._record(press, f"{press.where}{', sent again' if late else ''}, stop {answer.number}{on_disk}")
+            more = "" if answer.kept else ", not on the robot's disk"
+            more += ", reset before" if self._is_released(answer) else ""
+            self._record(press, f"{press.where}{', sent again' if late else ''}, stop {answer.number}{more}")
             self._tap.stop_taken(press.by, answer)
             self._answer(press.id, answer)
         self._spread()

@@ -22,7 +22,7 @@ from server.services import Services
 from server.settings import Settings
 from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
-from server.stop_presses import AlreadyTaken, NewPress, Press
+from server.stop_presses import NewPress, Press
 from server.stop_service import SILENCED, StopAnswer, StopOutcome
 
 __all__ = ["FleetSession"]
@@ -89,10 +89,9 @@ class FleetSession:
             raise TypeError("the fleet is not running")
         if press.by.link and self._house.is_silenced(press.by.link):
             raise Silenced(SILENCED)
+        stops.presses.forget(press.id)  # nobody knows here whether what it became still holds: the robot says it
         pressed = stops.presses.press(press)
         log.warning("stop kept", by=press.by.name, where=press.where, reason=press.reason, robot=self.name)
-        if isinstance(pressed, AlreadyTaken):
-            return StopAnswer(StopOutcome(press.id, pressed.taken), 0, up=False)
         if isinstance(pressed, NewPress) and pressed.replaced is not None:
             stops.settled(pressed.replaced.id)
         stops.keep(press)

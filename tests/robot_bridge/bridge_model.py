@@ -212,6 +212,8 @@ class BridgeModel:
             assert command.nonce in self.issued, "executed without having seen what it answers"
             self.witness.executed(moving=moving, answers=self.issued[command.nonce])
             self.driven = moving
+            if self.witness.neutral:
+                self.acknowledged.clear()  # it may move: a press of any id is a new stop
         elif isinstance(outcome, Answered):
             return [outcome.feedback]
         elif isinstance(outcome, Refused):
@@ -224,6 +226,7 @@ class BridgeModel:
             self._note_stop(given.number)
         if stop.press:
             assert self.acknowledged.setdefault(stop.press, given.number) == given.number or not self._keeps
+        assert not self.driven, "a press had no effect on a robot that moves"
         out: list[LinkMessage] = []
         if given.overtaken:
             refused = ResetRefused(given.overtaken, "stale_reset", "a newer stop came")

@@ -244,6 +244,18 @@ def test_a_repeat_of_a_press_changes_nothing() -> None:
     assert not core.issue_due(100.1)
 
 
+def test_a_press_that_was_reset_is_a_repeat_until_the_robot_may_move_and_then_a_new_stop() -> None:
+    core = core_at()
+    core.stop("ab12", "Ada", "", 100.0)
+    core.issue(MEASURED, 100.0)
+    core.reset(1, 101.0)
+    core.issue(MEASURED, 101.0)
+    assert core.stop("ab12", "Ada", "", 101.0) == StopGiven(1, is_new=False, latched=False)
+    core.command(command(2, issue=3, values=NEUTRAL), 101.0)
+    assert core.stop("ab12", "Eve", "", 101.1) == StopGiven(2, is_new=True, latched=True)
+    assert core.stop("ab12", "Eve", "", 101.2) == StopGiven(2, is_new=False, latched=False)
+
+
 def test_an_event_that_was_pending_at_the_stop_still_gets_its_feedback() -> None:
     core = core_at()
     core.command(command(2), 100.0)

@@ -66,12 +66,13 @@ async def test_a_latched_stop_outlives_the_bridge_with_its_reason_number_and_pre
         driver.link.send(Stop(press=PRESS))
         assert (await driver.next(StopTaken)).number == taken.number, "a repeat is no new stop after a restart either"
         await driver.reset()
-    async with bridge_in(tmp_path) as bridge, operator(bridge) as driver:
+    async with bridge_in(tmp_path) as bridge, operator(bridge, armed=False) as driver:
         assert not driver.feedback.stop.stopped
         driver.link.send(Stop(press=PRESS))
-        assert (await driver.next(StopTaken)).number == taken.number
+        assert (await driver.next(StopTaken)).number == taken.number, "a late copy does not undo the reset"
         assert not driver.feedback.stop.stopped
-        driver.link.send(Stop())
+        await driver.arm()
+        driver.link.send(Stop(press=PRESS))
         assert (await driver.next(StopTaken)).number > taken.number
 
 

@@ -465,6 +465,11 @@ class World:
         self.console.press(person, self.presses[-1], http=http)
         self.loop.turn()
 
+    def press_as(self, person: str, id_: str, *, http: bool = False) -> None:
+        """With an id that somebody has used before."""
+        self.console.press(person, id_, http=http)
+        self.loop.turn()
+
     def reset(self, person: str, offset: int = 0, *, http: bool = False) -> None:
         self.console.reset(person, max(0, self.console.clock.stop.number + offset), http=http)
         self.loop.turn()

@@ -178,6 +178,22 @@ class StopLife(RuleBasedStateMachine):
     def press(self, person: str, again: bool, http: bool) -> None:
         self.world.press(person, again=again, http=http)
 
+    @rule(person=people, which=st.integers(0, 5), http=st.booleans(), drives=mostly)
+    def somebody_stops_it_with_an_id_that_was_used_before(
+        self, person: str, which: int, http: bool, drives: bool
+    ) -> None:
+        world = self.world
+        if not world.presses or world.console.people.all[person].silenced:
+            return
+        if drives:
+            world.arm_and_drive()
+        for link in LINKS:
+            world.connect(link)
+        world.press_as(person, world.presses[-1 - min(which, len(world.presses) - 1)], http=http)
+        world.wait(0.2)  # one that comes too fast is held for so long
+        world.pump()
+        assert not world.bridge.driven, "a press had no effect on a robot that moves"
+
     @rule(person=people, offset=st.sampled_from([0, 0, -1, 1]), http=st.booleans())
     def reset(self, person: str, offset: int, http: bool) -> None:
         self.world.reset(person, offset, http=http)
@@ -321,6 +337,26 @@ def test_a_robot_that_is_driven_stopped_reset_and_armed_as_it_should_be_moves(wo
         (True, False),
     ]
     assert len(world.promises.delivered) == 1
+
+
+@pytest.mark.parametrize("http", [False, True])
+@pytest.mark.parametrize("restarts", [False, True])
+def test_no_choice_of_a_press_id_keeps_a_stop_from_stopping_a_robot_that_moves(
+    world: World, http: bool, restarts: bool
+) -> None:
+    for number, person in enumerate(("olga", "olga", "bob", "sue"), 1):
+        world.press_as(person, "ab" * 16, http=http)
+        world.pump()
+        assert world.bridge.witness.holds
+        assert len(world.bridge.witness.given) == number
+        world.let_a_second_pass_and_reset()
+        world.press_as(person, "ab" * 16, http=http)
+        world.pump()
+        assert not world.bridge.witness.holds, "a copy that comes late does not undo a reset"
+        if restarts:
+            world.restart_console(killed=True)
+        world.arm_and_drive()
+        assert world.bridge.driven
 
 
 def test_after_a_lost_link_a_restart_and_a_reset_an_eager_holder_moves_nothing_without_a_neutral_command(

@@ -217,6 +217,23 @@ async def test_a_repeat_sends_nothing_and_has_the_outcome_of_its_first_also_when
     assert len(bench.heard("olga", StopTaken)) == 2
 
 
+async def test_a_press_whose_stop_was_reset_goes_to_the_robot_which_says_whether_it_is_a_new_one(bench: Bench) -> None:
+    bench.press("olga", "p")
+    bench.take("p", 3)
+    bench.show(StopState(stopped=True, number=3, press="p"))
+    bench.press("bob", "p")
+    assert len(bench.robot.sent) == 1, "it holds: nothing is sent"
+    bench.show(StopState(number=3, press="p"))
+    for number, released in ((3, True), (4, False)):
+        bench.robot.sent = []
+        bench.press("bob", "p", "http")
+        assert [cast(Stop, each).press for each in bench.robot.sent] == ["p"]
+        bench.take("p", number)
+        outcome = await bench.service.outcome("p")
+        assert (outcome.number, outcome.released) == (number, released)
+    assert [each.what for each in bench.records("stop") if "stop 3" in each.what][-1] == "http, stop 3, reset before"
+
+
 async def test_with_no_robot_nobody_is_told_that_a_stop_was_delivered_however_many_press(bench: Bench) -> None:
     bench.lose()
     for who, press in (("ann", "a"), ("bob", "b"), ("bob", "b"), ("olga", "o")):

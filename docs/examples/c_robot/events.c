@@ -61,6 +61,7 @@ verdict events_command(events *of, uint32_t event, uint64_t issue, uint64_t nonc
     *reason = "not_neutral";
     if (moving && of->neutral_needed) return REFUSED;
     if (answered->spell == of->spell) of->neutral_needed = false;
+    if (!of->neutral_needed) of->pressed = 0; /* it may move: whatever press comes now is a new stop */
     of->pending = event;
     of->rested = 0;
     for (size_t i = 0; i < AXES; i++) of->targets[i] = fmin(fmax(values[i], -FASTEST[i]), FASTEST[i]);
