@@ -1,5 +1,6 @@
 """Parses what clients send on data channels and lines. Failures are named ChannelErrors; nothing else comes out."""
 
+import json
 from typing import Literal
 
 import msgspec
@@ -100,8 +101,26 @@ def stop_in(data: object) -> Stop | None:
     try:
         found = _any_stop.decode(data)
     except (msgspec.DecodeError, UnicodeError, RecursionError):
+        return _stop_in_text_cut_short(data)
+    return Stop(reason=stop_text(found.reason)[:MAX_REASON], press=stop_text(found.press))
+
+
+def _stop_in_text_cut_short(data: str | bytes) -> Stop | None:
+    """JSON with half of a surrogate pair in it, as of text that was cut within an emoji."""
+    try:
+        found = msgspec.convert(_whole(json.loads(data)), _AnyStop)
+    except (ValueError, RecursionError):
         return None
     return Stop(reason=stop_text(found.reason)[:MAX_REASON], press=stop_text(found.press))
+
+
+def _whole(value: object) -> object:
+    """Without halves of surrogate pairs in the texts of an object."""
+    if not isinstance(value, dict):
+        return value
+    return {
+        key: each.encode(errors="replace").decode() if isinstance(each, str) else each for key, each in value.items()
+    }
 
 
 class MessageBudget:

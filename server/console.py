@@ -30,6 +30,7 @@ from robot_bridge.protocol.messages import (
     PROTOCOL_VERSION,
     Command,
     Feedback,
+    LinkRole,
     Media,
     Ping,
     Pong,
@@ -323,6 +324,9 @@ class Console:
 
     def media_received(self, media: Media) -> None:
         self._media.feed(media, time.monotonic())
+
+    def link_failed(self, role: LinkRole, error: Exception) -> None:
+        self._metrics.faults.caught(f"robot link {role}", error)
 
     # what follows from the cores' outcomes
 

@@ -20,17 +20,22 @@ __all__ = ["LinkKeeper", "LinkSink"]
 log = structlog.get_logger(__name__)
 
 HEALTHY_AFTER = 5.0  # s up, then the next loss is retried soon again
+FAULT = "internal_error: this console failed at what the robot sent"
 
 
 class LinkSink(Protocol):
-    """Who is told. `link_closed` also follows a try that failed, with what was wrong."""
+    """Who is told. `link_closed` also follows a try that failed, with what was wrong; `link_failed` comes before it
+    where one of these raised `error`."""
 
     def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None: ...
     def link_closed(self, role: LinkRole, detail: str) -> None: ...
     def link_received(self, role: LinkRole, message: LinkMessage) -> None: ...
+    def link_failed(self, role: LinkRole, error: Exception) -> None: ...
 
 
 class LinkKeeper:
+    """What hearing the robot raises ends this link alone, and is no reason not to connect again."""
+
     def __init__(
         self,
         host: str,
@@ -80,6 +85,9 @@ class LinkKeeper:
                 await self._once()
             except LinkError as error:
                 self._sink.link_closed(self._role, error.detail)
+            except Exception as error:
+                self._sink.link_failed(self._role, error)
+                self._sink.link_closed(self._role, FAULT)
             await asyncio.sleep(self._backoff.next())
 
     async def _once(self) -> None:

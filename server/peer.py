@@ -207,7 +207,8 @@ class Peer(ABC):
         self.wanted_name = clean_name(name, clean_name(self.identity.name, self.identity.role))
 
     def send(self, channel: ChannelName, message: ServerMessage) -> None:
-        self.send_text(channel, encode_console_message(message))
+        with self.contained("message out"):
+            self.send_text(channel, encode_console_message(message))
 
     def send_text(self, channel: ChannelName, text: str) -> None:
         """Ignored while the channel is not open: a newcomer is told everything when it opens."""

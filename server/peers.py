@@ -177,7 +177,11 @@ class Peers:
     def participants(self) -> Participants:
         """Those who may drive first. In a crowd only they come with measured values: the list changes less often."""
         people = [peer for peer in self._sessions if not peer.thumbnail]
-        everyone = sorted((peer.participant() for peer in people), key=lambda each: each.role == "observer")
+        found = []
+        for peer in people:
+            with peer.contained("participant"):
+                found.append(peer.participant())
+        everyone = sorted(found, key=lambda each: each.role == "observer")
         return Participants(
             participants=[
                 each if len(everyone) <= FEW or each.role != "observer" else _without_values(each) for each in everyone

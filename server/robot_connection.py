@@ -56,6 +56,7 @@ class RobotHost(Protocol):
     def refusal_received(self, refusal: Refusal) -> None: ...
     def stop_taken(self, taken: StopTaken) -> None: ...
     def media_received(self, media: Media) -> None: ...
+    def link_failed(self, role: LinkRole, error: Exception) -> None: ...
 
 
 class RobotConnection:
@@ -137,6 +138,9 @@ class RobotConnection:
         if changed:
             log.warning("robot link down", detail=detail)
             self._host.link_down(detail)
+
+    def link_failed(self, role: LinkRole, error: Exception) -> None:
+        self._host.link_failed(role, error)
 
     def link_received(self, role: LinkRole, message: LinkMessage) -> None:
         if self._epochs.get(role) != self.epoch:

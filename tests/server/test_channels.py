@@ -136,6 +136,8 @@ def test_silence_saves_up_no_more_than_one_burst() -> None:
         ('{"type": "stop", "by": [], "reason": "dog"}', "dog", ""),
         ('{"type": "stop", "reason": "%s"}' % ("x" * 501), "x" * 500, ""),
         (b'{"type": "stop", "reason": "dog"}', "dog", ""),
+        (r'{"type": "stop", "reason": "dog \ud83d", "press": "\ude00"}', "dog ?", "?"),
+        (r'{"type": "stop", "reason": ["\ud83d"]}', r'["\ud83d"]', ""),
     ],
 )
 def test_what_says_that_it_is_a_stop_is_one_whatever_else_is_wrong_with_it(
@@ -151,6 +153,18 @@ def test_what_does_not_say_so_is_none(data: object) -> None:
     assert stop_in(data) is None
 
 
-@pytest.mark.parametrize("data", ['{"type": "reset"}', '{"type": "stop"', '"stop"', "[" * 9000, "x" * 99_999, 5])
+@pytest.mark.parametrize(
+    "data",
+    [
+        r'{"type": "reset", "by": "\ud83d"}',
+        r'["\ud83d"]',
+        '{"type": "reset"}',
+        '{"type": "stop"',
+        '"stop"',
+        "[" * 9000,
+        "x" * 99_999,
+        5,
+    ],
+)
 def test_nothing_else_becomes_a_stop(data: object) -> None:
     assert stop_in(data) is None

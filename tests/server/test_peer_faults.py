@@ -113,6 +113,10 @@ def _flushing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(cast(Any, peer)._writers["control"], "_flush", _raise)
 
 
+def _showing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(peer, "participant", _raise)
+
+
 def _closing_media(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(cast(Any, peer)._media, "close", _raise_later)
     peer.end("the test ends it")
@@ -164,7 +168,9 @@ CASES: list[tuple[str, Role, Plant]] = [
     ("rtcp", "operator", _rtcp),
     ("message in", "operator", _message_in),
     ("message out", "observer", _message_out),
+    ("message out", "operator", _message_out),
     ("message out", "operator", _flushing),
+    ("participant", "observer", _showing),
     ("close", "observer", _closing_media),
     ("close", "observer", _closing_ice),
     ("close", "observer", _closing_sctp),

@@ -1,9 +1,12 @@
 """The robot link breaks and comes back."""
 
 import asyncio
+from typing import Any, cast
+
+import pytest
 
 from robot_bridge.protocol.console import Notice, RobotState
-from robot_bridge.protocol.messages import Stop
+from robot_bridge.protocol.messages import LinkRole, Stop
 from tests.server.rig import PATIENCE, eventually, running_bridge, running_console, stop_words
 
 
@@ -79,3 +82,35 @@ async def test_a_second_console_waits_until_the_operator_link_is_free() -> None:
             answer = await second.http.post("/api/stop", headers=second.token("observer"))
             assert answer.status_code == 200, "a stop passes on the media link"
             await eventually(lambda: first.services.console.clock.stop.stopped)
+
+
+@pytest.mark.parametrize(
+    ("failing", "other", "handler"),
+    [
+        ("operator", "media", "feedback_received"),
+        ("media", "operator", "media_received"),
+    ],
+)
+async def test_a_fault_at_what_comes_by_one_link_ends_that_one_by_name_and_leaves_the_other(
+    failing: LinkRole, other: LinkRole, handler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running_bridge() as bridge, running_console(bridge.address[1]) as rig:
+        console = rig.services.console
+        keepers: Any = cast(Any, console.robot)._keepers
+        await eventually(lambda: all(keeper._link is not None for keeper in keepers.values()))
+        before = keepers[failing]._link, keepers[other]._link
+        received, heard = getattr(console, handler), asyncio.Event()
+
+        def fail_once(message: Any) -> None:
+            if keepers[failing]._link is before[0]:
+                raise ValueError("planted")
+            received(message)
+            heard.set()
+
+        monkeypatch.setattr(console, handler, fail_once)
+        async with asyncio.timeout(PATIENCE):
+            await heard.wait()
+        assert keepers[other]._link is before[1], "it lives"
+        assert rig.count("lockstep_internal_errors_total", where=f"robot link {failing}") == 1
+        assert rig.count("lockstep_robot_link_losses_total") == (failing == "operator")
+        await eventually(lambda: console.robot.up)
