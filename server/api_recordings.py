@@ -34,6 +34,7 @@ from server.recording.reader import Record, RecordingReader
 from server.recording.rights import RecordingReaderRight, check_end
 from server.recording.service import RecordingService
 from server.recording.shelf import RecordingEntry
+from server.services import known_caller
 
 __all__ = [
     "MAX_LISTED",
@@ -94,7 +95,7 @@ def _service(request: Request) -> RecordingService:
 
 
 async def _caller(request: Request) -> Right:
-    return _service(request).access.bearer(request.headers.get("authorization"))
+    return known_caller(request, _service(request).access.bearer(request.headers.get("authorization")))
 
 
 Caller = Annotated[Right, Depends(_caller)]

@@ -36,9 +36,9 @@ AuditKind = Literal[
 CHATTER: frozenset[AuditKind] = frozenset({"joined", "renamed", "left", "claim", "refusal", "note", "reading"})
 
 # What is written one by one only as often as its link's budget allows; the rest is counted together.
-# The others are either not caused by a link, limited where they are asked for, or needed one by one: who drove.
+# The others are either not caused by a link, or limited where they are asked for.
 LIMITED: frozenset[AuditKind] = frozenset(
-    {"joined", "renamed", "left", "claim", "invitation", "revocation", "recording", "reading", "publication"}
+    {"joined", "renamed", "left", "seat", "claim", "invitation", "revocation", "recording", "reading", "publication"}
 )
 BURST = 30.0  # records of one kind and link at once
 RATE = 0.1  # Hz, afterwards

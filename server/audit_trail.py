@@ -39,15 +39,21 @@ class AuditTrail:
         self._beyond = AuditMerger()  # the budget
         self._ticks = 0
         self._holder = Actor()
+        self._holder_is_noted = True  # the newest record of the seat says who has it
         self._claims: list[str] = []
         self._description = next((each.what for each in reversed([*log]) if each.kind == "epoch"), "")
 
     def record(self, kind: AuditKind, actor: Actor = NOBODY, what: str = "", detail: str = "") -> None:
         """Write down `kind`, now. Of some kinds, what is beyond the link's budget is only counted."""
+        self._record(kind, actor, what, detail)
+
+    def _record(self, kind: AuditKind, actor: Actor, what: str, detail: str) -> bool:
+        """Whether it was written down by itself."""
         if kind in LIMITED and not self._budget.take(kind, actor.link, time.monotonic()):
             self._beyond.add(kind, _link_alone(actor), what)
-        else:
-            self._write(kind, actor, what, detail)
+            return False
+        self._write(kind, actor, what, detail)
+        return True
 
     def _write(self, kind: AuditKind, actor: Actor, what: str, detail: str = "", count: int = 1) -> None:
         feedback = self._clock.feedback
@@ -86,7 +92,7 @@ class AuditTrail:
         if holder.peer != self._holder.peer:
             detail = f"was {self._holder.name} ({self._holder.peer})" if self._holder.peer else ""
             what = seat.why if holder.peer else f"{seat.why}, free"
-            self.record("seat", holder if holder.peer else self._holder, what, detail)
+            self._holder_is_noted = self._record("seat", holder if holder.peer else self._holder, what, detail)
             self._holder = holder
         if claims != self._claims:
             self.record("claim", by, detail=", ".join(f"{each.name} ({each.peer})" for each in seat.claims) or "none")
@@ -112,6 +118,7 @@ class AuditTrail:
     def flush(self, *, beyond: bool = False) -> None:
         """Write down what was merged until now; with `beyond` also what went beyond the links' budgets."""
         now = time.monotonic()
+        self._note_holder(now)
         for kind, actor, what, count in self._merger.take():
             if self._budget.take(kind, actor.link, now):
                 self._write(kind, actor, what, count=count)
@@ -121,6 +128,12 @@ class AuditTrail:
             self._budget.forget_idle(now)
             for kind, actor, what, count in self._beyond.take():
                 self._write(kind, actor, what, BEYOND, count)
+
+    def _note_holder(self, now: float) -> None:
+        """Whoever keeps a seat that went round too often to be written down each time."""
+        if not self._holder_is_noted and self._budget.take("seat", self._holder.link, now):
+            self._holder_is_noted = True
+            self._write("seat", self._holder, "has it now" if self._holder.peer else "free now")
 
 
 def _link_alone(actor: Actor) -> Actor:

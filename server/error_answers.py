@@ -8,6 +8,7 @@ from prometheus_client import Counter
 from starlette.exceptions import HTTPException
 from starlette.types import Scope
 
+from server.audit import Actor
 from server.errors import ConsoleError, TooManyRequests, http_error
 from server.house import House
 from server.problem import PROBLEM_JSON, problem_body
@@ -46,10 +47,20 @@ async def _answer_console_error(request: Request, error: Exception) -> Response:
     if not isinstance(error, ConsoleError):
         raise error
     entry = http_error(error)
+    if entry.status == HTTPStatus.FORBIDDEN:
+        _audit_refused(request, entry.name)
     if entry.status == HTTPStatus.UNAUTHORIZED and not _house(request.app.state).guard.may_fail(request.scope):
         error = TooManyRequests("too many requests without a valid token from this address")
         entry = http_error(error)
     return _error_response(request, entry.status, entry.name, error.detail, entry.headers)
+
+
+def _audit_refused(request: Request, name: str) -> None:
+    """Merged, as all refusals are: by the route, of which there are few, and never by the path, of which are many."""
+    actor, here = getattr(request.state, "actor", None), getattr(request.app.state, "services", None)
+    if isinstance(actor, Actor) and isinstance(here, Services):
+        route = getattr(request.scope.get("route"), "path", "")
+        here.console.audit.refused(actor, f"{name}: {request.method} {route}")
 
 
 async def _answer_http_exception(request: Request, error: Exception) -> Response:

@@ -30,7 +30,7 @@ from server.stop_presses import Press
 from server.stop_service import StopAnswer
 from server.voice import VoiceService
 
-__all__ = ["Services", "TakesStops", "authorized", "services", "takes_stops"]
+__all__ = ["Services", "TakesStops", "authorized", "known_caller", "services", "takes_stops"]
 
 
 class TakesStops(Protocol):
@@ -118,4 +118,10 @@ def takes_stops(connection: HTTPConnection) -> TakesStops:
 
 async def authorized(request: Request) -> Right:
     """What whoever asks may do. Raises AccessError, StateUnavailable."""
-    return services(request).access.bearer(request.headers.get("authorization"))
+    return known_caller(request, services(request).access.bearer(request.headers.get("authorization")))
+
+
+def known_caller(request: Request, caller: Right) -> Right:
+    """Whoever asks, on a route whose refusals are in the audit."""
+    request.state.actor = caller.actor
+    return caller

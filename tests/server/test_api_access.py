@@ -87,6 +87,14 @@ async def test_observers_see_no_invitations_and_revoke_none_and_only_supervisors
             answer = await rig.http.request(method, path, headers=rig.token(role))  # type: ignore[arg-type]
             assert (answer.status_code, answer.json()["error"]) == (403, "not_allowed")
             assert (await rig.http.request(method, path)).status_code == 401
+        rig.services.console.audit.flush()
+        refused = {(each.role, each.what, each.count) for each in rig.services.audit if each.kind == "refusal"}
+        assert refused == {
+            ("observer", "not_allowed: GET /api/invitations", 1),
+            ("observer", "not_allowed: DELETE /api/invitations/{invitation_id}", 1),
+            ("observer", "not_allowed: GET /api/audit", 1),
+            ("operator", "not_allowed: GET /api/audit", 1),
+        }
 
 
 async def test_there_are_only_so_many() -> None:

@@ -120,6 +120,23 @@ async def test_a_link_reads_nothing_that_was_recorded_before_it_was_made_and_all
         assert (await rig.http.get(f"{base}/chunks/0", headers=supervisor)).status_code == 200
         assert (await rig.http.delete(base, headers=supervisor)).status_code == 200
         rig.services.console.audit.flush(beyond=True)
+        refused = Counter[str]()
+        for each in rig.services.audit:
+            if each.kind == "refusal":
+                assert each.link
+                refused[f"{each.role}, {each.what}"] += each.count
+        route = "not_allowed: GET /api/recordings/{recording_id}"
+        assert refused == {
+            f"observer, {route}": 1,
+            f"observer, {route}/chunks/{{number}}": 1,
+            f"observer, {route}/records": 1,
+            f"observer, {route}/file": 1,
+            f"operator, {route}": 1,
+            f"operator, {route}/chunks/{{number}}": 2,
+            f"operator, {route}/records": 1,
+            f"operator, {route}/file": 2,
+            "operator, not_allowed: POST /api/recordings/{recording_id}/ticket": 1,
+        }
         audit = [each for each in rig.services.audit if each.kind in ("recording", "reading")]
         done = [(each.role, each.what, each.detail) for each in audit if each.kind == "recording"]
         assert done == [*[("operator", "downloaded", "one")] * 2, ("supervisor", "deleted", "one")]

@@ -1,9 +1,13 @@
 """What becomes a record, and with what."""
 
 from itertools import count
+from types import SimpleNamespace
+
+import pytest
 
 from robot_bridge.protocol.console import Seat, SeatClaim
 from robot_bridge.protocol.messages import Feedback
+from server import audit_trail
 from server.audit import (
     BURST,
     CHATTER,
@@ -115,7 +119,7 @@ def test_a_link_that_renames_itself_over_and_over_gets_one_record_a_minute_beyon
     assert (_last(tail).who, _last(tail).count) == ("Grace", 1), "another link has a budget of its own"
 
 
-def test_repeated_stops_draw_on_a_budget_and_a_first_stop_a_reset_and_a_hand_over_never_do() -> None:
+def test_repeated_stops_draw_on_a_budget_and_a_first_stop_and_a_reset_never_do() -> None:
     trail, tail, _ = _trail()
     for _ in range(200):
         trail.again("stop", ADA, "stop, again")
@@ -125,9 +129,33 @@ def test_repeated_stops_draw_on_a_budget_and_a_first_stop_a_reset_and_a_hand_ove
     for _ in range(100):
         trail.record("stop", ADA, "http")
         trail.record("reset", ADA, "http")
+    assert len(list(tail)) == before + 200
+
+
+def test_a_pair_that_hands_the_seat_round_without_end_fills_nothing_and_who_keeps_it_is_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 1000.0
+    monkeypatch.setattr(audit_trail, "time", SimpleNamespace(monotonic=lambda: now, time=lambda: now))
+    trail, tail, _ = _trail()
+    for _ in range(1000):
         trail.seat(Seat(holder="a1", why="request"), ADA, ADA)
-        trail.seat(Seat(why="released"), Actor(), ADA)
-    assert len(list(tail)) == before + 400
+        trail.seat(Seat(holder="b2", why="granted"), GRACE, ADA)
+    trail.seat(Seat(holder="a1", why="request"), ADA, ADA)
+    assert len(list(tail)) == 2 * BURST, "the first ones of each link have a record each"
+    assert _last(tail).who == "Grace"
+    trail.flush()
+    assert _last(tail).who == "Grace", "of a change that came too soon nothing is written yet"
+    now += 1.1 / RATE
+    trail.flush()
+    assert (_last(tail).kind, _last(tail).who, _last(tail).what) == ("seat", "Ada", "has it now")
+    trail.flush(beyond=True)
+    counted = {(record.link, record.what, record.count) for record in tail if record.detail == audit_trail.BEYOND}
+    assert counted == {("link1", "request", 1001 - BURST), ("link2", "granted", 1000 - BURST)}
+    trail.seat(Seat(why="released"), Actor(), ADA)
+    now += 1.1 / RATE
+    trail.flush()
+    assert _last(tail).what == "free now"
 
 
 def test_budgets_refill_and_their_number_is_bounded() -> None:
