@@ -1,7 +1,6 @@
 """Says zero to a ROS 2 base from the watchdog's process: by a node of its own, also when the bridge was killed.
 
-An arm needs none where it is driven by trajectories, which end by themselves after `horizon`; where it takes
-JointState, nobody but its own controller knows where it may stay.
+An arm gets none: it is told positions, and the last of them is where it stays (docs/ros2.md).
 """
 
 import msgspec
