@@ -28,9 +28,11 @@ setup: $(VENV)/.runtime server/web_dist/index.html ## Install what the console a
 run: setup ## Start the simulated robot and the console, and print the links (ARGS="--port 9000" …)
 	@exec $(BIN)/lockstep up $(ARGS)
 
+# A package that cannot be installed keeps no other test from running; the result is a failure all the same.
 test: $(VENV)/.dev setup ## Install what the tests need and run all of them
-	@scripts/system-packages $(TEST_PACKAGES)
-	$(MAKE) --no-print-directory test-web test-unit test-browser
+	@all=yes; scripts/system-packages $(TEST_PACKAGES) || all=no; \
+	$(MAKE) --no-print-directory --keep-going test-web test-unit test-browser || exit 1; \
+	[ $$all = yes ] || { echo "Some packages are missing: the tests SKIPPED above for want of them did not run"; exit 1; }
 
 test-fast: $(VENV)/.dev web/node_modules/.installed ## Run the tests that take less than a minute together
 	cd web && npm test --silent
