@@ -74,7 +74,7 @@ def _holes(number: int, packet: RtpPacket, random: Random) -> bytes:
 
 
 def _noise(number: int, packet: RtpPacket, random: Random) -> bytes:
-    return _rtp(packet, random.getrandbits(16), random.randbytes(random.randrange(1200)), random.getrandbits(32))
+    return _rtp(packet, number, random.randbytes(random.randrange(1200)), random.getrandbits(32))
 
 
 def _sources(number: int, packet: RtpPacket, random: Random) -> bytes:
