@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from robot_bridge.protocol.console import Role
 from robot_bridge.protocol.messages import Stop, StopTaken
 from server.loop_turns import turns_of_loop
 from tests.server.rig import PATIENCE, running_rig
@@ -47,3 +48,23 @@ async def test_it_waits_behind_the_crowd_on_its_channel_and_for_nobody_over_http
             taken = await peer.until(lambda each: isinstance(each, StopTaken))
         assert isinstance(taken, StopTaken)
         assert (taken.press, taken.number) == (PRESS, answer.json()["number"])
+
+
+@pytest.mark.parametrize("role", ["operator", "supervisor"])
+async def test_of_whoever_may_drive_it_waits_for_no_crowd_on_its_channel_either(
+    role: Role, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crowd = [_Talker() for _ in range(CROWD)]
+    async with running_rig() as rig, rig.peer(role) as peer:
+        turns = rig.services.media._turns
+        monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)
+        for each in crowd:
+            turns.add(each)
+        before = sum(each.handled for each in crowd)
+        peer.send("stop", Stop(press=PRESS))
+        async with asyncio.timeout(PATIENCE):
+            await peer.until(lambda each: isinstance(each, StopTaken))
+        rounds = (sum(each.handled for each in crowd) - before) / CROWD
+        for each in crowd:
+            each.goes_on = False
+        assert rounds < 1, "it waited for each of them once"
