@@ -50,6 +50,7 @@ from server.fleet.simulated import own_event_log, own_state_dir, simulated_robot
 from server.heap import share_arenas
 from server.link_access import link_access
 from server.logs import LogFormat, configure_logs
+from server.media_addresses import NoSuchAddress, check_media_addresses
 from server.run_console import run_console, say
 from server.serve import PortTaken, bind
 from server.settings import Settings
@@ -99,7 +100,12 @@ Host = Annotated[str | None, typer.Option(help="Address to listen on; 127.0.0.1 
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the console; 0 takes any free one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the links as one JSON line, once ready.")]
 IceHosts = Annotated[
-    list[str] | None, typer.Option("--ice-host", help="Address offered to browsers for media; may be given again.")
+    list[str] | None,
+    typer.Option("--ice-host", help="Address of this machine, offered to browsers for media; may be given again."),
+]
+Advertise = Annotated[
+    list[str] | None,
+    typer.Option(help="Outer address, from which a one-to-one NAT (as of a cloud) leads here; may be given again."),
 ]
 Quality = Annotated[
     Switch | None, typer.Option(help="Whether bitrate, rate and size of pictures follow the network; on unless set.")
@@ -137,6 +143,7 @@ def up(
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
+    advertise: Advertise = None,
     camera: Cameras = None,
     microphone: Microphones = None,
     whip: Whip = None,
@@ -166,6 +173,7 @@ def up(
         host=host,
         port=port,
         ice_hosts=ice_host,
+        advertise=advertise,
         media=_media(quality),
         cameras=_words(camera),
         microphones=_words(microphone),
@@ -226,6 +234,7 @@ def serve(
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
+    advertise: Advertise = None,
     camera: Cameras = None,
     microphone: Microphones = None,
     whip: Whip = None,
@@ -261,6 +270,7 @@ def serve(
         host=host,
         port=port,
         ice_hosts=ice_host,
+        advertise=advertise,
         media=_media(quality),
         cameras=_words(camera),
         microphones=_words(microphone),
@@ -343,6 +353,7 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     raise_file_limit()
     try:
         _check_files(settings)
+        check_media_addresses(settings.ice_hosts)
         check_board(settings, settings.public_url)
         if settings.is_fleet:
             robot_settings(settings)
@@ -354,7 +365,7 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     except PortTaken as error:
         say(f"{error}; choose another with --port")
         raise typer.Exit(EXIT_PORT_TAKEN) from error
-    except (StateDirUnusable, BadFleet, BoardUnusable) as error:
+    except (StateDirUnusable, BadFleet, BoardUnusable, NoSuchAddress) as error:
         raise _usage(str(error)) from error
     except ssl.SSLError as error:
         raise _usage(f"tls_cert and tls_key are no certificate chain and its key: {error}") from error

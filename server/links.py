@@ -61,7 +61,7 @@ def console_link(console: str, token: str) -> str:
 def listening_url(settings: Settings, listener: socket.socket) -> str:
     """How others reach what `listener` really listens on, unless the settings say better."""
     host, port = listener.getsockname()[:2]
-    shown = _own_address() if host in ANY else host
+    shown = next(iter(settings.advertise), None) or _own_address() if host in ANY else host
     scheme = "https" if settings.encrypted else "http"
     return settings.public_url or f"{scheme}://{f'[{shown}]' if ':' in shown else shown}:{port}"
 

@@ -123,6 +123,7 @@ def _certificate(settings: Settings, directory: Path) -> Certificate | None:
     if not settings.tls:
         return None
     names = own_names(settings.host) | set(settings.tls_names) | set(settings.own_names) | set(own_addresses())
+    names |= set(settings.advertise)
     try:
         certificate = self_signed(directory, names - {"*"}, datetime.datetime.now(datetime.UTC))
     except OSError as error:

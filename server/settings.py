@@ -40,7 +40,8 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     link_tls_cert: Path | None = None  # shown to a bridge that asks for a certificate
     link_tls_key: Path | None = None
     link_tls_ca: Path | None = None  # signed the bridge's certificate; None: one that this machine trusts
-    ice_hosts: NameList = ()  # addresses offered to peers; empty: all interfaces, and loopback when bound to it
+    ice_hosts: NameList = ()  # of this machine, for media; empty: all interfaces, and loopback when bound to it
+    advertise: NameList = ()  # further addresses for media, that a one-to-one NAT leads to those of this machine
     allowed_origins: NameList = ()  # other origins whose pages may use the HTTP API, "https://example.org"
     log_format: LogFormat = LogFormat.TEXT
     state_dir: Path | None = None  # signing key, invitations, audit log; None: ~/.local/state/lockstep
@@ -81,12 +82,12 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
             return {"robots": robot, **rest}
         return given
 
-    @field_validator("ice_hosts", "allowed_origins", mode="before")
+    @field_validator("ice_hosts", "advertise", "allowed_origins", mode="before")
     @classmethod
     def _split_list(cls, value: object) -> object:
         return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
 
-    @field_validator("ice_hosts")
+    @field_validator("ice_hosts", "advertise")
     @classmethod
     def _check_addresses(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         for address in value:

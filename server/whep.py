@@ -13,6 +13,7 @@ from aiortc.sdp import SessionDescription, candidate_from_sdp, candidate_to_sdp
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
 from server.access import Identity, Right
+from server.advertised import advertised_candidates, with_advertised
 from server.agreed_channels import AgreedChannel, agreed_channels
 from server.api_ice import servers_for
 from server.body import read_text
@@ -163,6 +164,7 @@ async def patched(
     except (TimeoutError, ConnectionError) as error:
         raise NotConnected("the ICE session ended, or gathered nothing in time") from error
     lines = [f"candidate:{candidate_to_sdp(each)}" for each in local.candidates]
+    lines += [more for line in lines for more in advertised_candidates(line, here.settings.advertise)]
     body = format_fragment(local.username, local.password, first.kind, first.rtp.muxId, lines)
     headers = {"ETag": ice.tag, "Cache-Control": "no-store"}
     return Response(body, status_code=200, media_type=FRAGMENT, headers=headers)
@@ -248,7 +250,7 @@ async def _negotiate(
             here.metrics.faults.caught("peer offer", error)
             raise InternalFault("the console could not answer; it has written down why") from error
         raise
-    return peer, pc.localDescription.sdp
+    return peer, with_advertised(pc.localDescription.sdp, here.settings.advertise)
 
 
 async def _answering_peer(

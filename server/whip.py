@@ -8,6 +8,7 @@ from aiortc import RTCIceGatherer, RTCIceServer, RTCPeerConnection, RTCSessionDe
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
 from server.access import Right
+from server.advertised import with_advertised
 from server.api_ice import servers_for
 from server.body import read_text
 from server.errors import (
@@ -157,7 +158,7 @@ async def _negotiate(here: Services, caller: Right, offer: str, camera: Publishe
             here.metrics.faults.caught("publisher offer", error)
             raise InternalFault("the console could not answer; it has written down why") from error
         raise
-    return publisher, pc.localDescription.sdp
+    return publisher, with_advertised(pc.localDescription.sdp, here.settings.advertise)
 
 
 def _publisher(

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
 
+from bench.emulator.address_translation import Firewall, OneToOneNat
 from bench.emulator.bottleneck import Bottleneck
 from bench.emulator.deliveries import Deliveries
 from bench.emulator.ip_packets import IpKind, IpSorter
@@ -46,7 +47,14 @@ class Namespaces:
         NamespacesUnavailable: on entering; says what is missing.
     """
 
-    def __init__(self, profile: Profile | str, *, seed: int = 1) -> None:
+    def __init__(self, profile: Profile | str, *, seed: int = 1, cloud: str | None = None) -> None:
+        """`cloud`: the outer address, and the only one, by which the robot's side is reached.
+
+        So it is with a machine in a cloud, which knows but its inner address. The operator's side then stands behind a
+        firewall, as a browser at home.
+        """
+        self._nat = OneToOneNat(ROBOT_ADDRESS, cloud) if cloud is not None else None
+        self._firewall = Firewall() if cloud is not None else None
         self.profile = load_profile(profile) if isinstance(profile, str) else profile
         self._client_outages = Outages(self.profile.client_outages)
         self._robot_outages = Outages(self.profile.robot_outages)
@@ -136,6 +144,8 @@ class Namespaces:
             except OSError:
                 return
             kind = self._sorter.kind(packet)
+            if kind is not None:
+                packet = self._translated(side, packet)
             if kind is None or packet[16:20] != _packed(other.address):
                 continue  # IPv6's own talk, broadcasts, and whatever looks for the rest of the world
             now = time.monotonic()
@@ -145,6 +155,16 @@ class Namespaces:
             arrives = self._paths[kind, direction].admit(now, len(packet))
             if arrives is not None:
                 self._deliveries.at(arrives, _write, other.packets, packet)
+
+    def _translated(self, side: Side, packet: bytes) -> bytes:
+        """As it arrives at the other side; b"": it does not."""
+        if self._nat is None or self._firewall is None:
+            return packet
+        if side == "operator":
+            self._firewall.leaving(packet)
+            return self._nat.inward(packet) or b""
+        outer = self._nat.outward(packet)
+        return outer if outer is not None and self._firewall.admits(outer) else b""
 
 
 def _write(descriptor: int, packet: bytes) -> None:

@@ -124,6 +124,8 @@ async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], 
     [
         (("--robot", "nonsense"), "is not tcp://host:port"),
         (("--ice-host", "example"), "ice_hosts"),
+        (("--ice-host", "203.0.113.1"), "the outer one of a one-to-one NAT belongs to --advertise"),
+        (("--advertise", "example"), "advertise"),
         (("--port", "70000"), "65535"),
         (("--board", "redis://:a-password@h:port"), "board: Value error, the board is not redis://"),
     ],

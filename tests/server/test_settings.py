@@ -28,6 +28,7 @@ def test_an_empty_variable_is_an_unset_one(monkeypatch: pytest.MonkeyPatch) -> N
         {"secret": "short"},
         {"public_url": "robot.example.org"},
         {"ice_hosts": ("example.org",)},
+        {"advertise": ("example.org",)},
         {"port": 65536},
         {"observer_feedback_hz": 0},
     ],

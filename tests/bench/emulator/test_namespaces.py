@@ -157,3 +157,38 @@ async def test_a_robot_link_between_the_sides_takes_the_robots_paths() -> None:
         assert await line(client) == "Media"
         counts = spaces.statistics()
     assert counts.paths["robot_media"]["to_operator"].passed >= 3
+
+
+CLOUD = "203.0.113.7"
+
+WATCH = """
+import asyncio, sys
+from client import Console
+
+async def main():
+    async with Console(sys.argv[1], audio=False, connect_seconds=float(sys.argv[2])) as console:
+        async for picture in console.pictures():
+            break
+        await console.restart_ice()
+        print("picture", flush=True)
+
+try:
+    asyncio.run(main())
+except Exception as error:
+    print(type(error).__name__, flush=True)
+"""
+
+
+@pytest.mark.parametrize(("advertise", "seen"), [(("--advertise", CLOUD), "picture"), ((), "ConnectFailed")])
+async def test_a_console_in_a_cloud_is_seen_from_home_by_the_outer_address_that_it_advertises(
+    tmp_path: Path, advertise: tuple[str, ...], seen: str
+) -> None:
+    environment = os.environ | {"LOCKSTEP_STATE_DIR": str(tmp_path)}
+    up = ["up", "--json", "--robot", "planar", "--host", "0.0.0.0", "--port", "8000", "--robot-port", "0", "--quiet"]
+    async with Namespaces(Profile("perfect"), cloud=CLOUD) as spaces:
+        console = await spaces.start("robot", [LOCKSTEP, *up, *advertise], stdout=PIPE, env=environment)
+        links = json.loads(await line(console))
+        assert links["console"] == f"http://{CLOUD if advertise else ROBOT_ADDRESS}:8000"
+        link = links["observer"].replace(ROBOT_ADDRESS, CLOUD)
+        client = await spaces.start("operator", python(WATCH, link, "30" if advertise else "6"), stdout=PIPE)
+        assert await line(client) == seen
