@@ -11,6 +11,7 @@ import pytest
 from playwright.async_api import Browser, Locator, expect
 
 from bench.browsers.console_page import RB, ConsolePage, open_console
+from tests.e2e.tamper import open_tampered
 from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
@@ -157,3 +158,25 @@ async def test_the_seats_button_is_always_in_view_and_in_one_place(
             box = await _button(ann, name).bounding_box()
             assert box is not None
             assert box["x"] + box["width"] <= width
+
+
+PRESSED = """(peer) => {
+  window.sent.length = 0;
+  const seat = { type: "seat", holder: peer, name: "me", why: "request", claims: [], idle_seconds_left: null };
+  window.say("session", seat);
+  [...document.querySelectorAll("button")].find((each) => each.textContent === "Request control").click();
+  return window.sent.map((message) => message.type);
+}"""
+
+
+async def test_the_seats_button_does_what_it_says_also_where_the_seat_came_a_moment_before(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_tampered(chromium, stack.operator) as console:
+        await console.until("s.seat.mine")
+        await _button(console, "Give control back").click()
+        await console.until("!s.seat.mine")
+        await _button(console, "Request control").wait_for()
+        peer = (await console.stats())["peer"]
+        assert "seat_request" in (sent := await console.page.evaluate(PRESSED, peer))
+        assert "seat_release" not in sent

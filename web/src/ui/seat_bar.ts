@@ -16,7 +16,7 @@ export function createSeatBar(app: ConsoleApp, talk: Panel): Panel {
   const grant = seatButton("Grant", "F8", () => app.session.answerFirst(true, performance.now()));
   const decline = seatButton("Decline", "F9", () => app.session.answerFirst(false, performance.now()));
   const keep = seatButton("Keep control", "", () => app.session.keepSeat());
-  const action = seatButton("", "", () => act(app));
+  const action: HTMLButtonElement = seatButton("", "", () => act(app, action.dataset.kind));
   action.classList.add("seat-action");
   const words = h("div", "seat-words", {}, title, text);
   const spoken = h("span", "unseen", { role: "status" }); // without the seconds, which would be read out all the time
@@ -79,13 +79,12 @@ function actionOf(app: ConsoleApp): SeatAction | null {
   return seatAction(app.session.role, seatStanding(seat, welcome?.peer ?? null));
 }
 
-function act(app: ConsoleApp): void {
-  const action = actionOf(app);
-  if (action === null || action.why !== null) return;
-  if (action.kind === "request") app.session.requestSeat();
-  else if (action.kind === "take") app.session.takeSeat();
-  else if (action.kind === "withdraw") app.session.release();
-  else app.releaseSeat();
+/** Does what the button says: the seat may have changed since it was last drawn. */
+function act(app: ConsoleApp, shown: string | undefined): void {
+  if (shown === "request") app.session.requestSeat();
+  else if (shown === "take") app.session.takeSeat();
+  else if (shown === "withdraw") app.session.release();
+  else if (shown === "release") app.releaseSeat();
 }
 
 function showAction(element: HTMLButtonElement, why: HTMLElement, action: SeatAction | null): void {
