@@ -109,7 +109,7 @@ export class ConsoleApp {
       arm: () => this.toggleArmed(),
       nextLayer: () => this.nextLayer(),
       isArmed: () => this.isArmed(),
-      answerClaim: (grant) => this.session.answerFirst(grant, performance.now()),
+      answerClaim: (grant) => this.session.answerShown(grant),
       lost: () => this.disarm("pad_lost"),
       silent: () => this.disarm("pad_silent"),
       plugged: (words) => note(this.state, "info", words, Date.now()),

@@ -10,6 +10,7 @@ const NAME_KEY = "lockstep.name";
 export class SessionDesk {
   role: Role | null = null; // of the last connection: the link has one and keeps it
   private wantsSeat = true; // when it connects
+  shownClaim: string | null = null; // the peer whose request stands on the page now
   seatMs = 0; // when the console last spoke of the seat: its countdowns began then
 
   constructor(
@@ -59,11 +60,15 @@ export class SessionDesk {
     this.tell({ type: grant ? "seat_grant" : "seat_decline", peer });
   }
 
-  /** Answers whoever has waited longest; says whether this page was asked at all. */
-  answerFirst(grant: boolean, now: number): boolean {
-    const first = holdsSeat(this.state) ? this.claims(now)[0] : undefined;
-    if (first !== undefined) this.answer(first.peer, grant);
-    return first !== undefined;
+  /**
+   * Answers whoever stands on the page, and nobody who came in their place since it was drawn: the robot is handed to
+   * who was read. Says whether this page asks its person at all.
+   */
+  answerShown(grant: boolean): boolean {
+    const { shownClaim, state } = this;
+    if (shownClaim === null || !holdsSeat(state)) return false;
+    if (state.seat?.claims.some((each) => each.peer === shownClaim) === true) this.answer(shownClaim, grant);
+    return true;
   }
 
   /** A supervisor's: whether STOP from that peer's link has an effect. */

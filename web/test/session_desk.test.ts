@@ -31,6 +31,8 @@ function rig(name: string | null = null): Rig {
   };
 }
 
+const LATE = { peer: "late", name: "L", seconds_left: 50 };
+const EARLY = { peer: "early", name: "E", seconds_left: 9 };
 const ASK_IF_FREE = { type: "seat_request", only_if_free: true };
 
 describe("a page that connects", () => {
@@ -79,25 +81,34 @@ describe("a page that connects", () => {
 });
 
 describe("the holder of the seat", () => {
-  it("answers who has waited longest, and nobody when nobody asks", () => {
+  it("answers whom the page shows, and nobody when nobody asks", () => {
     const { desk, told, connect, seat } = rig();
     connect();
     seat({ holder: "me" });
     told.length = 0;
-    expect(desk.answerFirst(true, 0)).toBe(false);
-    const claims = [
-      { peer: "late", name: "L", seconds_left: 50 },
-      { peer: "early", name: "E", seconds_left: 9 },
-    ];
-    seat({ holder: "me", claims });
-    expect(desk.answerFirst(true, 0)).toBe(true);
-    expect(desk.answerFirst(false, 0)).toBe(true);
+    expect(desk.answerShown(true)).toBe(false);
+    seat({ holder: "me", claims: [LATE, EARLY] });
+    expect(desk.answerShown(true)).toBe(false); // nothing of it has been drawn yet
+    desk.shownClaim = "early";
+    expect(desk.answerShown(true)).toBe(true);
+    expect(desk.answerShown(false)).toBe(true);
     expect(told).toEqual([
       { type: "seat_grant", peer: "early" },
       { type: "seat_decline", peer: "early" },
     ]);
-    seat({ holder: "ben", claims });
-    expect(desk.answerFirst(true, 0)).toBe(false);
+    seat({ holder: "ben", claims: [LATE, EARLY] });
+    expect(desk.answerShown(true)).toBe(false);
+  });
+
+  it("hands the robot to nobody who came in the place of whom the page shows", () => {
+    const { desk, told, connect, seat } = rig();
+    connect();
+    seat({ holder: "me", claims: [LATE, EARLY] });
+    desk.shownClaim = "early";
+    seat({ holder: "me", claims: [LATE] });
+    told.length = 0;
+    expect(desk.answerShown(true)).toBe(true);
+    expect(told).toEqual([]);
   });
 });
 

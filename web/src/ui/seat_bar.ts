@@ -13,8 +13,8 @@ export function createSeatBar(app: ConsoleApp, talk: Panel): Panel {
   const title = h("strong", "seat-title");
   const text = h("span", "seat-text");
   const why = h("span", "seat-why");
-  const grant = seatButton("Grant", "F8", () => app.session.answerFirst(true, performance.now()));
-  const decline = seatButton("Decline", "F9", () => app.session.answerFirst(false, performance.now()));
+  const grant = seatButton("Grant", "F8", () => app.session.answerShown(true));
+  const decline = seatButton("Decline", "F9", () => app.session.answerShown(false));
   const keep = seatButton("Keep control", "", () => app.session.keepSeat());
   const action: HTMLButtonElement = seatButton("", "", () => act(app, action.dataset.kind));
   action.classList.add("seat-action");
@@ -54,6 +54,7 @@ export function createSeatBar(app: ConsoleApp, talk: Panel): Panel {
         obstacle: obstacleOf(app, now),
         news: told !== null && now - toldMs < NEWS_MS ? told.words : null,
       });
+      session.shownClaim = found.tone === "asked" ? (claims[0]?.peer ?? null) : null;
       setData(element, "tone", found.tone);
       setText(title, found.title);
       setText(text, found.text);
