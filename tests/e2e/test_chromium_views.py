@@ -1,5 +1,6 @@
 """Where the views stand: pictures have the room that is there, nothing lies over another, and no box is empty."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -7,12 +8,14 @@ from playwright.async_api import Browser
 
 from bench.browsers.console_page import ConsolePage
 from tests.e2e.machine import open_on_machine
-from tests.support.stack import Stack
+from tests.server.media.sources.media_files import film
+from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
 LAPTOP, FULL_HD, NARROW, UPRIGHT = (1366, 768), (1920, 1080), (1024, 640), (1024, 1366)
-PHONE, TURNED, ZOOMED = (390, 844), (844, 390), (683, 384)
+PHONE, SMALL_PHONE, TURNED, ZOOMED = (390, 844), (360, 640), (844, 390), (683, 384)
+TABLET = (820, 1180)
 
 # After the next layout: every box, and how large the picture in it is drawn.
 LOOK = """() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => {
@@ -29,7 +32,14 @@ LOOK = """() => new Promise((resolve) => requestAnimationFrame(() => requestAnim
   });
   const gauges = [...document.querySelectorAll(".gauges > *")].filter((each) => each.checkVisibility());
   const room = document.querySelector(".views");
-  resolve({ views, gauges: gauges.map((each) => ({ name: "a gauge", ...box(each) })), room: box(room) });
+  const named = (name, found) => found.map((each) => ({ name, ...box(each) }));
+  const all = (selector) => [...document.querySelectorAll(selector)].filter((each) => each.checkVisibility());
+  resolve({
+    views,
+    gauges: named("a gauge", gauges),
+    room: box(room),
+    others: [...named("the event", all(".event")), ...named("STOP", all(".stop")), ...named("a stick", all(".stick"))],
+  });
 })))"""
 
 
@@ -108,6 +118,50 @@ async def test_on_small_screens_no_box_is_empty_and_the_large_picture_has_its_ro
             assert not small["empty"]
             if size == TURNED:
                 assert small["x"] >= large["x"] + large["picture"] - 1, "it lies beside the picture, not over it"
+
+
+def _box_of(looked: dict[str, Any], name: str) -> dict[str, Any]:
+    found: dict[str, Any] = next(each for each in looked["others"] if each["name"] == name)
+    return found
+
+
+def _empty_share(looked: dict[str, Any]) -> float:
+    """Of the room of the views, what stands empty behind the small ones in their row."""
+    small = [view for view in looked["views"] if view["place"] == "small"]
+    room, event = looked["room"], _box_of(looked, "the event")
+    bottom = max(view["y"] + view["height"] for view in small)
+    row = [view for view in small if abs(view["y"] + view["height"] - bottom) < 1]
+    large = next(view for view in looked["views"] if view["place"] == "main")
+    if row[0]["y"] < large["y"] + large["height"]:
+        return 0.0  # a column beside the large one
+    end = event["x"] if event["y"] < bottom else room["x"] + room["width"]
+    empty = end - max(view["x"] + view["width"] for view in row)
+    return float(max(0.0, empty) * row[0]["height"] / (room["width"] * room["height"]))
+
+
+@pytest.mark.parametrize("role", ["operator", "observer"])
+@pytest.mark.parametrize("more", [(), ("wide",), ("wide", "tall", "square")], ids=["two", "three", "five"])
+async def test_on_upright_screens_pictures_take_the_room_that_stands_empty(
+    tmp_path: Path, chromium: Browser, more: tuple[str, ...], role: str
+) -> None:
+    shapes = {"wide": (320, 180), "tall": (180, 320), "square": (200, 200)}
+    cameras = [f"--camera={name}=file:{film(tmp_path / f'{name}.mp4', size=shapes[name])}" for name in more]
+    async with (
+        running_stack(tmp_path, extra=(*cameras, "--quiet")) as stack,
+        open_on_machine(chromium, getattr(stack, role), touch=True, width=390, height=844) as console,
+    ):
+        await console.until_live()
+        for size in (PHONE, SMALL_PHONE, TABLET):
+            what = f"{size} {role}"
+            looked = await _look(console, size)
+            _check(looked, what)
+            for other in looked["others"]:
+                assert not any(_overlaps(view, other) for view in looked["views"]), f"{what}: {other['name']}"
+                assert other["y"] + other["height"] <= size[1] + 0.5, f"{what}: {other['name']}"
+            sticks = [each for each in looked["others"] if each["name"] == "a stick"]
+            assert len(sticks) == (2 if role == "operator" else 0)
+            assert all(stick["height"] >= 90 for stick in sticks), what
+            assert _empty_share(looked) < 0.1, what
 
 
 async def test_on_a_phone_the_scene_that_somebody_asked_for_has_a_place_beside_the_small_pictures(

@@ -115,6 +115,7 @@ export class Page {
     const alarm = createAlarmStrip(app);
     const banner = createBanner(app);
     const event = createEventPanel(app);
+    board.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(app, false));
     const contact = later.panel((parts) => parts.createForceGauge(app, true));
     const radar = later.panel((parts) => parts.createRangeRadar(app));

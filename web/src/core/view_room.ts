@@ -6,6 +6,14 @@ export interface ViewRoom {
   readonly large: number; // width to height of the large view's picture
   readonly small: readonly number[]; // the same of the others, in their order
   readonly gauges: readonly number[]; // heights of the gauges at the end of column or row
+  readonly card: MovableCard | null; // null: none that could stand in the row
+}
+
+/** What stands below the room, or at the end of the row of small views, where these leave room. */
+export interface MovableCard {
+  readonly height: number; // that the room gains without it
+  readonly leastWidth: number;
+  readonly leastHeight: number;
 }
 
 /** Where the small views and the gauges stand: in a column beside the large view, or in a row below it. */
@@ -13,34 +21,78 @@ export interface ViewPlan {
   readonly run: "alone" | "column" | "row"; // alone: there are none
   readonly size: number; // width of the column, height of the row
   readonly tight: boolean; // the small views in the column share its height, whatever shape that gives them
+  readonly card: boolean; // stands at the end of the row
 }
 
 /** Of the shapes that small views take: a square picture lies in a wider one, so that the column is not used up. */
 const SQUAREST = 4 / 3;
 const LEAST = 150; // width of a small view, and of a gauge
+const NARROW = 600; // a room of less width has place for so many small views in a row:
+const NARROW_ROW = 4;
 const MOST_OF_LEAST = 216;
 const LEAST_SHARE = 0.17;
 const MOST_SHARE = 0.5;
-/** The row must be worth more than this, so that views do not change their places for a few pixels. */
-const ROW_GAIN = 1.1;
+/** Another place must be worth more than this, so that views do not change theirs for a few pixels. */
+const GAIN = 1.1;
 
 /** The shape of a small view of such a picture: width to height. */
 export function smallShape(aspect: number): number {
   return Math.max(SQUAREST, aspect);
 }
 
+/** A plan, and what comes of it. */
+interface Candidate {
+  readonly plan: ViewPlan;
+  readonly large: number; // width of the large picture
+  readonly small: number; // area of all small views
+}
+
 /**
  * The large picture is as large as its room lets it be. The others have what is left beside or below it, as far as
- * they fill it, and never less than they need.
+ * they fill it, and never less than they need. Where that leaves the end of a row empty, a card moves in from below.
  */
 export function planViews(room: ViewRoom): ViewPlan {
-  if (room.small.length === 0 && room.gauges.length === 0) return { run: "alone", size: 0, tight: false };
-  const column = columnWidth(room);
-  const row = rowHeight(room);
-  const beside = pictureWidth(room, room.width - room.gap - column, room.height);
-  if (row !== null && pictureWidth(room, room.width, room.height - room.gap - row) > ROW_GAIN * beside)
-    return { run: "row", size: row, tight: false };
-  return { run: "column", size: column, tight: column > filledWidth(room, abreast(room, column)) };
+  if (room.small.length === 0 && room.gauges.length === 0)
+    return { run: "alone", size: 0, tight: false, card: false };
+  let best = inColumn(room);
+  for (const other of [inRow(room), inRowWithCard(room)])
+    if (other !== null && isBetter(other, best)) best = other;
+  return best.plan;
+}
+
+function isBetter(other: Candidate, best: Candidate): boolean {
+  return (
+    other.large > GAIN * best.large || (other.large >= best.large && other.small > GAIN * GAIN * best.small)
+  );
+}
+
+function inColumn(room: ViewRoom): Candidate {
+  const { width, height, gap, small } = room;
+  const size = columnWidth(room);
+  const filled = filledWidth(room, abreast(room, size));
+  const tight = size > filled;
+  return {
+    plan: { run: "column", size, tight, card: false },
+    large: pictureWidth(room, width - gap - size, height),
+    small: size * Math.min(size, filled) * sum(small.map((aspect) => 1 / smallShape(aspect))),
+  };
+}
+
+function inRow(room: ViewRoom, card: MovableCard | null = null): Candidate | null {
+  const size = rowHeight(room, card);
+  if (size === null) return null;
+  return {
+    plan: { run: "row", size, tight: false, card: card !== null },
+    large: pictureWidth(room, room.width, room.height - room.gap - size),
+    small: size * size * sum(room.small.map(smallShape)),
+  };
+}
+
+/** null: the card has no place beside the small views. */
+function inRowWithCard(room: ViewRoom): Candidate | null {
+  const { card, small } = room;
+  if (card === null || small.length === 0) return null;
+  return inRow({ ...room, height: room.height + card.height }, card);
 }
 
 /** How wide the large picture is drawn into a place of this size. */
@@ -48,8 +100,10 @@ function pictureWidth({ large }: ViewRoom, width: number, height: number): numbe
   return Math.min(width, height * large);
 }
 
-/** What a small view has in any case. */
-function leastWidth({ width }: ViewRoom): number {
+/** What a small view has in any case. A gauge below it needs more than a narrow room gives. */
+function leastWidth({ width, gap, gauges }: ViewRoom): number {
+  if (width < NARROW && gauges.length === 0)
+    return Math.min(LEAST, (width - (NARROW_ROW - 1) * gap) / NARROW_ROW);
   return Math.min(MOST_OF_LEAST, Math.max(LEAST, LEAST_SHARE * width));
 }
 
@@ -75,15 +129,15 @@ function filledWidth({ height, gap, small, gauges }: ViewRoom, side: number): nu
   return small.length === 0 ? Infinity : free / sum(small.map((aspect) => 1 / smallShape(aspect)));
 }
 
-/** null: what stands in the row needs more width. */
-function rowHeight(room: ViewRoom): number | null {
+/** `card`: at its end. null: what stands in the row needs more width. */
+function rowHeight(room: ViewRoom, card: MovableCard | null): number | null {
   const { width, height, gap, large, small, gauges } = room;
-  const gaugesWidth = gauges.length * LEAST;
-  const free = width - gaugesWidth - (small.length + gauges.length - 1) * gap;
+  const others = gauges.length * LEAST + (card === null ? 0 : card.leastWidth + gap);
+  const free = width - others - (small.length + gauges.length - 1) * gap;
   const most = small.length === 0 ? Infinity : free / sum(small.map(smallShape));
-  const least = Math.max(leastWidth(room) / SQUAREST, ...gauges);
+  const least = Math.max(leastWidth(room) / SQUAREST, card?.leastHeight ?? 0, ...gauges);
   if (free < 0 || most < least) return null;
-  const below = height - gap - width / large;
+  const below = height - gap - room.width / large;
   return Math.floor(Math.max(least, Math.min(below, most)));
 }
 

@@ -2,7 +2,7 @@ import type { ConsoleApp } from "../console_app";
 import { note, robotIsUp } from "../core/console_state";
 import { staleAge } from "../core/freshness";
 import { sourceWords } from "../core/source_words";
-import { planViews, smallShape } from "../core/view_room";
+import { planViews, smallShape, type MovableCard, type ViewPlan } from "../core/view_room";
 import { stalenessOf } from "../statistics";
 import type { StreamInfo } from "../wire";
 import { h, setData, setHidden, setText } from "./dom";
@@ -22,18 +22,22 @@ interface View {
 
 const SCENE = "3D scene";
 const SCENE_SHAPE = 4 / 3;
+const CARD_WIDTH = 150;
+const CARD_HEIGHT = 64;
 const TOO_SLOW = "The 3D scene was closed: this machine draws it too slowly";
 
 /** One view large, the others small; a click on a small one swaps it in. */
 export class ViewBoard {
   readonly element = h("main", "views", { "aria-label": "Views" });
   readonly gauges = h("div", "gauges");
+  card: HTMLElement | null = null; // that may stand at the end of a row of small views, where the style sheet lets it
   sceneSwitch: SceneSwitch | null = null; // until its code is there
   private readonly views = new Map<string, View>(); // cameras in their order, then the scene while it is there
   private readonly sceneView: View;
   private main: string | null = null;
   private epoch: string | null = null;
   private shapes = ""; // of the pictures, as they were last laid out
+  private cardHeight = 0; // in its own place
 
   constructor(readonly scene: SceneView) {
     this.sceneView = this.createView(SCENE, SCENE, null, scene.element);
@@ -188,7 +192,7 @@ export class ViewBoard {
   private fit(): void {
     this.shapes = this.shapesNow();
     const style = getComputedStyle(this.element);
-    const padding = 2 * parseFloat(style.paddingTop);
+    const gap = parseFloat(style.columnGap);
     let large = SCENE_SHAPE;
     const small: number[] = [];
     for (const view of this.views.values()) {
@@ -197,22 +201,48 @@ export class ViewBoard {
       if (this.isLarge(view)) large = shape;
       else small.push(shape);
     }
-    const { run, size, tight } = planViews({
-      width: this.element.clientWidth - padding,
-      height: this.element.clientHeight - padding,
-      gap: parseFloat(style.columnGap),
+    const card = this.movableCard();
+    const hasCard = this.card?.dataset.beside === "true"; // now: the room has its height already
+    const plan = planViews({
+      width: this.element.clientWidth - 2 * parseFloat(style.paddingLeft),
+      height:
+        this.element.clientHeight - 2 * parseFloat(style.paddingTop) - (hasCard ? (card?.height ?? 0) : 0),
+      gap,
       large,
       small,
       gauges: [...this.gauges.children].map((gauge) => gauge.clientHeight).filter((height) => height > 0),
+      card,
     });
+    this.lay(plan, plan.run === "row" ? rowWidth(small, plan.size, gap) : 0);
+  }
+
+  private lay({ run, size, tight, card }: ViewPlan, taken: number): void {
     setData(this.element, "run", run);
     setData(this.element, "tight", String(tight));
     this.element.style.setProperty("--size", `${size}px`);
+    if (this.card === null) return;
+    setData(this.card, "beside", String(card));
+    this.card.style.setProperty("--size", `${size}px`);
+    this.card.style.setProperty("--taken", `${taken}px`);
+  }
+
+  /** null: this screen has a place of its own for the card. */
+  private movableCard(): MovableCard | null {
+    if (this.card === null) return null;
+    const style = getComputedStyle(this.card);
+    if (style.getPropertyValue("--moves") !== "1") return null;
+    if (this.card.dataset.beside !== "true") this.cardHeight = this.card.offsetHeight;
+    return { height: this.cardHeight, leastWidth: CARD_WIDTH, leastHeight: CARD_HEIGHT };
   }
 
   private shapesNow(): string {
     return [...this.views.values()].map((view) => shapeOf(view).toFixed(3)).join(" ");
   }
+}
+
+/** Of small views of these shapes, with a gap behind each. */
+function rowWidth(small: readonly number[], height: number, gap: number): number {
+  return small.reduce((width, shape) => width + smallShape(shape) * height + gap, 0);
 }
 
 function shapeOf({ canvas }: View): number {

@@ -21,7 +21,15 @@ function* rooms(): Generator<ViewRoom> {
       for (const gauges of GAUGES)
         for (let count = 0; count < 6; count += 1)
           for (const shape of [1, CAMERA, 16 / 9])
-            yield { width, height, gap: GAP, large, small: Array<number>(count).fill(shape), gauges };
+            yield {
+              width,
+              height,
+              gap: GAP,
+              large,
+              small: Array<number>(count).fill(shape),
+              gauges,
+              card: null,
+            };
 }
 
 /** How wide pictures of these shapes are drawn in such a plan. */
@@ -47,10 +55,13 @@ function fixed(room: ViewRoom): { large: number; small: number } {
 describe("the room of the views", () => {
   it("is all the large view's where nothing else is there", () => {
     for (const [width, height] of ROOMS)
-      expect(planViews({ width, height, gap: GAP, large: CAMERA, small: [], gauges: [] })).toEqual({
+      expect(
+        planViews({ width, height, gap: GAP, large: CAMERA, small: [], gauges: [], card: null }),
+      ).toEqual({
         run: "alone",
         size: 0,
         tight: false,
+        card: false,
       });
   });
 
@@ -93,26 +104,56 @@ describe("the room of the views", () => {
       large: CAMERA,
       small: Array<number>(5).fill(1),
       gauges: [130],
+      card: null,
     };
     expect(planViews(crowd).tight).toBe(true);
   });
 
   it("beside a picture as high as the room is the column's", () => {
-    const room = { width: 1524, height: 778, gap: GAP, large: CAMERA, small: [CAMERA], gauges: [] };
+    const room = {
+      width: 1524,
+      height: 778,
+      gap: GAP,
+      large: CAMERA,
+      small: [CAMERA],
+      gauges: [],
+      card: null,
+    };
     const plan = planViews(room);
-    expect(plan).toEqual({ run: "column", size: Math.floor(1524 - GAP - 778 * CAMERA), tight: false });
+    expect(plan).toEqual({
+      run: "column",
+      size: Math.floor(1524 - GAP - 778 * CAMERA),
+      tight: false,
+      card: false,
+    });
     expect(drawn(room, plan).large).toBeCloseTo(778 * CAMERA);
   });
 
   it("below a picture as wide as the room is the row's", () => {
-    const room = { width: 880, height: 830, gap: GAP, large: CAMERA, small: [CAMERA, CAMERA], gauges: [130] };
+    const room = {
+      width: 880,
+      height: 830,
+      gap: GAP,
+      large: CAMERA,
+      small: [CAMERA, CAMERA],
+      gauges: [130],
+      card: null,
+    };
     const plan = planViews(room);
-    expect(plan).toEqual({ run: "row", size: 830 - GAP - 660, tight: false });
+    expect(plan).toEqual({ run: "row", size: 830 - GAP - 660, tight: false, card: false });
     expect(drawn(room, plan).large).toBe(880);
   });
 
   it("has no wider column than its views fill above the gauges", () => {
-    const room = { width: 1524, height: 778, gap: GAP, large: 1, small: [1, CAMERA, 16 / 9], gauges: [130] };
+    const room = {
+      width: 1524,
+      height: 778,
+      gap: GAP,
+      large: 1,
+      small: [1, CAMERA, 16 / 9],
+      gauges: [130],
+      card: null,
+    };
     const { run, size } = planViews(room);
     expect(run).toBe("column");
     expect(size).toBeGreaterThan(216);
@@ -129,6 +170,7 @@ describe("the room of the views", () => {
       large: CAMERA,
       small: [CAMERA, CAMERA],
       gauges: [130, 130],
+      card: null,
     };
     const { size } = planViews(room);
     expect(size).toBeGreaterThanOrEqual(312);
@@ -136,9 +178,57 @@ describe("the room of the views", () => {
   });
 
   it("is the pictures' by half at most, and gauges alone have no more than they need", () => {
-    const wide = { width: 1400, height: 300, gap: GAP, large: 1, small: [4], gauges: [] };
-    expect(planViews(wide)).toEqual({ run: "column", size: 700, tight: false });
-    const gauges = { width: 1524, height: 778, gap: GAP, large: 1, small: [], gauges: [130] };
-    expect(planViews(gauges)).toEqual({ run: "column", size: 216, tight: false });
+    const wide = { width: 1400, height: 300, gap: GAP, large: 1, small: [4], gauges: [], card: null };
+    expect(planViews(wide)).toEqual({ run: "column", size: 700, tight: false, card: false });
+    const gauges = { width: 1524, height: 778, gap: GAP, large: 1, small: [], gauges: [130], card: null };
+    expect(planViews(gauges)).toEqual({ run: "column", size: 216, tight: false, card: false });
+  });
+
+  it("lets as many as four small views stand in a row on an upright phone", () => {
+    const room = { width: 374, height: 380, gap: 8, large: CAMERA, small: [], gauges: [], card: null };
+    for (let count = 1; count < 5; count += 1) {
+      const plan = planViews({ ...room, small: Array<number>(count).fill(CAMERA) });
+      expect(plan.run).toBe("row");
+      expect(count * plan.size * CAMERA + (count - 1) * 8).toBeLessThanOrEqual(374);
+    }
+  });
+
+  it("leaves gauges their width in a room as narrow as a phone's", () => {
+    const room = {
+      width: 459,
+      height: 300,
+      gap: 12,
+      large: CAMERA,
+      small: [CAMERA],
+      gauges: [130],
+      card: null,
+    };
+    expect(planViews(room)).toMatchObject({ run: "column", size: 150 });
+  });
+
+  it("takes a card into the row that one small view leaves empty, and that view grows by the room it frees", () => {
+    const card = { height: 62, leastWidth: 150, leastHeight: 64 };
+    const room = { width: 374, height: 362, gap: 8, large: CAMERA, small: [CAMERA], gauges: [], card: null };
+    const alone = planViews(room);
+    const together = planViews({ ...room, card });
+    expect(alone).toMatchObject({ run: "row", card: false });
+    expect(together).toMatchObject({ run: "row", card: true });
+    expect(together.size).toBeGreaterThan(1.5 * alone.size);
+    expect(together.size * CAMERA + 8 + card.leastWidth).toBeLessThanOrEqual(374);
+    expect(together.size).toBeLessThanOrEqual(room.height + card.height - 8 - 374 / CAMERA);
+  });
+
+  it("takes the card into the row of a short phone, where the large picture gains by it", () => {
+    const card = { height: 46, leastWidth: 150, leastHeight: 64 };
+    const room = { width: 344, height: 238, gap: 8, large: CAMERA, small: [CAMERA], gauges: [], card };
+    expect(planViews(room)).toEqual({ run: "row", size: 64, tight: false, card: true });
+    expect(planViews({ ...room, card: null }).run).toBe("column");
+  });
+
+  it("leaves the card where it is when small views fill the row", () => {
+    const card = { height: 62, leastWidth: 150, leastHeight: 64 };
+    const small = [CAMERA, CAMERA, CAMERA];
+    const room = { width: 374, height: 362, gap: 8, large: CAMERA, small, gauges: [], card };
+    expect(planViews(room).card).toBe(false);
   });
 });

@@ -12,18 +12,26 @@ __all__ = ["film", "tone"]
 WIDTH, HEIGHT = 160, 120
 
 
-def film(path: Path, codec: str = "libx264", *, count: int = 30, b_frames: int = 0) -> Path:
+def film(
+    path: Path,
+    codec: str = "libx264",
+    *,
+    count: int = 30,
+    b_frames: int = 0,
+    size: tuple[int, int] = (WIDTH, HEIGHT),
+) -> Path:
+    width, height = size
     pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
     with av.open(str(path), "w") as container:
         stream: Any = container.add_stream(codec, rate=30)
-        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, pix_fmt
+        stream.width, stream.height, stream.pix_fmt = width, height, pix_fmt
         stream.codec_context.gop_size = 10
         stream.codec_context.max_b_frames = b_frames
         if codec == "libx264":
             stream.options = {"x264-params": "scenecut=0"}  # keyframes come when they are due
         for number in range(count):
-            luma = np.full((HEIGHT * 3 // 2, WIDTH), 40 + 5 * (number % 30), np.uint8)
-            luma[:, (11 * number) % WIDTH] = 230
+            luma = np.full((height * 3 // 2, width), 40 + 5 * (number % 30), np.uint8)
+            luma[:, (11 * number) % width] = 230
             frame = av.VideoFrame.from_ndarray(luma, format="yuv420p").reformat(format=pix_fmt)
             frame.pts = number
             container.mux(stream.encode(frame))
