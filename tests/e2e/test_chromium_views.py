@@ -158,6 +158,9 @@ async def test_on_upright_screens_pictures_take_the_room_that_stands_empty(
             for other in looked["others"]:
                 assert not any(_overlaps(view, other) for view in looked["views"]), f"{what}: {other['name']}"
                 assert other["y"] + other["height"] <= size[1] + 0.5, f"{what}: {other['name']}"
+            large = next(view for view in looked["views"] if view["place"] == "main")
+            margins = large["x"], size[0] - max(view["x"] + view["width"] for view in looked["views"])
+            assert abs(margins[0] - margins[1]) < 1, f"{what}: as much beside the views on the right as on the left"
             sticks = [each for each in looked["others"] if each["name"] == "a stick"]
             assert len(sticks) == (2 if role == "operator" else 0)
             assert all(stick["height"] >= 90 for stick in sticks), what

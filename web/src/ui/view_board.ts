@@ -201,6 +201,9 @@ export class ViewBoard {
       if (this.isLarge(view)) large = shape;
       else small.push(shape);
     }
+    const gauges = [...this.gauges.children]
+      .map((gauge) => gauge.clientHeight)
+      .filter((height) => height > 0);
     const card = this.movableCard();
     const hasCard = this.card?.dataset.beside === "true"; // now: the room has its height already
     const plan = planViews({
@@ -210,9 +213,10 @@ export class ViewBoard {
       gap,
       large,
       small,
-      gauges: [...this.gauges.children].map((gauge) => gauge.clientHeight).filter((height) => height > 0),
+      gauges,
       card,
     });
+    this.element.style.setProperty("--columns", rowColumns(small.length, gauges.length > 0));
     this.lay(plan, plan.run === "row" ? rowWidth(small, plan.size, gap) : 0);
   }
 
@@ -238,6 +242,12 @@ export class ViewBoard {
   private shapesNow(): string {
     return [...this.views.values()].map((view) => shapeOf(view).toFixed(3)).join(" ");
   }
+}
+
+/** Of a row: the last one takes the rest. A column of their own for gauges that are not there would leave a gap. */
+function rowColumns(small: number, hasGauges: boolean): string {
+  const before = hasGauges ? small : small - 1;
+  return before > 0 ? `repeat(${before}, auto) minmax(0, 1fr)` : "minmax(0, 1fr)";
 }
 
 /** Of small views of these shapes, with a gap behind each. */
