@@ -3,6 +3,8 @@
 What takes long runs first, files that need a browser between those that do not: these compute while the others wait.
 """
 
+import itertools
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,6 +21,7 @@ settings.load_profile("any-machine")  # no test asserts a time
 
 
 SLOW = ("slow", "browser", "long")
+_homes = itertools.count()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -52,4 +55,12 @@ def own_state_directory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[No
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LOCKSTEP_STATE_DIR", str(tmp_path_factory.mktemp("state")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state-home")))  # of bridges
+        yield
+
+
+@pytest.fixture(autouse=True)
+def own_state_home(own_state_directory: None) -> Iterator[None]:
+    """A bridge that was killed begins stopped the next time: the next test's has another place for its stop."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(Path(os.environ["XDG_STATE_HOME"]) / str(next(_homes))))
         yield

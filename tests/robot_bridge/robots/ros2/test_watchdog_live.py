@@ -28,7 +28,7 @@ STAY = [0.0, 0.0]
 # `lockstep robot --ros2`, and one of its calls that hangs while the file `hang` is there.
 A_BRIDGE = """
 import ctypes, os, sys, time
-hang, how, settings = sys.argv[1:4]
+hang, how, settings, state = sys.argv[1:5]
 from robot_bridge.robots.ros2 import base_drive, robot
 
 class Robot(robot.Ros2Robot):
@@ -51,7 +51,7 @@ class Drive(base_drive.BaseDrive):
         super()._take(message)
 
 robot.Ros2Robot, robot.BaseDrive = Robot, Drive
-sys.argv[1:] = ["--ros2", settings, "--port", "0", "--json"]
+sys.argv[1:] = ["--ros2", settings, "--port", "0", "--json", "--state-dir", state]
 from robot_bridge.cli import main
 main()
 """
@@ -65,7 +65,8 @@ class RunningBridge:
 
 @asynccontextmanager
 async def bridge_that_hangs(how: str, directory: Path, node: RosRobot) -> AsyncIterator[RunningBridge]:
-    command = (ros_python(), "-c", A_BRIDGE, str(directory / "hang"), how, str(EXAMPLES / "base.yaml"))
+    files = (str(EXAMPLES / "base.yaml"), str(directory / "bridge-state"))
+    command = (ros_python(), "-c", A_BRIDGE, str(directory / "hang"), how, *files)
     async with running_process(*command, environment=node.environment) as (process, ready):
         host, _, port = ready["robot"].removeprefix("tcp://").rpartition(":")
         try:
