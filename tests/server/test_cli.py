@@ -110,6 +110,7 @@ async def test_a_port_in_use_is_said_clearly() -> None:
         (("up", "--ros2", "none.yaml", "--port", "0", "--robot-port", "0"), 4, "none.yaml: No such file"),
         (("up", "--robot-python", "/none/python", "--port", "0", "--robot-port", "0"), 4, "/none/python"),
         (("serve", "--board", "redis://h", "--public-url", "http://h"), 2, "--robot NAME=tcp://"),
+        (("serve", "--ice-host", "203.0.113.1"), 2, "the outer one of a one-to-one NAT belongs to --advertise"),
     ],
 )
 async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], code: int, words: str) -> None:
@@ -124,7 +125,6 @@ async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], 
     [
         (("--robot", "nonsense"), "is not tcp://host:port"),
         (("--ice-host", "example"), "ice_hosts"),
-        (("--ice-host", "203.0.113.1"), "the outer one of a one-to-one NAT belongs to --advertise"),
         (("--advertise", "example"), "advertise"),
         (("--port", "70000"), "65535"),
         (("--board", "redis://:a-password@h:port"), "board: Value error, the board is not redis://"),
