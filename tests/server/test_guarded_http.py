@@ -269,7 +269,7 @@ async def test_a_link_that_has_ended_is_a_strangers_and_no_longer_comes_first() 
 
 async def test_a_body_that_was_announced_does_not_keep_a_connection_that_was_answered() -> None:
     """One byte of it ends the server's own timer between two requests."""
-    async with guarded_console(request_timeout=0.3) as (rig, port):
+    async with guarded_console(request_timeout=1.5) as (rig, port):
         reader, writer = await _open(
             port, HEAD.replace(b"GET /healthz", b"POST /api/stop") + b"Content-Length: 9\r\n\r\n"
         )
