@@ -5,6 +5,7 @@ import os
 import signal
 import socket
 import sys
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 
@@ -75,7 +76,15 @@ async def test_a_bridge_that_dies_is_started_again_on_the_same_port(tmp_path: Pa
         assert any(stack.robot in line for line in stack.output)
 
 
-async def test_the_end_of_the_terminal_ends_the_console_in_order(tmp_path: Path) -> None:
+@pytest.fixture
+def hangups() -> Iterator[None]:
+    """What is started hears of the end of its terminal, also where the tests themselves run under nohup."""
+    before = signal.signal(signal.SIGHUP, lambda *_: None)  # a handler: a program that is started has the default again
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+async def test_the_end_of_the_terminal_ends_the_console_in_order(tmp_path: Path, hangups: None) -> None:
     async with running_stack(tmp_path) as stack:
         stack.process.send_signal(signal.SIGHUP)
         async with asyncio.timeout(PATIENCE):
