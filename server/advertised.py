@@ -15,7 +15,7 @@ FIELDS = 8  # candidate:FOUNDATION COMPONENT TRANSPORT PRIORITY ADDRESS PORT typ
 
 
 def with_advertised(sdp: str, addresses: Sequence[str]) -> str:
-    """`sdp` of ours, with the outer candidates behind each inner one."""
+    """`sdp` of ours, with the outer candidates after each inner one."""
     if not addresses:
         return sdp
     lines = []
@@ -27,9 +27,9 @@ def with_advertised(sdp: str, addresses: Sequence[str]) -> str:
 
 
 def advertised_candidates(candidate: str, addresses: Sequence[str]) -> list[str]:
-    """What the NAT makes of "candidate:…": as many as there are outer addresses of its family.
+    """The outer candidates for an inner one, "candidate:…": one for each of `addresses` of its family.
 
-    None where it is no host candidate, or on loopback, which no NAT leads to.
+    Empty for what is no host candidate, and for loopback, where no NAT leads.
     """
     words = candidate.split()
     if len(words) < FIELDS or words[7] != "host":

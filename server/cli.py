@@ -105,7 +105,7 @@ IceHosts = Annotated[
 ]
 Advertise = Annotated[
     list[str] | None,
-    typer.Option(help="Outer address, from which a one-to-one NAT (as of a cloud) leads here; may be given again."),
+    typer.Option(help="Outer address of this machine behind a one-to-one NAT, as in a cloud; may be given again."),
 ]
 Quality = Annotated[
     Switch | None, typer.Option(help="Whether bitrate, rate and size of pictures follow the network; on unless set.")

@@ -35,7 +35,7 @@ class Faults:
     def uncaught(self, loop: object, context: dict[str, Any]) -> None:
         """For `loop.set_exception_handler`: what nobody awaited, and what a callback of the loop raised."""
         error = context.get("exception")
-        if isinstance(error, InvalidStateError):
+        if isinstance(error, InvalidStateError) and "future" in context:
             return  # aiortc goes on connecting a peer that has ended, in a task that nobody can await; it is no fault
         if not isinstance(error, BaseException):
             error = RuntimeError(str(context.get("message", "")))

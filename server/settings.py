@@ -41,7 +41,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     link_tls_key: Path | None = None
     link_tls_ca: Path | None = None  # signed the bridge's certificate; None: one that this machine trusts
     ice_hosts: NameList = ()  # of this machine, for media; empty: all interfaces, and loopback when bound to it
-    advertise: NameList = ()  # further addresses for media, that a one-to-one NAT leads to those of this machine
+    advertise: NameList = ()  # outer addresses of this machine, where it is behind a one-to-one NAT
     allowed_origins: NameList = ()  # other origins whose pages may use the HTTP API, "https://example.org"
     log_format: LogFormat = LogFormat.TEXT
     state_dir: Path | None = None  # signing key, invitations, audit log; None: ~/.local/state/lockstep

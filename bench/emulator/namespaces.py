@@ -48,10 +48,10 @@ class Namespaces:
     """
 
     def __init__(self, profile: Profile | str, *, seed: int = 1, cloud: str | None = None) -> None:
-        """`cloud`: the outer address, and the only one, by which the robot's side is reached.
+        """`cloud`: the outer address of the robot's side, which is reached by no other.
 
-        So it is with a machine in a cloud, which knows but its inner address. The operator's side then stands behind a
-        firewall, as a browser at home.
+        It is then like a machine in a cloud, which only knows its inner address, and the operator's side stands behind
+        a firewall, like a browser at home.
         """
         self._nat = OneToOneNat(ROBOT_ADDRESS, cloud) if cloud is not None else None
         self._firewall = Firewall() if cloud is not None else None

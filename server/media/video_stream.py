@@ -27,10 +27,8 @@ from server.media.stream import Encoded, Stream
 __all__ = ["VideoStream"]
 
 PACKETISE = {"H264": packetise_h264, "VP8": packetise_vp8}
-QUIET_SECONDS, QUIET_PICTURES = (
-    2.0,
-    3,
-)  # without a picture, and at least so many in a row missing: the camera gives none
+# A camera gives nothing when none came for so long, and at least so many in a row are missing.
+QUIET_SECONDS, QUIET_PICTURES = 2.0, 3
 
 
 class SourcePicture:

@@ -1,3 +1,5 @@
+import asyncio
+import gc
 from typing import Any
 
 from aiortc import InvalidStateError
@@ -31,10 +33,26 @@ def test_every_fault_is_counted_and_a_place_that_goes_on_failing_does_not_flood_
     assert len(logs) == 1
 
 
-def test_that_aiortc_goes_on_connecting_a_peer_that_has_ended_is_no_fault() -> None:
+async def test_that_aiortc_goes_on_connecting_a_peer_that_has_ended_is_no_fault() -> None:
+    """In a task that nobody awaits. What a callback of ours raises by that name is one."""
     faults, registry, _ = _faults()
-    faults.uncaught(object(), {"message": "", "exception": InvalidStateError("RTCIceTransport is closed")})
+
+    def fail() -> None:
+        raise InvalidStateError("RTCIceTransport is closed")
+
+    async def connect() -> None:
+        fail()
+
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(faults.uncaught)
+    task = loop.create_task(connect())
+    await asyncio.wait([task])
+    del task
+    gc.collect()
     assert _count(registry, "loop") is None
+    loop.call_soon(fail)
+    await asyncio.sleep(0)
+    assert _count(registry, "loop") == 1
 
 
 def test_what_nobody_awaited_is_a_fault_of_the_loop() -> None:
