@@ -92,6 +92,8 @@ def _vp8_starts(payload: bytes) -> bool:
 
 def _vp8_part(payload: bytes, *, first: bool) -> bytes:
     """Without its descriptor (RFC 7741 4.2)."""
+    if not payload:
+        raise BadPayload("too short")
     if first != _vp8_starts(payload):
         raise BadPayload("a picture that does not begin with its first packet")
     at = 1

@@ -62,6 +62,7 @@ def test_a_vp8_picture_of_several_packets_and_its_kind() -> None:
         ("VP8", [b"\x90\x80"]),  # nothing behind the descriptor
         ("VP8", [b"\x10"]),
         ("VP8", [b""]),
+        ("VP8", [b"\x10ab", b""]),
     ],
 )
 def test_what_is_none_of_its_codec_is_refused(codec: PictureCodec, payloads: list[bytes]) -> None:
