@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from client.console import Console
 from client.errors import ConsoleLost
+from server.console_name import console_name
 from tests.robot_bridge.bridge_model import MotionWitness
 from tests.server.rig import PATIENCE
 
@@ -228,6 +229,11 @@ class ConsoleProcess:
     @property
     def url(self) -> str:
         return self.links["console"]
+
+    @property
+    def name(self) -> str:
+        """What it is called at the bridge."""
+        return console_name(self._state)
 
     def token(self, role: str) -> dict[str, str]:
         return {"Authorization": f"Bearer {self.links[role].partition('#token=')[2]}"}

@@ -8,7 +8,7 @@ import asyncio
 import secrets
 import signal
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
 from random import Random
@@ -19,7 +19,10 @@ import pytest
 
 from client.console import Console
 from client.errors import CommandRefused, SeatRefused, StopUnconfirmed
-from robot_bridge.protocol.messages import Feedback
+from robot_bridge.link_client import RobotLink
+from robot_bridge.protocol.errors import LinkRefused
+from robot_bridge.protocol.messages import Command, Feedback, LinkMessage, Refusal
+from robot_bridge.protocol.serial import event_after
 from robot_bridge.stop_latch import LEAST_STOP
 from tests.safety.live_world import ConsoleProcess, Judge, LinkPath, Player, Robot
 from tests.server.rig import PATIENCE
@@ -42,6 +45,8 @@ FAULTS = [
     ["disk_fails", "drive", "end_bridge", "drive"],
     ["drive+lock", "reset_locked", "arm", "unlock", "drive"],
     ["lock", "kill_bridge", "reset_locked", "unlock", "seat", "drive"],
+    ["reset", "drive+intrude"],
+    ["reset", "another_console", "seat", "drive"],
 ]
 PLAIN = [
     ["stop_operator"],
@@ -104,10 +109,37 @@ class Session:
             await self._operator.do(lambda console: console.take_seat())
 
     async def intrude(self) -> None:
-        """Backwards, with an operator's link and without the seat."""
+        """With an operator's link and without the seat: neither a neutral command passes, nor one that moves."""
         await self.linked()
-        with suppress(CommandRefused):
-            await self._intruder.do(lambda console: _forward(console, -FASTEST))
+        for verb in (lambda console: console.arm(), lambda console: _forward(console, -FASTEST)):
+            with pytest.raises(CommandRefused) as refused:
+                await self._intruder.do(verb)
+            assert refused.value.reason in ("no_seat", "link_down", "stopped")
+
+    async def another_console(self) -> None:
+        """It keeps no rules: it takes the robot, and moves it as soon as it has a feedback. The bridge lets it not."""
+        await self.away()
+        async with self._robot_link() as link:
+            feedback = await _heard(link, lambda message: isinstance(message, Feedback))
+            assert isinstance(feedback, Feedback)
+            event = event_after(feedback.event)
+            values = [FASTEST, *[0.0] * (len(feedback.axes) - 1)]
+            link.send(Command(event=event, issue=feedback.issue, nonce=feedback.nonce, values=values))
+            answer = await _heard(link, lambda message: getattr(message, "event", 0) == event)
+        assert isinstance(answer, Refusal)
+        assert answer.reason in ("not_neutral", "stopped")
+        await self.back()
+
+    @asynccontextmanager
+    async def _robot_link(self) -> AsyncIterator[RobotLink]:
+        """Under the name of the console, for which the bridge keeps the robot when its link breaks."""
+        async with asyncio.timeout(PATIENCE):
+            while True:
+                with suppress(LinkRefused):  # until the bridge knows that the other is gone
+                    async with RobotLink("127.0.0.1", self._path.target, "operator", name=self._console.name) as link:
+                        yield link
+                        return
+                await asyncio.sleep(0.02)
 
     # STOP
 
@@ -210,7 +242,7 @@ class Session:
     async def back(self) -> None:
         self._path.away = False
         await self.linked()
-        await self._kept_stops_arrive()
+        await self.kept_stops_arrive()
 
     async def kill_bridge(self) -> None:
         await self._restart_bridge(signal.SIGKILL)
@@ -232,9 +264,9 @@ class Session:
         await self._console.end(how)
         self._path.away = False
         await self._console.start()
-        await self._kept_stops_arrive()
+        await self.kept_stops_arrive()
 
-    async def _kept_stops_arrive(self) -> None:
+    async def kept_stops_arrive(self) -> None:
         """Nobody presses again: what was promised comes by itself."""
         kept, self.kept = self.kept, []
         await self._robot.until(lambda: self._robot.numbers.keys() >= set(kept))
@@ -271,6 +303,13 @@ class Session:
 
     async def step(self, words: str) -> None:
         await asyncio.gather(*(getattr(self, word)() for word in words.split("+")))
+
+
+async def _heard(link: RobotLink, wanted: Callable[[LinkMessage], bool]) -> LinkMessage:
+    async with asyncio.timeout(PATIENCE):
+        while not wanted(message := await anext(link)):
+            pass
+    return message
 
 
 async def _forward(console: Console, speed: float) -> Feedback:
@@ -316,6 +355,7 @@ async def test_in_a_random_life_the_robot_moves_only_as_the_rules_of_a_stop_let_
     async with running_session(tmp_path, random) as (session, robot):
         for step in steps:
             await session.step(step)
+        await session.kept_stops_arrive()
     judge = Judge()
     for record in robot.records:
         judge.read(record)
