@@ -331,7 +331,8 @@ class Connection:
         gate = CommandGate(self.options.pacing, self.options.tolerance["video"], 1 / rate)
         pilot = Pilot(gate, [axis.rest for axis in description.axes])
         self._driver = Driver(pilot, lambda message: self._peer.send("control", message))
-        self.session.seated = pilot.seated
+        self.session.seated, self.session.unseated = pilot.seated, pilot.unseated
+        pilot.holds_seat = self.session.holds_seat
         if self._early_feedback is not None:
             self._take_feedback(self._early_feedback)
 

@@ -88,6 +88,7 @@ class Pilot:
         self.timer = RepeatTimer()
         self.armed = False
         self.ready = False  # whether the robot may move: a neutral command was executed since one was last needed
+        self.holds_seat = True  # else what is executed is somebody else's
         self.newest: Feedback | None = None
         self.repeats = 0  # sent because no answer came in time
         self.echoes = 0  # sent because the path loses packets
@@ -129,7 +130,13 @@ class Pilot:
 
     def seated(self) -> None:
         """This console holds the control seat from now on."""
+        self.holds_seat = True
         self.hold_back("not_neutral")
+
+    def unseated(self) -> None:
+        """This console does not hold the control seat, or not any more."""
+        self.holds_seat = False
+        self.hold_back("no_seat")
 
     def hold_back(self, reason: RefusalReason) -> None:
         """The robot may not move until somebody arms again: gives up what is wanted or in flight, for `reason`."""
@@ -337,6 +344,9 @@ class Pilot:
     # What follows
 
     def _landed(self, flight: _Flight, feedback: Feedback, now: float) -> None:
+        if not self.holds_seat:
+            self.hold_back("no_seat")  # that event was somebody else's command
+            return
         self._flight = None
         self._prove(flight, feedback)
         taken = now - flight.first_sent_at

@@ -34,6 +34,7 @@ class Session:
     Attributes:
         welcome: who this connection is; None before the console said so
         seated: called when this connection becomes the holder of the seat
+        unseated: called when it is the holder no longer
     """
 
     def __init__(
@@ -49,6 +50,7 @@ class Session:
         self.participants = Participants(participants=[])
         self.notes: deque[SharedNote] = deque(maxlen=KEPT_NOTES)
         self.seated: Callable[[], None] = _ignore
+        self.unseated: Callable[[], None] = _ignore
         self._send = send
         self._until = until
         self._refusals: deque[Refusal] = deque(maxlen=16)  # of requests, not of commands
@@ -77,6 +79,8 @@ class Session:
                 held, self.seat = self.holds_seat, message
                 if self.holds_seat and not held:
                     self.seated()
+                elif held and not self.holds_seat:
+                    self.unseated()
 
     def stop_shown(self, stop: StopState) -> None:
         """What the robot says of its stop now."""

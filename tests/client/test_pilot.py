@@ -169,6 +169,31 @@ def test_arming_sends_one_neutral_command_and_is_done_with_its_feedback() -> Non
     assert pilot.due(10.0) == []
 
 
+@pytest.mark.parametrize("what", ["arm", "drive"])
+def test_an_event_that_somebody_else_executed_is_no_answer_to_a_command_without_the_seat(what: str) -> None:
+    pilot = new_pilot()
+    pilot.unseated()
+    pilot.outcomes()
+    ticket = pilot.arm() if what == "arm" else pilot.intend(FAST, 0.0)
+    assert [each.event for each in commands(pilot.due(0.0))] == [2]
+    pilot.feedback(feedback(2), 0.01)
+    [outcome] = pilot.outcomes()
+    assert (outcome.ticket, outcome.feedback) == (ticket, None)
+    assert outcome.refusal is not None
+    assert outcome.refusal.reason == "no_seat"
+    assert not pilot.ready
+    assert pilot.due(10.0) == []
+
+
+def test_whoever_loses_the_seat_hears_at_once_that_a_command_in_flight_was_not_taken() -> None:
+    pilot = new_pilot()
+    ticket = pilot.intend(FAST, 0.0)
+    pilot.due(0.0)
+    pilot.unseated()
+    assert [(each.ticket, each.refusal and each.refusal.reason) for each in pilot.outcomes()] == [(ticket, "no_seat")]
+    assert pilot.due(10.0) == []
+
+
 def test_arming_goes_on_over_a_refusal_that_fresh_feedback_cures_and_until_the_robot_asks_for_nothing_more() -> None:
     pilot = new_pilot()
     pilot.seated()

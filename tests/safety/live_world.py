@@ -18,7 +18,7 @@ from random import Random
 from typing import Any, TypeVar
 
 from client.console import Console
-from client.errors import ConsoleLost
+from client.errors import ConnectFailed, ConsoleLost
 from server.console_name import console_name
 from tests.robot_bridge.bridge_model import MotionWitness
 from tests.server.rig import PATIENCE
@@ -40,22 +40,33 @@ class LinkPath:
         self.port = 0
         self.away = False  # nothing comes through
         self._ends: set[asyncio.StreamWriter] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    async def close(self) -> None:
+        self.away = True
+        self.cut()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def cut(self) -> None:
         for end in self._ends:
             end.transport.abort()
 
-    async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if self.away:
-            writer.transport.abort()
-            return
+    def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.get_running_loop().create_task(self._join(reader, writer), name="link path")
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._ends.add(writer)
         try:
             other_reader, other = await asyncio.open_connection("127.0.0.1", self.target)
-            self._ends.add(other)
-            await asyncio.gather(self._pass_on(reader, other), self._pass_on(other_reader, writer))
         except OSError:
             writer.transport.abort()
+            return
+        self._ends.add(other)
+        if self.away:
+            self.cut()
+        await asyncio.gather(self._pass_on(reader, other), self._pass_on(other_reader, writer))
 
     async def _pass_on(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with suppress(OSError):
@@ -291,16 +302,21 @@ class Player:
         self._link = link
         self._name = name
         self._console: Console | None = None
+        self._connecting = asyncio.Lock()
 
     async def do(self, verb: Callable[[Console], Awaitable[Result]]) -> Result:
         async with asyncio.timeout(3 * PATIENCE):
+            console: Console | None = None
             while True:
-                if self._console is None:
-                    self._console = await self._connected()
                 try:
-                    return await verb(self._console)
+                    async with self._connecting:  # two steps at the same time share a connection
+                        console = self._console = self._console or await self._connected()
+                    return await verb(console)
                 except ConsoleLost:
-                    await self.leave()
+                    if self._console is console:
+                        await self.leave()
+                except ConnectFailed:
+                    await asyncio.sleep(0.05)  # the console starts again
 
     async def _connected(self) -> Console:
         console = Console(self._link, video=False, audio=False, name=self._name, silence_seconds=LOST_AFTER)

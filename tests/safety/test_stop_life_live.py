@@ -324,8 +324,8 @@ async def running_session(directory: Path, random: Random) -> AsyncIterator[tupl
         await robot.start()
         stack.push_async_callback(robot.end, signal.SIGTERM)
         server = await asyncio.start_server(path.accept, "127.0.0.1", 0)
+        stack.push_async_callback(path.close)
         stack.callback(server.close)
-        stack.callback(path.cut)
         path.port = server.sockets[0].getsockname()[1]
         console = ConsoleProcess(directory / "console", path)
         await console.start()
