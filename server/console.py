@@ -48,7 +48,7 @@ from server.channels import ChannelName
 from server.command_desk import Absorbed, Answer, CommandDesk, Forward, ForwardRest, Refuse, RestOutcome
 from server.errors import ChannelError, Flood, Silenced
 from server.event_clock import EventClock
-from server.feedback_fanout import FeedbackFanout
+from server.feedback_fanout import FeedbackFanout, FeedbackReceiver
 from server.feedback_viewer import FeedbackViewer, NoViewer
 from server.metrics import Metrics
 from server.peer import Peer
@@ -116,7 +116,9 @@ class Console:
         self.stops = StopService(
             self.robot, stops, self.peers, self.clock, self._holder, self.audit, metrics, self._tap, silenced
         )
-        self._fanout = FeedbackFanout(settings.observer_feedback_hz, self.peers.drivers, self.peers.observers)
+        self._fanout = FeedbackFanout(
+            settings.observer_feedback_hz, self._is_driven_by, self.peers.drivers, self.peers.observers
+        )
         self._forwarded_at = 0.0  # when the command in flight left
         self._shown_stop = StopState()  # what everyone was told last
         self._link_was_up = False
@@ -373,7 +375,11 @@ class Console:
 
     def _joined(self, peer: Peer) -> None:
         peer.silenced = self.stops.is_silenced(peer.identity.token_id)
+        peer.drives(False)
         self.people.joined(peer)
+
+    def _is_driven_by(self, peer: FeedbackReceiver) -> bool:
+        return isinstance(peer, Peer) and self.seat.rules.holds(peer.id)
 
     def _holder(self) -> str:
         return self.seat.rules.holder

@@ -1,9 +1,11 @@
-"""Feedback to everyone: operators at once, observers at a bounded rate, the newest only.
+"""Feedback to everyone: whoever drives at once, others who may drive in slices, observers at a bounded rate besides.
+
+Whoever does not drive gets the newest only.
 
 The more observers there are, the less often each is served, down to half the rate.
 
 `FeedbackPace` says when; `FeedbackFanout` sends. Sending to a peer costs a fraction of a millisecond in Python, so a
-hundred observers are served in small slices, and the operator's commands are handled between them.
+hundred peers are served in small slices, and the operator's commands are handled between them.
 """
 
 import asyncio
@@ -62,19 +64,49 @@ class FeedbackFanout:
     def __init__(
         self,
         rate: float,
+        drives: Callable[[FeedbackReceiver], bool],
         operators: Callable[[], Sequence[FeedbackReceiver]],
         observers: Callable[[], Sequence[FeedbackReceiver]],
     ) -> None:
+        """`drives`: whether this one of the `operators` does; one link may have a hundred of them that do not."""
         self._pace = FeedbackPace(rate)
+        self._drives = drives
         self._operators = operators
         self._observers = observers
         self._offered = asyncio.Event()
+        self._newest = ""
+        self._behind: dict[FeedbackReceiver, None] = {}  # operators that have not got the newest yet, in order
+        self._asked = False  # for a turn
 
     def publish(self, text: str) -> None:
+        self._newest = text
         for peer in self._operators():
-            peer.send_feedback(text)
+            if self._drives(peer):
+                peer.send_feedback(text)
+                self._behind.pop(peer, None)
+            else:
+                self._behind[peer] = None
+        self._ask()
         self._pace.offer(text)
         self._offered.set()
+
+    def _ask(self) -> None:
+        if self._behind and not self._asked:
+            self._asked = True
+            turns_of_loop().ask(self._serve_operators)
+
+    def _serve_operators(self) -> None:
+        self._asked = False
+        turns = turns_of_loop()
+        try:
+            while self._behind:
+                peer = next(iter(self._behind))
+                del self._behind[peer]
+                peer.send_feedback(self._newest)
+                if turns.is_over():
+                    break
+        finally:
+            self._ask()
 
     async def run(self) -> None:
         loop = asyncio.get_running_loop()

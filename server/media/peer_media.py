@@ -94,7 +94,7 @@ class PeerMedia:
         """Whether this peer holds the control seat: the operator's tier is made for who does."""
         self.quality.drives = holds_seat
         for delivery in self._deliveries:
-            delivery.target.priority = holds_seat or self.quality.operator
+            delivery.target.priority = holds_seat
 
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
         """Call `tell` when something else was decided for this peer's pictures."""

@@ -45,9 +45,11 @@ from server.media.settings import MediaSettings
 from server.media.sources.source_url import SourceSpec
 from server.media.video_stream import VideoStream
 from server.media.voice_private import VoicePacket, take_voice
+from server.token_bucket import TokenBucket
 
 __all__ = ["MediaPlane", "MediaSettings", "PeerMedia"]
 
+NOT_DRIVING_RATE = 1000.0  # Hz, datagrams of all together who may drive and do not, before they wait as observers' do
 MAX_LINK_TIME = 1e9  # s; no monotonic clock gets there, and NaN is not below it
 
 AnyStream = VideoStream | AudioStream
@@ -81,6 +83,7 @@ class MediaPlane:
         self._loop_turns = turns_of_loop()
         self._fan_out = FanOut(self._loop_turns)
         self._turns = ReceiveTurns(self._loop_turns)
+        self._not_driving = TokenBucket(NOT_DRIVING_RATE, NOT_DRIVING_RATE, time.monotonic())
         self._quality = QualityDesk(
             settings,
             QualityMetrics(metrics_registry),
@@ -200,11 +203,11 @@ class MediaPlane:
 
         The i-th video section gets the i-th camera, the i-th audio section the i-th microphone; sections without
         one, or without a codec in common, are answered inactive. `priority` is for the operator: served first and at
-        once. `waits`: its datagrams take observers' turns. `trailer` asks for the trailer carrier; otherwise the
-        offer's header extensions decide. `thumbnail`: the first camera alone, in the lowest tier. `voice` takes the
-        peer's own sound, from the first audio section in which it would only send.
+        once. `waits`: its datagrams take observers' turns; without it those do that are too many, unless it drives.
+        `trailer` asks for the trailer carrier; otherwise the offer's header extensions decide. `thumbnail`: the first
+        camera alone, in the lowest tier. `voice` takes the peer's own sound, from the first audio section in which it
+        would only send.
         """
-        self._guard(pc, self._turns if waits else None)
         extensions = offered_extensions(offer_sdp)
         sources: dict[str, Iterator[AnyStream]] = {
             kind: iter([stream for stream in self._streams.values() if stream.kind == kind][: 1 if thumbnail else None])
@@ -212,6 +215,7 @@ class MediaPlane:
         }
         deliveries: list[Delivery] = []
         peer = PeerMedia(deliveries, self._peer_quality(pc, priority), self._detached)
+        self._guard(pc, None if waits else lambda: peer.quality.drives or self._may_go_at_once())
         if thumbnail and self._settings.quality:
             peer.quality.stay_low()
         for transceiver in pc.getTransceivers():
@@ -246,7 +250,7 @@ class MediaPlane:
             for stream in self._streams.values()
             for codec in [stream.codec_in_use(camera_codec if stream.kind == "video" else "")]
         ]
-        self._guard(pc, self._turns)
+        self._guard(pc)
         deliveries: list[Delivery] = []
         peer = PeerMedia(deliveries, self._peer_quality(pc, priority=False), self._detached)
         peer.quality.relays = True
@@ -302,11 +306,17 @@ class MediaPlane:
 
     def guard_publisher(self, pc: RTCPeerConnection) -> None:
         """What a publisher sends waits for its turn among observers. Call after setRemoteDescription(offer)."""
-        self._guard(pc, self._turns)
+        self._guard(pc)
 
-    def _guard(self, pc: RTCPeerConnection, turns: ReceiveTurns | None) -> None:
-        on_socket = self._loop_turns.yield_to if turns is None else None
-        guard_transports(pc, lambda kind: self._metrics.malformed.labels(kind).inc(), turns, on_socket)
+    def _guard(self, pc: RTCPeerConnection, at_once: Callable[[], bool] | None = None) -> None:
+        """Without `at_once` everything that this peer sends waits for its turn."""
+        on_socket = None if at_once is None else self._loop_turns.yield_to
+        on_error = self._metrics.malformed.labels
+        guard_transports(pc, lambda kind: on_error(kind).inc(), self._turns, on_socket, at_once)
+
+    def _may_go_at_once(self) -> bool:
+        """Whether one more datagram of those who may drive and do not is handled before all that waits."""
+        return self._not_driving.take(time.monotonic())
 
     def _peer_quality(self, pc: RTCPeerConnection, priority: bool) -> PeerQuality:
         cameras = min(

@@ -82,11 +82,13 @@ class _Intake(asyncio.Queue[Any]):
         on_error: Callable[[str], None],
         turns: ReceiveTurns | None,
         on_socket: Callable[[HasFileno], None] | None = None,
+        at_once: Callable[[], bool] | None = None,
     ) -> None:
         super().__init__()
         self._dtls = dtls
         self._on_error = on_error
         self._turns = turns  # None: everything at once
+        self._at_once = at_once  # whether the next one need not wait for its turn; None: every one waits
         self._on_socket = on_socket
         self._pair: Any = None  # of candidates, whose socket was told last
         self._later: deque[bytes] = deque()  # what waits for its turn
@@ -110,11 +112,18 @@ class _Intake(asyncio.Queue[Any]):
             self._on_error("receive_overflow")
         elif not self._is_idle():
             super().put_nowait(item)
-        elif self._turns is not None:
+        elif self._turns is not None and (self._later or not self._may_go_at_once()):
             self._later.append(item[0])
             self._turns.add(self)
         elif not self._handled(item[0]):
             super().put_nowait(item)
+
+    @property
+    def _always_waits(self) -> bool:
+        return self._turns is not None and self._at_once is None
+
+    def _may_go_at_once(self) -> bool:
+        return self._at_once is not None and self._at_once()
 
     def handle_next(self) -> bool:
         """In our turn: one of those that wait; whether there are more."""
@@ -143,7 +152,7 @@ class _Intake(asyncio.Queue[Any]):
                 self._take_record(data)
             elif 127 < data[0] < 192 and is_rtcp(data):
                 run_now(self._dtls._handle_rtcp_data(self._dtls._rx_srtp.unprotect_rtcp(data)))
-            elif 127 < data[0] < 192 and self._turns is not None:  # its turn: not in one go with all that wait
+            elif 127 < data[0] < 192 and self._always_waits:  # its turn: not in one go with all that wait
                 run_now(self._dtls._handle_rtp_data(self._dtls._rx_srtp.unprotect(data), 0))
             else:
                 return False
@@ -176,10 +185,12 @@ def guard_transports(
     on_error: Callable[[str], None],
     turns: ReceiveTurns | None = None,
     on_socket: Callable[[HasFileno], None] | None = None,
+    at_once: Callable[[], bool] | None = None,
 ) -> None:
     """Keep what a peer sends from ending its connection or filling memory; `on_error` gets a stable name to count.
 
-    With `turns` its datagrams are handled in its turn, without at once. `on_socket` gets the socket by which they come,
+    With `turns` its datagrams are handled in its turn, without at once; with `at_once` too, those at once for which it
+    says yes while none waits. `on_socket` gets the socket by which they come,
     and another one when that has changed.
 
     Call after setRemoteDescription, when the transports exist. Calling it again changes nothing.
@@ -190,7 +201,7 @@ def guard_transports(
     if pc.sctp is not None:
         transports.add(pc.sctp.transport)
     for transport in transports:
-        _guard_transport(transport, on_error, turns, on_socket)
+        _guard_transport(transport, on_error, turns, on_socket, at_once)
 
 
 def _estimate_nothing(receiver: RTCRtpReceiver) -> None:
@@ -204,13 +215,14 @@ def _guard_transport(
     on_error: Callable[[str], None],
     turns: ReceiveTurns | None,
     on_socket: Callable[[HasFileno], None] | None,
+    at_once: Callable[[], bool] | None,
 ) -> None:
     connection = dtls.transport._connection
     if isinstance(connection._queue, _Intake):
         return
     if not hasattr(dtls, HANDSHAKE_DONE):
         raise RuntimeError("aiortc moved __handshake_done; see server/media/receive_guard_private.py")
-    connection._queue = _Intake(dtls, on_error, turns, on_socket)
+    connection._queue = _Intake(dtls, on_error, turns, on_socket, at_once)
     receive = dtls._recv_next
 
     async def guarded() -> None:

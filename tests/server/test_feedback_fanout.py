@@ -19,6 +19,10 @@ class FakePeer:
         self.news.set()
 
 
+def _drives(peer: object) -> bool:
+    return True
+
+
 def test_the_first_feedback_is_due_at_once() -> None:
     pace = FeedbackPace(10)
     assert pace.wait(5.0) is None
@@ -62,9 +66,9 @@ def test_no_more_than_the_rate_leaves_and_the_newest_never_starves(gaps: list[fl
     assert pace.take(now + 0.2) is not None or left[-1] == now
 
 
-async def test_operators_are_served_at_once_and_observers_by_the_task() -> None:
+async def test_whoever_drives_is_served_at_once_and_observers_by_the_task() -> None:
     operator, observers = FakePeer(), [FakePeer() for _ in range(5)]
-    fanout = FeedbackFanout(1000, lambda: [operator], lambda: observers)
+    fanout = FeedbackFanout(1000, _drives, lambda: [operator], lambda: observers)
     task = asyncio.create_task(fanout.run())
     fanout.publish("a")
     assert operator.got == ["a"]
@@ -76,18 +80,50 @@ async def test_operators_are_served_at_once_and_observers_by_the_task() -> None:
     await asyncio.gather(task, return_exceptions=True)
 
 
-async def test_a_turn_of_the_loop_serves_observers_until_the_slice_is_over() -> None:
-    class SlowPeer(FakePeer):
-        """Sending to it takes longer than a slice."""
+class Expensive(FakePeer):
+    """Sending to it takes longer than a slice."""
 
+    def send_feedback(self, text: str) -> None:
+        super().send_feedback(text)
+        until = time.perf_counter() + SLICE
+        while time.perf_counter() < until:
+            pass
+
+
+async def test_a_hundred_operators_who_do_not_drive_take_one_slice_of_a_turn_and_get_the_newest() -> None:
+    driver, others = FakePeer(), [Expensive() for _ in range(100)]
+    fanout = FeedbackFanout(1000, lambda peer: peer is driver, lambda: [*others, driver], list)
+    fanout.publish("a")
+    assert driver.got == ["a"]
+    assert not any(other.got for other in others)
+    await asyncio.sleep(0)
+    assert [other.got for other in others] == [["a"]] + [[]] * 99
+    fanout.publish("b")
+    async with asyncio.timeout(20):
+        while not all(other.got and other.got[-1] == "b" for other in others):  # noqa: ASYNC110
+            await asyncio.sleep(0)
+    assert driver.got == ["a", "b"]
+    assert [len(other.got) for other in others] == [2] + [1] * 99
+
+
+async def test_a_fault_of_one_operator_takes_feedback_from_no_other() -> None:
+    class Broken(FakePeer):
         def send_feedback(self, text: str) -> None:
-            super().send_feedback(text)
-            until = time.perf_counter() + SLICE
-            while time.perf_counter() < until:
-                pass
+            raise RuntimeError("a fault of ours")
 
-    observers = [SlowPeer() for _ in range(3)]
-    fanout = FeedbackFanout(1000, list, lambda: observers)
+    caught: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: caught.append(context["exception"]))
+    other = FakePeer()
+    fanout = FeedbackFanout(1000, lambda peer: False, lambda: [Broken(), other], list)
+    fanout.publish("a")
+    async with asyncio.timeout(20):
+        await other.news.wait()
+    assert [str(each) for each in caught] == ["a fault of ours"]
+
+
+async def test_a_turn_of_the_loop_serves_observers_until_the_slice_is_over() -> None:
+    observers = [Expensive() for _ in range(3)]
+    fanout = FeedbackFanout(1000, _drives, list, lambda: observers)
     task = asyncio.create_task(fanout.run())
     fanout.publish("a")
     steps = []
@@ -104,7 +140,7 @@ async def test_a_failure_of_ours_ends_the_task_which_is_run_again() -> None:
         def send_feedback(self, text: str) -> None:
             raise RuntimeError("a fault of ours")
 
-    fanout = FeedbackFanout(1000, list, lambda: [Broken()])
+    fanout = FeedbackFanout(1000, _drives, list, lambda: [Broken()])
     fanout.publish("a")
     async with asyncio.timeout(20):
         with pytest.raises(RuntimeError, match="a fault of ours"):
@@ -113,7 +149,7 @@ async def test_a_failure_of_ours_ends_the_task_which_is_run_again() -> None:
 
 async def test_an_observer_gets_the_newest_of_a_burst() -> None:
     observer = FakePeer()
-    fanout = FeedbackFanout(50, list, lambda: [observer])
+    fanout = FeedbackFanout(50, _drives, list, lambda: [observer])
     task = asyncio.create_task(fanout.run())
     async with asyncio.timeout(20):
         fanout.publish("first")

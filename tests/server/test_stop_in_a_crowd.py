@@ -1,11 +1,11 @@
-"""An observer's STOP while a crowd of observers has more to say than the console can hear."""
+"""Who waits for whom while a crowd of observers has more to say than the console can hear."""
 
 import asyncio
 
 import pytest
 
-from robot_bridge.protocol.console import Role
-from robot_bridge.protocol.messages import Stop, StopTaken
+from robot_bridge.protocol.console import Pong, Role, Seat, SeatRequest
+from robot_bridge.protocol.messages import Ping, Stop, StopTaken
 from server.loop_turns import turns_of_loop
 from tests.server.rig import PATIENCE, running_rig
 
@@ -68,3 +68,30 @@ async def test_of_whoever_may_drive_it_waits_for_no_crowd_on_its_channel_either(
         for each in crowd:
             each.goes_on = False
         assert rounds < 1, "it waited for each of them once"
+
+
+async def test_of_operators_who_flood_only_whoever_drives_does_not_wait_for_the_crowd(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One link may have a hundred connections; what all of them may send at once is bounded in all."""
+    crowd = [_Talker() for _ in range(CROWD)]
+    async with running_rig() as rig, rig.peer("operator") as driver, rig.peer("operator") as other:
+        driver.send("session", SeatRequest())
+        async with asyncio.timeout(PATIENCE):
+            await driver.until(lambda each: isinstance(each, Seat) and each.holder != "")
+        turns = rig.services.media._turns
+        monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)
+        monkeypatch.setattr(rig.services.media._not_driving, "take", lambda now: False)  # others have sent too much
+        for each in crowd:
+            turns.add(each)
+        rounds = []
+        for peer in (driver, other):
+            before = sum(each.handled for each in crowd)
+            peer.send("control", Ping(id=7))
+            async with asyncio.timeout(PATIENCE):
+                await peer.until(lambda each: isinstance(each, Pong) and each.id == 7)
+            rounds.append((sum(each.handled for each in crowd) - before) / CROWD)
+        for each in crowd:
+            each.goes_on = False
+        assert rounds[0] < 1, "who drives waited for each of them once"
+        assert rounds[1] >= 0.9, "the other one went before them"

@@ -41,7 +41,9 @@ class Ends:
 
 @asynccontextmanager
 async def connected(
-    turns: ReceiveTurns | None = None, on_socket: Callable[[HasFileno], None] | None = None
+    turns: ReceiveTurns | None = None,
+    on_socket: Callable[[HasFileno], None] | None = None,
+    at_once: Callable[[], bool] | None = None,
 ) -> AsyncIterator[Ends]:
     client, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
     opened = asyncio.Event()
@@ -54,7 +56,7 @@ async def connected(
         async with asyncio.timeout(PATIENCE):
             await client.setLocalDescription(await client.createOffer())
             await server.setRemoteDescription(RTCSessionDescription(client.localDescription.sdp, "offer"))
-            guard_transports(server, errors.append, turns, on_socket)
+            guard_transports(server, errors.append, turns, on_socket, at_once)
             await server.setLocalDescription(await server.createAnswer())
             await client.setRemoteDescription(RTCSessionDescription(server.localDescription.sdp, "answer"))
             await opened.wait()
@@ -99,6 +101,30 @@ def test_before_the_connection_is_up_the_queue_is_bounded_and_still_ends() -> No
     queue.put_nowait(None)
     assert queue.qsize() == 1025
     assert errors == ["receive_overflow"] * (3000 - 1024) + ["datagram_size"] * 2
+
+
+async def test_what_need_not_wait_is_handled_at_once_unless_something_before_it_waits() -> None:
+    clock = [0.0]
+    turns = LoopTurns(lambda: clock[0])
+    urgent = [True]
+    async with connected(ReceiveTurns(turns), at_once=lambda: urgent[0]) as ends:
+        await exchanged(ends, "first")
+        handled: list[bytes] = []
+        intake = ends.intake
+        intake._handled = lambda data: handled.append(data) is None
+        intake.put_nowait((b"a", 1))
+        assert handled == [b"a"]
+        urgent[0] = False
+        intake.put_nowait((b"b", 1))
+        urgent[0] = True
+        intake.put_nowait((b"c", 1))
+        assert handled == [b"a"], "b waits for its turn, and c for b"
+        async with asyncio.timeout(PATIENCE):
+            while len(handled) < 3:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+        assert handled == [b"a", b"b", b"c"]
+        intake.put_nowait((b"d", 1))
+        assert handled[-1] == b"d"
 
 
 async def test_a_message_is_handled_in_the_turn_that_its_datagram_comes_in(monkeypatch: pytest.MonkeyPatch) -> None:
