@@ -205,7 +205,7 @@ class StopStore:
         try:
             data = os.pread(self._lock, MAX_BYTES, 0)
             return max(0, min(_read_reserved.decode(data).up_to, MAX_NUMBER))
-        except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             return 0
 
     def _read_note(self) -> str:

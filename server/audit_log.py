@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import msgspec
 import structlog
 
 from server.audit import AuditRecord
@@ -93,19 +94,25 @@ class AuditLog:
 def open_audit_log(
     directory: StateDir, settings: Settings, robot: str = "", signer: Signer | None = None
 ) -> Iterator[AuditLog]:
-    """Continues the numbers of the last run. Without a place for it, records stay in memory; `trouble` says why.
+    """Continues the numbers of the last run. Without a place for it, records stay in memory until there is one;
+    `trouble` says why.
 
     Args:
         signer: signs heads of it; None: they are not signed
     """
+
+    def store_at(path: Path) -> AuditStore:
+        anchors = AnchorFile(anchors_path(settings, directory.path), settings.audit_bytes)
+        return AuditStore(path, settings.audit_bytes, settings.audit_files, robot, signer, anchors)
+
     with ExitStack() as opened:
         try:
             path = opened.enter_context(directory.own_log("audit"))
-        except StateDirUnusable as error:
-            found = AuditLog(_Nowhere(error.reason), [])
+        except StateDirUnusable:
+            late = _LateFile(directory, store_at)
+            found = AuditLog(late, [], lambda: late.newest_anchor)
         else:
-            anchors = AnchorFile(anchors_path(settings, directory.path), settings.audit_bytes)
-            store = AuditStore(path, settings.audit_bytes, settings.audit_files, robot, signer, anchors)
+            store = store_at(path)
             found = AuditLog(store, last_records(path), lambda: store.newest_anchor)
         opened.callback(found.close)
         yield found
@@ -116,20 +123,48 @@ def anchors_path(settings: Settings, directory: Path) -> Path:
     return settings.audit_anchor or recordings_directory(settings.recording, directory) / ANCHORS_NAME
 
 
-class _Nowhere:
-    """Stands in for a file that cannot be had."""
+class _LateFile:
+    """Stands in for a file that could not be had at the start: each attempt to write looks for it anew.
 
-    def __init__(self, reason: str) -> None:
-        self._reason = reason
+    Blocks: used from the writer's thread only. Records that were numbered without knowing those on the disk get the
+    numbers behind them there.
+    """
+
+    def __init__(self, directory: StateDir, store_at: Callable[[Path], AuditStore]) -> None:
+        self._directory = directory
+        self._store_at = store_at
+        self._store: AuditStore | None = None
+        self._ahead = 0  # numbers on the disk before this run's first
+        self._held = ExitStack()  # the lock of the file
+
+    @property
+    def newest_anchor(self) -> Anchor | None:
+        return None if self._store is None else self._store.newest_anchor
 
     def write(self, records: list[AuditRecord]) -> None:
-        raise OSError(self._reason)
+        store = self._opened(records[0].n)
+        store.write([msgspec.structs.replace(record, n=record.n + self._ahead) for record in records])
+
+    def _opened(self, first: int) -> AuditStore:
+        if self._store is None:
+            with ExitStack() as opened:
+                try:
+                    store = self._store_at(opened.enter_context(self._directory.own_log("audit")))
+                except StateDirUnusable as error:
+                    raise OSError(error.reason) from error
+                self._ahead = max(0, store.last() - first + 1)
+                self._held = opened.pop_all()
+            self._store = store
+        return self._store
 
     def settle(self) -> None:
-        pass
+        if self._store is not None:
+            self._store.settle()
 
     def close(self) -> None:
-        pass
+        with self._held:
+            if self._store is not None:
+                self._store.close()
 
 
 def _ignore(trouble: str) -> None:

@@ -58,6 +58,12 @@ class AuditStore:
         if chatter:
             self._chatter.write(chatter)
 
+    def last(self) -> int:
+        """Number of the newest record on the disk; 0: there is none. Raises OSError."""
+        self._own.open()
+        self._chatter.open()
+        return max(self._own.last, self._chatter.last)
+
     def settle(self) -> None:
         """Nothing waits: sign what is written, when that is due."""
         if time.monotonic() - self._anchored_at >= ANCHOR_SECONDS:
@@ -87,6 +93,8 @@ class AuditStore:
                 log.error("signed heads of the audit cannot be kept", path=path, detail=error.strerror or str(error))
             self._trouble = True
         else:
+            if self._trouble:
+                log.info("signed heads of the audit are kept again", path=str(self._anchors.path))
             self._trouble = False
 
     def _is_anchored(self) -> bool:

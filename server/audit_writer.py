@@ -91,9 +91,9 @@ class AuditWriter:
             return True
         try:
             self._file.write(list(waiting))
-        except OSError as error:
+        except Exception as error:  # not the disk's alone: this thread must not end without a word
             self.failures += 1
-            self._report(error.strerror or str(error))
+            self._report(getattr(error, "strerror", None) or str(error) or type(error).__name__)
             return False
         waiting.clear()
         self._report("")

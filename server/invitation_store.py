@@ -238,7 +238,7 @@ class InvitationStore:
         data = self._directory.read(SEEN)
         try:
             return 0.0 if data is None else _seen.decode(data).seen
-        except (msgspec.DecodeError, UnicodeError) as error:
+        except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             raise StateDamaged(self._directory.path / SEEN, f"not understood: {error}") from error
 
     def _write_seen(self) -> float:

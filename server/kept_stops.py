@@ -71,7 +71,7 @@ class KeptStops:
                 press = _decoder.decode(file.read(MAX_BYTES))
             if self._path(press.id) == path and len(press.id) <= MAX_GIVEN:  # of a bridge's own any text
                 return press
-        except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             log.error("a kept stop cannot be read", error="kept_stop_unreadable", path=path.name, detail=str(error))
         with suppress(OSError):  # then it is found, and said, at the next start too
             os.replace(path, self._path(press_id("", path.stem)))

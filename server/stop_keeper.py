@@ -96,31 +96,37 @@ class StopKeeper:
             self._write_last()
 
     async def _settle(self) -> bool:
-        """Make the disk what it should be. False: try again later."""
+        """Make the disk what it should be. False: try again later. What fails for one press keeps no other from it."""
         missing = [press for press in self._wanted.values() if press.id not in self._written]
         over = [press for press in self._written if press not in self._wanted]
-        try:
-            for press in missing:
+        trouble = ""
+        for press in missing:
+            try:
                 await asyncio.to_thread(self._files.keep, press)
+            except OSError as error:
+                trouble = error.strerror or str(error)
+                self._tell(trouble)
+            else:
                 self._written.add(press.id)
-                self._tell("")
-            for id_ in over:
+                self._tell(trouble)
+        for id_ in over:
+            try:
                 await asyncio.to_thread(self._files.drop, id_)
+            except OSError as error:
+                trouble = error.strerror or str(error)
+            else:
                 self._written.discard(id_)
-        except OSError as error:
-            self._tell(error.strerror or str(error))
-            return False
-        self._tell("")
-        return True
+        self._tell(trouble)
+        return not trouble
 
     def _write_last(self) -> None:
         """Nothing else runs any more that a slow disk could hold up."""
-        try:
-            for press in self.presses.pending:
-                if press.id not in self._written:
+        for press in self.presses.pending:
+            if press.id not in self._written:
+                try:
                     self._files.keep(press)
-        except OSError as error:
-            log.error("stops cannot be kept on disk", error="stops_unwritable", detail=str(error))
+                except OSError as error:
+                    log.error("stops cannot be kept on disk", error="stops_unwritable", detail=str(error))
 
     def _tell(self, trouble: str) -> None:
         changed, self.trouble = trouble != self.trouble, trouble

@@ -140,3 +140,21 @@ def test_while_the_disk_is_full_every_record_is_written_later_or_counted_as_lost
     assert writer.lost > 0
     assert len(file.written) + writer.lost == 3 * MAX_WAITING
     assert file.written == sorted(file.written)
+
+
+def test_a_record_that_no_file_can_hold_is_told_and_the_thread_goes_on(
+    file: FakeFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told, write = Told(), file.write
+
+    def broken(records: list[AuditRecord]) -> None:
+        raise ValueError("surrogates not allowed")
+
+    monkeypatch.setattr(file, "write", broken)
+    writer = _writer(file, told)
+    writer.append(_record(1))
+    told.until(["surrogates not allowed"])
+    monkeypatch.setattr(file, "write", write)
+    told.until(["surrogates not allowed", ""])
+    writer.close()
+    assert file.written == [1]

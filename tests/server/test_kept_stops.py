@@ -46,7 +46,9 @@ def test_a_press_id_of_any_text_names_a_file_of_this_directory(tmp_path: Path, n
     assert kept.load() == []
 
 
-@pytest.mark.parametrize("damage", [b"", b"{", b"\xff\xff", b"[]", b'{"id": "another"}', b"{" * 100_000])
+@pytest.mark.parametrize(
+    "damage", [b"", b"{", b"\xff\xff", b"[]", b'{"id": "another"}', b"{" * 100_000, b'{"x":' + b"[" * 16_000]
+)
 def test_a_file_that_cannot_be_read_is_a_stop_too_and_goes_when_that_has_arrived(tmp_path: Path, damage: bytes) -> None:
     kept = _kept(tmp_path)
     kept.keep(_press("a"))

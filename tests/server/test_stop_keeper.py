@@ -1,4 +1,5 @@
 import asyncio
+import hashlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -7,7 +8,7 @@ import pytest
 
 from robot_bridge.protocol.messages import StopTaken
 from server import stop_keeper
-from server.kept_stops import KeptStops
+from server.kept_stops import KeptStops, kept_stops_place
 from server.stop_keeper import KEPT, KEPT_IN_MEMORY, StopKeeper
 from server.stop_presses import Press
 from tests.server.rig import PATIENCE
@@ -120,3 +121,33 @@ async def test_whoever_pressed_is_told_how_long_a_stop_is_kept(tmp_path: Path) -
             keeper.keep(press)
             assert await keeper.kept_words(press.id) == words
             assert "until this console ends" in words or lasts
+
+
+async def test_what_cannot_be_written_or_dropped_of_one_press_keeps_no_other_stop_from_the_disk_nor_on_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop_keeper, "RETRY_SECONDS", 0.01)
+
+    def file_of(press: str) -> Path:
+        name = hashlib.sha256(press.encode()).hexdigest()[:32]
+        return kept_stops_place(tmp_path, ROBOT) / f"{name}.json"
+
+    (file_of("a") / "in it").mkdir(parents=True)  # a folder in its place
+    keeper = StopKeeper(tmp_path, ROBOT)
+    task = asyncio.create_task(keeper.run())
+    keeper.keep(_pressed(keeper, "a"))
+    keeper.keep(_pressed(keeper, "b"))
+    async with asyncio.timeout(PATIENCE):
+        while not file_of("b").exists() or keeper.trouble != "Is a directory":  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    async with _running(tmp_path) as keeper:
+        found = keeper.presses.pending
+        assert len(found) == 2, "whatever is in the place of a stop is one"
+        for press in found:
+            keeper.presses.taken(StopTaken(press=press.id, number=1))
+            keeper.settled(press.id)
+        async with asyncio.timeout(PATIENCE):
+            while file_of("b").exists() or not keeper.trouble:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
