@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from robot_bridge.protocol.console import Pong, Role, Seat, SeatRequest
-from robot_bridge.protocol.messages import Ping, Stop, StopTaken
+from robot_bridge.protocol.console import Role, Seat, SeatRequest
+from robot_bridge.protocol.messages import Ping, Pong, Stop, StopTaken
 from server.loop_turns import turns_of_loop
 from tests.server.rig import PATIENCE, running_rig
 

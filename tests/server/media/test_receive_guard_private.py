@@ -111,7 +111,12 @@ async def test_what_need_not_wait_is_handled_at_once_unless_something_before_it_
         await exchanged(ends, "first")
         handled: list[bytes] = []
         intake = ends.intake
-        intake._handled = lambda data: handled.append(data) is None
+
+        def handle(data: bytes) -> bool:
+            handled.append(data)
+            return True
+
+        intake._handled = handle
         intake.put_nowait((b"a", 1))
         assert handled == [b"a"]
         urgent[0] = False
