@@ -5,6 +5,10 @@ that arrives is lost; once the second is connected, DTLS, SCTP and SRTP send thr
 has authenticated the peer and goes on doing so, whatever path its datagrams take. If the second never connects, nothing
 has changed.
 
+A browser may receive on its old path and answer no check there once it has moved to the new one. So while a restart is
+under way, consent that expires on the old path (RFC 7675) stops what is sent there and ends nothing: that is decided
+when the new path is found, or is not.
+
 Private parts of aiortc and aioice that are used; tests pin every one of them:
 
 - `RTCIceGatherer._connection`, `._remote_candidates_end`, `RTCIceTransport._connection`, `._recv`, `._send`: what DTLS
@@ -85,6 +89,7 @@ class IceSession:
         self._restarting = asyncio.Lock()
         self._next: Any = None  # the connection that is to take over
         self._taking_over: asyncio.Task[None] | None = None
+        self._lapsed = False  # consent for the current path has expired, and the restart decides
         # Called when the peer has answered no check of the current path for 30 s; the connection closes then.
         self.on_expired: Callable[[], None] = lambda: None
         if self._transport is not None:
@@ -121,6 +126,7 @@ class IceSession:
                     await self.add_candidate(candidate)
             except BaseException:
                 await self._give_up()
+                await self._end_if_lapsed()
                 raise
             self.tag, self.username = _new_tag(), username
             local = gatherer.getLocalParameters()
@@ -151,9 +157,24 @@ class IceSession:
         guard_ice(connection, self._on_refused)
         keep_consent(connection, lambda: self._expired(connection), self._on_round_trip)
 
-    def _expired(self, connection: Any) -> None:
-        if self._transport is not None and self._transport._connection is connection:
+    def _expired(self, connection: Any) -> bool:
+        """Whether the connection stays open, silent, for a restart that is under way."""
+        if self._transport is None or self._transport._connection is not connection:
+            return False
+        if self._next is None:
             self.on_expired()
+            return False
+        log.info("ice consent expired while a restart is under way")
+        self._lapsed = True
+        self._transport._send = _send_nothing
+        return True
+
+    async def _end_if_lapsed(self) -> None:
+        """No path is left."""
+        if self._lapsed and self._transport is not None:
+            self._lapsed = False
+            self.on_expired()
+            await self._transport._connection.close()
 
     async def _give_up(self) -> None:
         """End the session that has not taken over."""
@@ -171,14 +192,15 @@ class IceSession:
             async with asyncio.timeout(self._connect_timeout):
                 await connection.connect()
         except (ConnectionError, TimeoutError):
-            log.info("ice restart found no path; the old one stays")
+            log.info("ice restart found no path", old_path="expired" if self._lapsed else "stays")
             self._next = None
             await connection.close()
+            await self._end_if_lapsed()
             return
         if self._transport is None or self._transport.state != "completed":
             return  # it ended meanwhile; `close` follows
         old = _swap(self._transport, connection)
-        self._next = None
+        self._next, self._lapsed = None, False
         task = asyncio.get_running_loop().create_task(_close_later(old), name="ice linger")
         self._lingering.add(task)
         task.add_done_callback(self._lingering.discard)
@@ -220,6 +242,10 @@ def _swap(transport: Any, connection: Any) -> Any:
     if old._query_consent_task is not None:
         old._query_consent_task.cancel()
     return old
+
+
+async def _send_nothing(data: bytes) -> None:
+    """For DTLS, on a path without consent; what it carries is repeated, or too old."""
 
 
 async def _close_later(connection: Any) -> None:

@@ -71,7 +71,7 @@ class _ConsentKeeper:
     """The checks of one connection, on the pair that was nominated last."""
 
     def __init__(
-        self, connection: Any, on_expired: Callable[[], None], on_round_trip: Callable[[float], None] | None
+        self, connection: Any, on_expired: Callable[[], bool | None], on_round_trip: Callable[[float], None] | None
     ) -> None:
         self._connection = connection
         self._complete = connection.check_complete
@@ -108,7 +108,8 @@ class _ConsentKeeper:
                     self._send_check(now)
         finally:
             self._forget(float("inf"))
-        self._on_expired()
+        if self._on_expired():
+            return
         # `close` waits for this very task, so that another one has to call it.
         self._closing = loop.create_task(self._connection.close(), name="ice consent expired")
 
@@ -139,13 +140,14 @@ class _ConsentKeeper:
 
 def keep_consent(
     connection: Any,
-    on_expired: Callable[[], None] = lambda: None,
+    on_expired: Callable[[], bool | None] = lambda: None,
     on_round_trip: Callable[[float], None] | None = None,
 ) -> None:
     """Let `connection`, one of aioice with one component, end after 30 s without a valid answer and no sooner.
 
-    Call before its `connect`. `on_expired` is called once, before the connection closes because of it. `on_round_trip`
-    gets what each answer shows, in seconds; for it a check is sent at once.
+    Call before its `connect`. `on_expired` is called once, before the connection closes because of it; True: it does not
+    close by itself, and whoever was asked sends nothing more by it. `on_round_trip` gets what each answer shows, in
+    seconds; for it a check is sent at once.
 
     Raises:
         RuntimeError: as `require_consent_hooks`.

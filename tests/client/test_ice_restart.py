@@ -12,9 +12,12 @@ from client.aiortc_private import transport_of
 from client.errors import ConnectFailed, SignallingRefused
 from client.ice_restart_private import MONITOR, IceRestart
 from client.peer import Peer
+from robot_bridge.protocol import ice_consent
 from tests.server.rig import PATIENCE, Rig, running_rig
 
 CANDIDATE = re.compile(r"^a=candidate:(\S+ \d+ \S+ \d+) (\S+) (\d+) typ host", re.MULTILINE)
+
+CHECK_ANSWER = b"\x01\x01"  # a STUN binding success response (RFC 8489 5)
 
 
 class Paths:
@@ -45,6 +48,7 @@ class Forwarder:
 
     def __init__(self, console: tuple[str, int]) -> None:
         self.passed = 0
+        self.answers_pass = True  # whether the client's answers to checks reach the console
         self._here, self._there = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
         self._client: tuple[str, int] | None = None
         self._console = console
@@ -59,6 +63,8 @@ class Forwarder:
     def _from_client(self) -> None:
         data, self._client = self._here.recvfrom(2048)
         self.passed += 1
+        if data.startswith(CHECK_ANSWER) and not self.answers_pass:
+            return
         self._there.sendto(data, self._console)
 
     def _from_console(self) -> None:
@@ -124,6 +130,54 @@ async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was() -> No
                     await console.restart_ice()
                 feedback = await console.drive([0.0] * len(console.description.axes))
                 assert feedback.event > 1
+        finally:
+            paths.close()
+
+
+@pytest.fixture
+def hasty_consent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ice_consent, "EXPIRY_SECONDS", 1.0)
+    monkeypatch.setattr(ice_consent, "CHECK_SECONDS", (0.05, 0.1))
+
+
+async def _lapse(rig: Rig, paths: Paths) -> None:
+    """The old path carries everything but the answers to the console's checks, while a restart is under way."""
+    session = rig.webrtc_peers[0].ice
+    await session.restart("somebody", "x" * 22, [])
+    paths.forwarders[0].answers_pass = False
+    async with asyncio.timeout(PATIENCE):
+        while not session._lapsed:
+            await asyncio.sleep(0.02)
+
+
+@pytest.mark.usefixtures("hasty_consent")
+async def test_an_old_path_without_answers_ends_nothing_while_a_restart_is_under_way() -> None:
+    paths = Paths()
+    async with running_rig(ice_hosts="127.0.0.1") as rig:
+        try:
+            async with Console(_link(rig), route=paths, video=False, audio=False) as console:
+                await console.take_seat()
+                values = [0.1] * len(console.description.axes)
+                before = await console.drive(values)
+                await _lapse(rig, paths)
+                await console.restart_ice()
+                after = await console.drive(values)
+                assert after.event > before.event
+                assert len(rig.services.console.peers) == 1
+        finally:
+            paths.close()
+    assert rig.count("lockstep_rests_total", why="disconnected") == 0
+
+
+@pytest.mark.usefixtures("hasty_consent")
+async def test_a_restart_that_finds_no_path_ends_a_session_whose_old_path_gives_no_answers() -> None:
+    paths = Paths()
+    async with running_rig(ice_hosts="127.0.0.1", peer_connect_timeout=3.0) as rig:
+        try:
+            async with Console(_link(rig), route=paths, video=False, audio=False):
+                await _lapse(rig, paths)
+                async with asyncio.timeout(PATIENCE):
+                    await rig.services.console.peers.all_gone()
         finally:
             paths.close()
 
