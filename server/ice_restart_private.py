@@ -65,6 +65,7 @@ class IceSession:
 
     Attributes:
         tag: entity tag of the newest ICE session (RFC 9725 4.3.1); a restart changes it
+        lapsed: set while consent has expired on the current path and a restart is under way
     """
 
     def __init__(
@@ -89,7 +90,7 @@ class IceSession:
         self._restarting = asyncio.Lock()
         self._next: Any = None  # the connection that is to take over
         self._taking_over: asyncio.Task[None] | None = None
-        self._lapsed = False  # consent for the current path has expired, and the restart decides
+        self.lapsed = asyncio.Event()
         # Called when the peer has answered no check of the current path for 30 s; the connection closes then.
         self.on_expired: Callable[[], None] = lambda: None
         if self._transport is not None:
@@ -165,14 +166,14 @@ class IceSession:
             self.on_expired()
             return False
         log.info("ice consent expired while a restart is under way")
-        self._lapsed = True
+        self.lapsed.set()
         self._transport._send = _send_nothing
         return True
 
     async def _end_if_lapsed(self) -> None:
         """No path is left."""
-        if self._lapsed and self._transport is not None:
-            self._lapsed = False
+        if self.lapsed.is_set() and self._transport is not None:
+            self.lapsed.clear()
             self.on_expired()
             await self._transport._connection.close()
 
@@ -192,7 +193,7 @@ class IceSession:
             async with asyncio.timeout(self._connect_timeout):
                 await connection.connect()
         except (ConnectionError, TimeoutError):
-            log.info("ice restart found no path", old_path="expired" if self._lapsed else "stays")
+            log.info("ice restart found no path", old_path="expired" if self.lapsed.is_set() else "stays")
             self._next = None
             await connection.close()
             await self._end_if_lapsed()
@@ -200,7 +201,8 @@ class IceSession:
         if self._transport is None or self._transport.state != "completed":
             return  # it ended meanwhile; `close` follows
         old = _swap(self._transport, connection)
-        self._next, self._lapsed = None, False
+        self._next = None
+        self.lapsed.clear()
         task = asyncio.get_running_loop().create_task(_close_later(old), name="ice linger")
         self._lingering.add(task)
         task.add_done_callback(self._lingering.discard)

@@ -145,9 +145,9 @@ def keep_consent(
 ) -> None:
     """Let `connection`, one of aioice with one component, end after 30 s without a valid answer and no sooner.
 
-    Call before its `connect`. `on_expired` is called once, before the connection closes because of it; True: it does not
-    close by itself, and whoever was asked sends nothing more by it. `on_round_trip` gets what each answer shows, in
-    seconds; for it a check is sent at once.
+    Call before its `connect`. `on_expired` is called once, before the connection closes because of it. True: it does
+    not close by itself, and whoever was asked sends nothing more by it. `on_round_trip` gets what each answer shows,
+    in seconds; for it a check is sent at once.
 
     Raises:
         RuntimeError: as `require_consent_hooks`.

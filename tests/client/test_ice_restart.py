@@ -146,8 +146,7 @@ async def _lapse(rig: Rig, paths: Paths) -> None:
     await session.restart("somebody", "x" * 22, [])
     paths.forwarders[0].answers_pass = False
     async with asyncio.timeout(PATIENCE):
-        while not session._lapsed:
-            await asyncio.sleep(0.02)
+        await session.lapsed.wait()
 
 
 @pytest.mark.usefixtures("hasty_consent")
