@@ -36,14 +36,30 @@ function declarationOf([name, node]) {
   return `${about}export interface ${name} {\n${fieldsOf(node).join("\n")}\n}`;
 }
 
-function withoutWords(node) {
-  if (Array.isArray(node)) return node.map(withoutWords);
-  if (node === null || typeof node !== "object") return node;
-  const kept = Object.entries(node).filter(([key, value]) => {
-    const isWords = (key === "title" || key === "description") && typeof value === "string";
-    return !isWords && key !== "default";
-  });
-  return Object.fromEntries(kept.map(([key, value]) => [key, withoutWords(value)]));
+/** The same as the page's parser reads it (src/core/schema_check.ts): it comes before the first picture, so it is short. */
+function shapeOf(node) {
+  if (node.$ref) return nameOf(node.$ref);
+  const union = node.anyOf ?? node.oneOf;
+  if (union) return { any: union.map(shapeOf) };
+  if (node.enum) return { enum: node.enum };
+  if (node.type === "array") return listOf(node);
+  if (node.type === "object") return recordOf(node);
+  const { minimum, maximum } = node;
+  return minimum === undefined && maximum === undefined ? node.type : { type: node.type, minimum, maximum };
+}
+
+function listOf({ prefixItems, items }) {
+  if (!prefixItems) return { items: shapeOf(items) };
+  const shapes = prefixItems.map(shapeOf);
+  if (shapes.some((shape) => JSON.stringify(shape) !== JSON.stringify(shapes[0])))
+    throw new Error(`a tuple of different kinds: ${JSON.stringify(prefixItems)}`);
+  return { items: shapes[0], length: shapes.length };
+}
+
+function recordOf({ properties = {}, required = [] }) {
+  const fields = Object.fromEntries(Object.entries(properties).map(([name, node]) => [name, shapeOf(node)]));
+  const optional = Object.keys(properties).filter((name) => !required.includes(name));
+  return optional.length > 0 ? { fields, optional } : { fields };
 }
 
 function reachableFrom(name, found = new Set()) {
@@ -57,7 +73,7 @@ function reachableFrom(name, found = new Set()) {
 const head = "// Generated from docs/schemas/console.schema.json by `npm run generate`. Do not edit.\n";
 const types = `${head}\n${Object.entries(definitions).map(declarationOf).join("\n\n")}\n`;
 const received = [...reachableFrom("ServerMessage")].sort();
-const checks = Object.fromEntries(received.map((name) => [name, withoutWords(definitions[name])]));
+const checks = Object.fromEntries(received.map((name) => [name, shapeOf(definitions[name])]));
 const generated = {
   "../src/wire.ts": types,
   "../src/wire_schema.json": `${JSON.stringify(checks)}\n`,

@@ -14,6 +14,7 @@ export { createInviteSheet } from "./ui/invite_sheet";
 export { createKeysSheet } from "./ui/keys_sheet";
 export { createLogPanel } from "./ui/log_panel";
 export { createNotesPanel } from "./ui/notes_panel";
+export { createScene } from "./ui/page_scene";
 export { createPadSheet } from "./ui/pad_sheet";
 export { createPeoplePanel } from "./ui/people_panel";
 export { createPlacePanel } from "./ui/place_panel";

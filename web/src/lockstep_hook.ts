@@ -34,6 +34,8 @@ declare global {
   }
 }
 
+const NO_SCENE: SceneStatistics = { state: "away", event: null, gap: null, held: 0, forced: 0 };
+
 export function installHook(page: Page): void {
   const { app } = page;
   const { room } = app;
@@ -42,7 +44,7 @@ export function installHook(page: Page): void {
     robot: () => app.state.robot?.description ?? null,
     rendered: (stream) => (room.videos.get(stream) ?? room.sounds.get(stream))?.log.all() ?? [],
     feedbacks: () => room.feedbacks.all(),
-    scene: () => page.board.scene.statistics(),
+    scene: () => page.board.scene?.statistics() ?? NO_SCENE,
     configure({ gate, pacing, tolerance }) {
       const { settings } = app.state;
       settings.gate = gate ?? settings.gate;

@@ -5,7 +5,6 @@ import type { PageAction } from "./core/page_keys";
 import { staleAge } from "./core/freshness";
 import { readFragment } from "./core/fragment";
 import { replayHash } from "./core/replay_link";
-import { sceneDue } from "./core/scene_gate";
 import { countUnread, createUnread, markRead } from "./core/unread";
 import { FIELDS } from "./input/keyboard";
 import type { Pad } from "./input/pad";
@@ -26,7 +25,6 @@ import { Later, type LaterParts } from "./ui/later";
 import { createLimitsStrip } from "./ui/limits_strip";
 import { createOverlay, overlayWords } from "./ui/overlay";
 import { createPageTools } from "./ui/page_tools";
-import { SceneView } from "./ui/scene_view";
 import { createSeatBar } from "./ui/seat_bar";
 import { Sheets, type SheetContent } from "./ui/sheet";
 import { createStatusBar } from "./ui/status_bar";
@@ -61,35 +59,24 @@ export class Page {
   constructor(api: ConsoleApi, options: PeerOptions, name: string | null, first: FirstOpening | null) {
     const left = h("div", "stick left", { role: "group", "aria-label": "Left stick" });
     const right = h("div", "stick right", { role: "group", "aria-label": "Right stick" });
-    this.board = new ViewBoard(this.scene(api));
+    this.board = new ViewBoard();
     const events: ConsoleAppEvents = {
       canvas: (info) => this.board.canvas(info),
       mainStream: () => this.board.mainStream(),
       isOccupied: () => this.isOccupied(),
       armedChanged: () => this.draw(performance.now()),
       feedbackTaken: (now) => this.board.update(this.app, now),
-      pictureDrawn: () => this.board.scene.settle(),
+      pictureDrawn: () => this.board.scene?.settle(),
     };
     this.app = new ConsoleApp(api, options, name, new TouchSticks(left, right), events, first);
     this.panels = this.build(left, right, api);
     this.later.use((parts) => this.takePad(parts));
-    this.later.use(({ Rumble, ContactTone, SceneSwitch }) => {
-      this.board.sceneSwitch = new SceneSwitch();
+    this.later.use(({ Rumble, ContactTone, SceneSwitch, createScene }) => {
+      this.board.takeScene(createScene(this.app, this.board, api), new SceneSwitch());
       this.app.touch.rumble = new Rumble();
       this.app.touch.tone = new ContactTone(this.app.audio);
     });
     watchTouch();
-  }
-
-  private scene(api: ConsoleApi): SceneView {
-    return new SceneView(api, {
-      due: () => {
-        const video = this.app.room.videos.get(this.board.mainStream() ?? "");
-        return sceneDue(this.app.room.context("video"), video?.gate.shown ?? null);
-      },
-      context: () => this.app.room.context("video"),
-      onkey: (key) => this.app.controls.keyboard.foreign(key),
-    });
   }
 
   /** Shows the page and keeps it current. */

@@ -1,6 +1,6 @@
 import type { RobotDescription, ServerMessage } from "../wire";
 import schema from "../wire_schema.json";
-import { isRecord, misfit, type SchemaDefinitions } from "./schema_check";
+import { isRecord, misfit, type Definitions, type Shape } from "./schema_check";
 
 /** A message of the console protocol, or why the text is none. */
 export type Parsed =
@@ -8,14 +8,18 @@ export type Parsed =
   | { readonly kind: "unknown"; readonly type: string }
   | { readonly kind: "malformed"; readonly detail: string };
 
-const definitions: SchemaDefinitions = schema;
+const definitions: Definitions = schema;
 const MAX_LENGTH = 1_000_000;
 
 const nameByType: ReadonlyMap<string, string> = new Map(
-  Object.entries(definitions).flatMap(([name, node]) =>
-    (node.properties?.["type"]?.enum ?? []).map((type): [string, string] => [String(type), name]),
-  ),
+  Object.entries(definitions).flatMap(([name, shape]) => typesOf(shape).map((type) => [type, name] as const)),
 );
+
+/** The values of the field `type` of a message. */
+function typesOf(shape: Shape): readonly string[] {
+  const type = typeof shape === "object" && "fields" in shape ? shape.fields["type"] : undefined;
+  return typeof type === "object" && "enum" in type ? type.enum.map(String) : [];
+}
 
 export function parseServerMessage(data: unknown): Parsed {
   if (typeof data !== "string") return { kind: "malformed", detail: "not text" };

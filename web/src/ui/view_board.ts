@@ -31,20 +31,26 @@ export class ViewBoard {
   readonly element = h("main", "views", { "aria-label": "Views" });
   readonly gauges = h("div", "gauges");
   card: HTMLElement | null = null; // that may stand at the end of a row of small views, where the style sheet lets it
-  sceneSwitch: SceneSwitch | null = null; // until its code is there
+  scene: SceneView | null = null; // until its code is there
+  sceneSwitch: SceneSwitch | null = null; // comes with the scene
   private readonly views = new Map<string, View>(); // cameras in their order, then the scene while it is there
-  private readonly sceneView: View;
+  private sceneView: View | null = null;
   private main: string | null = null;
   private epoch: string | null = null;
   private shapes = ""; // of the pictures, as they were last laid out
   private cardHeight = 0; // in its own place
 
-  constructor(readonly scene: SceneView) {
-    this.sceneView = this.createView(SCENE, SCENE, null, scene.element);
+  constructor() {
     this.element.append(this.gauges);
     const sizes = new ResizeObserver(() => this.fit());
     sizes.observe(this.element);
     sizes.observe(this.gauges);
+  }
+
+  takeScene(scene: SceneView, sceneSwitch: SceneSwitch): void {
+    this.sceneView = this.createView(SCENE, SCENE, null, scene.element);
+    this.scene = scene;
+    this.sceneSwitch = sceneSwitch;
   }
 
   /** The canvas of a stream; the same one again after a reconnect. */
@@ -71,57 +77,61 @@ export class ViewBoard {
   update(app: ConsoleApp, now: number): void {
     this.element.classList.toggle("is-locked", app.isArmed());
     this.followEpoch(app.state.robot?.epoch ?? null);
-    if (this.scene.hasSettled(now) && app.ticker.isHeldUp(now)) this.dropScene(app);
-    if (this.scene.hasFailed && this.sceneSwitch?.isWanted === false) this.sceneSwitch.giveUp();
-    this.sceneSwitch?.update(app, now);
-    this.showScene(app);
-    this.scene.take(app.state.feedback);
-    this.scene.update();
-    for (const view of this.views.values())
-      if (view.canvas !== null) showVeil(app, view, now);
-      else this.showSceneVeil(app, view, now);
+    if (this.scene !== null && this.sceneView !== null)
+      this.updateScene(this.scene, this.sceneView, app, now);
+    for (const view of this.views.values()) if (view.canvas !== null) showVeil(app, view, now);
     if (this.shapes !== this.shapesNow()) this.fit();
   }
 
-  /** The scene stands on the page or it does not: nothing is kept free for one that is not there. */
-  private showScene(app: ConsoleApp): void {
-    const isOn = this.sceneSwitch?.isOn === true;
-    const description = app.state.robot?.description;
-    if (isOn && description !== undefined) this.scene.open(description);
-    if (isOn === this.views.has(SCENE)) return;
-    if (isOn) this.addView(this.sceneView);
-    else this.removeScene();
+  private updateScene(scene: SceneView, view: View, app: ConsoleApp, now: number): void {
+    if (scene.hasSettled(now) && app.ticker.isHeldUp(now)) this.dropScene(scene, app);
+    if (scene.hasFailed && this.sceneSwitch?.isWanted === false) this.sceneSwitch.giveUp();
+    this.sceneSwitch?.update(app, now);
+    this.showScene(scene, view, app);
+    scene.take(app.state.feedback);
+    scene.update();
+    if (this.views.has(SCENE)) this.showSceneVeil(scene, view, app, now);
   }
 
-  private removeScene(): void {
-    this.scene.close();
+  /** The scene stands on the page or it does not: nothing is kept free for one that is not there. */
+  private showScene(scene: SceneView, view: View, app: ConsoleApp): void {
+    const isOn = this.sceneSwitch?.isOn === true;
+    const description = app.state.robot?.description;
+    if (isOn && description !== undefined) scene.open(description);
+    if (isOn === this.views.has(SCENE)) return;
+    if (isOn) this.addView(view);
+    else this.removeScene(scene, view);
+  }
+
+  private removeScene(scene: SceneView, view: View): void {
+    scene.close();
     this.views.delete(SCENE);
-    this.sceneView.element.remove();
+    view.element.remove();
     if (this.main === SCENE) this.main = this.mainStream();
     this.arrange();
   }
 
   /** The scene is judged like a picture: by how far its event is from the feedback. */
-  private showSceneVeil(app: ConsoleApp, view: View, now: number): void {
-    const { event, gap } = this.scene.statistics();
-    const staleness = this.scene.staleness(staleAge(app.measuredMs, now));
+  private showSceneVeil(scene: SceneView, view: View, app: ConsoleApp, now: number): void {
+    const { event, gap } = scene.statistics();
+    const staleness = scene.staleness(staleAge(app.measuredMs, now));
     const words = event === null && staleness === null ? null : (unreachableWords(app) ?? staleness);
     setHidden(view.veil, words === null);
     view.element.classList.toggle("is-stale", words !== null);
     if (words !== null) setText(view.veilWords, words);
     const { video } = app.state.settings.tolerance;
-    const unknown = this.scene.lacksJoints ? " · not all joints measured" : "";
+    const unknown = scene.lacksJoints ? " · not all joints measured" : "";
     setText(
       view.detail,
       event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}${unknown}`,
     );
     setData(view.element, "gap", words === null ? "good" : "bad");
-    setHidden(view.swap, this.isLarge(view) && this.scene.isFull);
+    setHidden(view.swap, this.isLarge(view) && scene.isFull);
   }
 
   /** Nothing may keep STOP waiting, so a scene that this machine cannot draw fast enough goes. */
-  private dropScene(app: ConsoleApp): void {
-    if (this.scene.isFull) this.scene.unload();
+  private dropScene(scene: SceneView, app: ConsoleApp): void {
+    if (scene.isFull) scene.unload();
     else this.sceneSwitch?.giveUp();
     const camera = [...this.views.keys()].find((name) => name !== SCENE);
     if (camera !== undefined && this.main === SCENE) this.swapIn(camera);
@@ -131,7 +141,7 @@ export class ViewBoard {
   /** The scene lives as long as the bridge whose robot it shows. */
   private followEpoch(epoch: string | null): void {
     if (epoch === null || epoch === this.epoch) return;
-    if (this.epoch !== null) this.scene.renew();
+    if (this.epoch !== null) this.scene?.renew();
     this.epoch = epoch;
   }
 
@@ -157,15 +167,15 @@ export class ViewBoard {
   private addView(view: View): void {
     const hasScene = this.views.delete(SCENE);
     this.views.set(view.name, view);
-    if (hasScene) this.views.set(SCENE, this.sceneView);
+    if (hasScene && this.sceneView !== null) this.views.set(SCENE, this.sceneView);
     this.element.append(view.element);
     this.arrange();
   }
 
   private swapIn(name: string): void {
     this.main = name;
-    if (name === SCENE) this.scene.load();
-    else this.scene.unload();
+    if (name === SCENE) this.scene?.load();
+    else this.scene?.unload();
     this.arrange();
   }
 
