@@ -12,12 +12,32 @@ from playwright.async_api import Browser, BrowserContext, Page, async_playwright
 __all__ = ["PAD", "chromium_program", "missed_in_page", "open_page", "running_chromium"]
 
 PAD = Path(__file__).with_name("test_pad.js")
+# The switch replaces Playwright's own, whose list these are, but for the last two: with them every window loads two
+# pages for suggestions below an address bar that nobody sees, which costs more than the page that is tested.
+DISABLED_FEATURES = (
+    "AvoidUnnecessaryBeforeUnloadCheckSync",
+    "DestroyProfileOnBrowserClose",
+    "HttpsUpgrades",
+    "HttpsFirstBalancedModeAutoEnable",
+    "LensOverlay",
+    "MediaRouter",
+    "PaintHolding",
+    "ThirdPartyStoragePartitioning",
+    "AvoidCorsURLLoaderRestartOnRedirect",
+    "OptimizationHints",
+    "NetworkTimeServiceQuerying",
+    "AimEnabled",
+    "PreconnectToSearch",
+    "WebUIOmniboxPopup",
+    "WebUIOmniboxAimPopup",
+)
 FLAGS = [
     "--no-sandbox",
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
     "--autoplay-policy=no-user-gesture-required",
+    f"--disable-features={','.join(DISABLED_FEATURES)}",
 ]
 
 
