@@ -23,7 +23,8 @@ class RecordClock:
 class LinkTimes:
     """From the robot bridge's monotonic clock to the console's. The mapping changes only with a feedback.
 
-    So a reader gets the bridge's own time of a picture back, exactly: by the feedback before it.
+    So a reader gets the bridge's own time of a picture back, exactly: by the feedback before it. Of one that came
+    sooner than the mapping allows, the time of its arrival is recorded.
     """
 
     def __init__(self) -> None:
