@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from bench.driving import drive_on
 from client import (
     CommandError,
     CommandRefused,
@@ -36,7 +37,7 @@ async def test_every_stamp_is_the_truth(stack: Stack, carrier: Carrier, codec: s
         await console.take_seat()
         async with collecting(console) as found:
             for number in range(EVENTS):
-                feedback = await console.drive({"base.wz": 0.5 if number % 20 < 10 else -0.5})
+                feedback = await drive_on(console, {"base.wz": 0.5 if number % 20 < 10 else -0.5})
         figures = console.stats()
         for name, media in found.items():
             assert len({medium.stamp for medium in media}) > EVENTS // 3, name
@@ -84,7 +85,7 @@ async def test_an_observer_sees_but_cannot_drive(stack: Stack) -> None:
         await operator.take_seat()
         async with collecting(observer, sound=False) as found, asyncio.timeout(20):
             for _ in range(10):
-                driven = await operator.drive([0.0, 0.0, 0.2])
+                driven = await drive_on(operator, [0.0, 0.0, 0.2])
             async for feedback in observer.feedbacks():
                 if feedback.event >= driven.event:
                     break

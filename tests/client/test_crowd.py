@@ -7,6 +7,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any, cast
 
+from bench.driving import drive_on
 from client import Console
 from tests.support.stack import running_stack
 
@@ -51,7 +52,7 @@ class Steps:
 
 async def drive(operator: Console) -> None:
     while True:
-        await operator.drive([0.0, 0.0, 0.3])
+        await drive_on(operator, [0.0, 0.0, 0.3])
 
 
 @asynccontextmanager

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from bench.driving import drive_on
 from client import CommandRefused, Console, SeatRefused
 from robot_bridge.protocol.serial import event_after
 from tests.client.truth import until_logged
@@ -70,7 +71,7 @@ async def test_in_a_hand_over_in_mid_drive_nothing_moves_between_the_two_drivers
         await first.drive(FIRST)
         driving = asyncio.create_task(_drive_until_refused(first, FIRST))
         await _hand_over(how, first, second)
-        last = [await second.drive(SECOND) for _ in range(10)][-1]
+        last = [await drive_on(second, SECOND) for _ in range(10)][-1]
         assert await driving == "no_seat"
         assert (second.seat.holder, second.seat.name, second.seat.why) == (second.peer, "Grace", how)
         await until_logged(stack, "feedback", lambda record: record["event"] >= last.event)
@@ -128,7 +129,7 @@ async def test_a_driver_who_vanishes_is_succeeded_by_who_asked(stack: Stack) -> 
         async with asyncio.timeout(PATIENCE):
             await asking
         assert second.seat.holder == second.peer
-        assert (await second.drive(SECOND)).event > 0
+        assert (await drive_on(second, SECOND)).event > 0
 
 
 async def test_an_observer_asks_in_vain_and_an_operator_takes_nothing(stack: Stack) -> None:

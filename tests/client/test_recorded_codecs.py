@@ -9,6 +9,7 @@ from pathlib import Path
 import av
 import httpx
 
+from bench.driving import drive_on
 from client import Console
 from robot_bridge.robots.event_strip import read_event_strip
 from server.recording import export_mp4
@@ -42,10 +43,10 @@ async def test_vp8_that_a_headless_client_takes_is_recorded_and_nothing_else_is_
     async with running_stack(tmp_path, settings=settings) as stack:
         async with Console(stack.operator, codec="VP8", name="Ada") as console:
             await console.take_seat()
-            await console.drive([0.3, 0.0, 0.2])
+            await drive_on(console, [0.3, 0.0, 0.2])
             await _ask(stack, "POST", "/api/recordings")
             for number in range(EVENTS):
-                await console.drive([0.3 if number // 15 % 2 == 0 else -0.3, 0.0, 0.2])
+                await drive_on(console, [0.3 if number // 15 % 2 == 0 else -0.3, 0.0, 0.2])
             await _ask(stack, "POST", "/api/recordings/stop")
             encoded = await _encoded(stack, *CAMERAS)
         captured = {(each["stream"], each["event"]) for each in stack.events("media")}

@@ -5,6 +5,7 @@ import signal
 import time
 from pathlib import Path
 
+from bench.driving import drive_on
 from client import Console
 from server.recording.reader import RecordingReader
 from server.recording.settings import RecordingSettings
@@ -23,7 +24,7 @@ async def test_a_killed_consoles_recording_opens_and_is_completed(tmp_path: Path
         async with Console(stack.operator, codec="H264", name="Ada") as console:
             await console.take_seat()
             for _ in range(EVENTS):
-                await console.drive([0.3, 0.0, 0.2])
+                await drive_on(console, [0.3, 0.0, 0.2])
             os.kill(stack.process.pid, signal.SIGKILL)
             killed = time.time()
             await stack.process.wait()

@@ -12,6 +12,7 @@ import pytest
 import pytest_asyncio
 from pydantic import SecretStr
 
+from bench.driving import drive_on
 from client import Console
 from client.errors import ConsoleLost
 from robot_bridge.protocol.console import Notice, Role, SilenceStops, Welcome
@@ -113,7 +114,7 @@ async def test_the_overview_of_one_shows_the_others_robot_who_is_there_and_who_d
     await world.one.robot("right", lambda tile: tile["link"] == "up")
     async with Console(world.two.link("right"), video=False, audio=False, name="Ann") as ann:
         await ann.take_seat()
-        await ann.drive({"base.vx": 0.1})
+        await drive_on(ann, {"base.vx": 0.1})
         seen = await world.one.robot("right", lambda tile: tile["driver"] == "Ann" and tile["participant_count"] == 1)
         assert seen["url"] == f"{world.two.stack.console}/robots/right/"
         assert seen["console"].startswith("two-")
@@ -150,7 +151,7 @@ async def test_a_link_of_one_console_opens_the_other_until_it_is_revoked_where_i
 async def test_stop_all_at_one_console_stops_the_robot_of_the_other_while_it_drives(world: World) -> None:
     async with Console(world.two.link("right"), video=False, audio=False, name="Ann") as ann:
         await ann.take_seat()
-        await ann.drive({"base.vx": 0.1})
+        await drive_on(ann, {"base.vx": 0.1})
         answer = await world.one.http.post("/api/fleet/stop", headers=world.one.token(), json={"reason": "smoke"})
         stopped = {each["name"]: each for each in answer.json()["robots"]}
         assert stopped["left"]["delivered"]
@@ -242,7 +243,7 @@ async def _driving(console: Console, robot: str) -> AsyncIterator[_Driven]:
 
     async def drive() -> None:
         while True:
-            await console.drive({"base.vx": 0.05, "base.wz": 0.3})
+            await drive_on(console, {"base.vx": 0.05, "base.wz": 0.3})
             found.events += 1
             found.seats_lost += console.seat.holder != console.peer
 
