@@ -10,9 +10,11 @@ TEST_PACKAGES := $(RUN_PACKAGES) gcc libc6-dev chromium firefox-esr pulseaudio p
 WEB_SOURCES := $(shell find web -path web/node_modules -prune -o -type f -print 2>/dev/null)
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 ARGS ?=
-# A file's tests share what they start. Browsers take what there is: their tests run after the others, one at a time.
-WORKERS ?= 2
-PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+# A file's tests share what they start. Most wait more than they compute, so that there are more workers than cores.
+# Browsers take what there is: their tests run after the others.
+WORKERS ?= 4
+BROWSERS ?= 2
+PARALLEL := --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -42,10 +44,11 @@ test-web: web/node_modules/.installed
 	cd web && npm test --silent
 
 test-unit: $(VENV)/.dev $(ROS2)/.installed
-	$(BIN)/python -m pytest -q -m "not browser and not long" $(PARALLEL)
+	$(BIN)/python -m pytest -q -m "not browser and not long" -n $(WORKERS) $(PARALLEL)
 
 test-browser: $(VENV)/.dev $(ROS2)/.installed server/web_dist/index.html
-	$(BIN)/python -m pytest -q -m "browser and not long"
+	$(BIN)/python -m pytest -q -m "browser and not long" -n $(BROWSERS) $(PARALLEL) \
+	  $$(grep -rlF mark.browser tests --include='test_*.py' | sort)
 
 test-long: $(VENV)/.dev setup ## Run the tests that take minutes by their nature
 	@scripts/system-packages $(TEST_PACKAGES)

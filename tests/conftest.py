@@ -1,23 +1,40 @@
 """No test touches the state that a console keeps for its user; all draw off screen.
 
 What takes long runs first, files that need a browser between those that do not: these compute while the others wait.
+Files whose tests share one console among all files are the last with browsers: it does not idle beside the others.
 """
 
+import gc
 import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import structlog
 from hypothesis import HealthCheck, settings
 
 from robot_bridge.robots.mujoco_view.graphics import choose_graphics
 from tests.needs import is_real
 
+# Until all tests are collected: what is made by then stays, and is not looked through again and again, which would hold
+# up the robots that run in a test's process.
+gc.disable()
 choose_graphics()  # before a test file imports mujoco
 
 settings.register_profile("any-machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any-machine")  # no test asserts a time
+
+# As a console of its own process logs, see server/logs.py. What structlog does unless told otherwise draws each
+# traceback with all its variables: that held robots in a test's process up for seconds.
+structlog.configure(
+    processors=[
+        structlog.contextvars.merge_contextvars,
+        structlog.processors.add_log_level,
+        structlog.processors.format_exc_info,
+        structlog.processors.KeyValueRenderer(key_order=["level", "event"]),
+    ]
+)
 
 
 SLOW = ("slow", "browser", "long")
@@ -32,6 +49,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: places[item.path])
 
 
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
+
+
 def _module(item: pytest.Item) -> str:
     assert isinstance(item, pytest.Function)
     name: str = item.module.__name__
@@ -41,13 +63,19 @@ def _module(item: pytest.Item) -> str:
 def _places(items: list[pytest.Item]) -> dict[Path, float]:
     """Of each file in the run: those with browsers and other slow ones evenly from 0 to 1, then the rest."""
     kinds: dict[str, dict[Path, None]] = {"browser": {}, "slow": {}, "fast": {}}
-    for item in items:
+    for item in sorted(items, key=_shares_a_console):
         kind = next((each for each in ("browser", "fast") if item.get_closest_marker(each)), "slow")
+        kinds[kind].pop(item.path, None)
         kinds[kind][item.path] = None
     places = dict.fromkeys(kinds["fast"], 1.0)
     for each in ("slow", "browser"):
         places |= {path: (number + 0.5) / len(kinds[each]) for number, path in enumerate(kinds[each])}
     return places
+
+
+def _shares_a_console(item: pytest.Item) -> bool:
+    assert isinstance(item, pytest.Function)
+    return "stack_keeper" in item.fixturenames
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -1,12 +1,13 @@
-"""Consoles with the planar robot; one Chromium and one sound card for all tests, since they start slowly.
+"""Consoles with the planar robot; one Chromium for all tests, since it starts slowly.
 
 A test that ends, freezes or floods a part of its console, records, or looks for what only a new one says, has one of
 its own. A test has browser contexts of its own: nothing is shared that a page can change. All run on one event loop,
 because the browser belongs to the loop that started it.
 """
 
+import os
 from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,7 +41,7 @@ async def own_stack(tmp_path: Path) -> AsyncIterator[Stack]:
 
 
 class StackKeeper:
-    """One console for the tests of a file, as long as each leaves it as good as new. One more that idles costs time."""
+    """One console for all tests that ask for it, as long as each leaves it as good as new."""
 
     def __init__(self, directories: pytest.TempPathFactory) -> None:
         self._directories = directories
@@ -60,7 +61,7 @@ class StackKeeper:
         await self._running.aclose()
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="session")
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
 async def stack_keeper(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[StackKeeper]:
     keeper = StackKeeper(tmp_path_factory)
     yield keeper
@@ -69,7 +70,7 @@ async def stack_keeper(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterato
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def stack(stack_keeper: StackKeeper) -> Stack:
-    """A console that other tests of the file have used and will use."""
+    """A console that other tests have used and will use."""
     return await stack_keeper.stack()
 
 
@@ -99,7 +100,14 @@ class ChromiumKeeper:
 
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")
-async def chromium_keeper(sound_card: SoundCard) -> AsyncIterator[ChromiumKeeper]:
+async def chromium_keeper() -> AsyncIterator[ChromiumKeeper]:
+    keeper = ChromiumKeeper(os.environ | {"PULSE_SERVER": "unix:/nowhere"})
+    yield keeper
+    await keeper.close()
+
+
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
+async def loud_chromium_keeper(sound_card: SoundCard) -> AsyncIterator[ChromiumKeeper]:
     keeper = ChromiumKeeper(sound_card.environment)
     yield keeper
     await keeper.close()
@@ -107,8 +115,21 @@ async def chromium_keeper(sound_card: SoundCard) -> AsyncIterator[ChromiumKeeper
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def chromium(chromium_keeper: ChromiumKeeper) -> AsyncIterator[Browser]:
-    """Without any page open, before and after."""
-    browser = await chromium_keeper.browser()
+    """Without any page open, before and after, and without a sound card: what it plays, it plays to nobody."""
+    async with _without_pages(chromium_keeper) as browser:
+        yield browser
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def loud_chromium(loud_chromium_keeper: ChromiumKeeper) -> AsyncIterator[Browser]:
+    """The same with the sound card, which costs a tenth more."""
+    async with _without_pages(loud_chromium_keeper) as browser:
+        yield browser
+
+
+@asynccontextmanager
+async def _without_pages(keeper: ChromiumKeeper) -> AsyncIterator[Browser]:
+    browser = await keeper.browser()
     yield browser
     for context in browser.contexts:  # what a test that failed has left
         await context.close()

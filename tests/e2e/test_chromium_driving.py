@@ -43,9 +43,9 @@ async def test_every_stream_arrives_with_the_capture_time_carrier_and_advances(s
 
 
 async def test_driving_moves_the_robot_and_nothing_outside_the_tolerance_is_rendered(
-    stack: Stack, chromium: Browser
+    stack: Stack, loud_chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.operator) as console:
+    async with open_console(loud_chromium, stack.operator) as console:
         await console.until_live()
         await _driven(console, 60)
         # Sound that piled up while the sound device opened must not keep it behind the events for long.

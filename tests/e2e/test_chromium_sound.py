@@ -19,21 +19,21 @@ SILENT = 0.002
 PATIENCE = 30.0  # s
 
 
-async def test_the_robots_tone_is_heard(stack: Stack, chromium: Browser, sound_card: SoundCard) -> None:
-    async with open_console(chromium, stack.operator) as console:
+async def test_the_robots_tone_is_heard(stack: Stack, loud_chromium: Browser, sound_card: SoundCard) -> None:
+    async with open_console(loud_chromium, stack.operator) as console:
         await console.until_live()
         await console.until("s.streams.microphone.rendered > 20")
         assert await sound_card.hears(TONE, 0.04)
 
 
 async def test_one_of_a_crowd_hears_it_without_gaps_in_a_third_of_the_packets(
-    tmp_path: Path, chromium: Browser, sound_card: SoundCard
+    tmp_path: Path, loud_chromium: Browser, sound_card: SoundCard
 ) -> None:
     crowd = {"LOCKSTEP_MEDIA__CROWD_OBSERVERS": "1"}
     async with (
         running_stack(tmp_path, settings=crowd) as stack,
         Console(stack.observer, decode=False),
-        open_console(chromium, stack.observer, pad=False) as console,
+        open_console(loud_chromium, stack.observer, pad=False) as console,
     ):
         await console.until_live()
         await console.until("s.streams.microphone.rendered > 20")
@@ -49,9 +49,9 @@ async def test_one_of_a_crowd_hears_it_without_gaps_in_a_third_of_the_packets(
 
 
 async def test_sound_outside_the_tolerance_is_silent_until_the_gate_is_switched_off(
-    stack: Stack, chromium: Browser, sound_card: SoundCard
+    stack: Stack, loud_chromium: Browser, sound_card: SoundCard
 ) -> None:
-    async with open_console(chromium, stack.operator) as console:
+    async with open_console(loud_chromium, stack.operator) as console:
         await console.until_live()
         await console.until("s.streams.microphone.rendered > 20")
         for _ in range(6):
@@ -70,8 +70,8 @@ async def test_sound_outside_the_tolerance_is_silent_until_the_gate_is_switched_
         assert gated < ungated / 2
 
 
-async def test_a_dead_robot_link_is_silent(own_stack: Stack, chromium: Browser, sound_card: SoundCard) -> None:
-    async with open_console(chromium, own_stack.operator) as console:
+async def test_a_dead_robot_link_is_silent(own_stack: Stack, loud_chromium: Browser, sound_card: SoundCard) -> None:
+    async with open_console(loud_chromium, own_stack.operator) as console:
         await console.until_live()
         await console.until("s.streams.microphone.rendered > 20")
         with own_stack.frozen_bridge():

@@ -17,13 +17,13 @@ SECRETS = {"LOCKSTEP_RELAY_KEY": KEY, "LOCKSTEP_RELAY_SECRET": SECRET}
 
 
 async def test_pictures_and_sound_pass_the_gate_and_when_the_relay_dies_the_console_serves_the_page_itself(
-    tmp_path: Path, chromium: Browser, sound_card: SoundCard
+    tmp_path: Path, loud_chromium: Browser, sound_card: SoundCard
 ) -> None:
     async with livekit_stand_in() as server:
         extra = ("--relay", f"livekit:{server.url}?room=demo", "--observers-direct", "0")
         async with (
             running_stack(tmp_path, extra=extra, settings=SECRETS) as stack,
-            open_console(chromium, stack.observer, pad=False) as page,
+            open_console(loud_chromium, stack.observer, pad=False) as page,
         ):
             await _through_the_relay(page, server)
             await page.until("s.streams.overview?.rendered > 10", 60)
