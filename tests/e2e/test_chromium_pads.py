@@ -22,13 +22,17 @@ ODD: dict[str, Any] = {
 DEADMAN, ARM, STOP = 4, 6, 2
 
 
-# A pad that reports at every look, as some wireless ones do, also while nothing changes.
+# A pad that reports at every look, as some wireless ones do, also while nothing changes. Counted are looks in a row:
+# where a busy machine holds the page up, the row begins anew.
 REPORTS = """() => {
   const pads = navigator.getGamepads.bind(navigator);
+  let last = -Infinity;
   window.looks = 0;
   window.reports = true;
   navigator.getGamepads = () => {
-    window.looks += 1;
+    const now = performance.now();
+    window.looks = now - last > 200 ? 0 : window.looks + 1;
+    last = now;
     const [pad] = pads();
     if (window.reports) pad.timestamp += 4;
     return pads();

@@ -1,5 +1,6 @@
 """The 3D scene that nobody has asked for: it comes where the machine has room for it, and else leaves no empty box."""
 
+import asyncio
 import io
 from typing import Any
 
@@ -102,13 +103,18 @@ async def test_it_stays_away_and_leaves_no_box_without_graphics_on_a_phone_or_wh
         "narrow network": {"downlink": 0.4},
         "phone": {"width": 390, "height": 844, "touch": True},
     }
-    for name, facts in machines.items():
+
+    async def stays_away(name: str, facts: dict[str, Any]) -> None:
         async with open_on_machine(chromium, stack.observer, **facts) as console:
             await console.until_live()
             await console.until(DECIDED)
             assert await console.page.evaluate(FIGURES) == ["overview", "front"], name
             assert await console.page.evaluate(f"{CODE}.length") == 0, name
             assert await console.page.evaluate("window.lockstep.scene().state") == "away", name
+
+    async with asyncio.TaskGroup() as all_at_once:
+        for name, facts in machines.items():
+            all_at_once.create_task(stays_away(name, facts))
 
 
 async def test_what_the_person_decides_is_remembered_either_way(stack: Stack, chromium: Browser) -> None:

@@ -52,7 +52,7 @@ async def test_each_way_not_to_get_through_has_its_own_words(own_stack: Stack, c
         await _says(page, "Open the link", "lockstep up printed")
 
 
-async def test_blocked_udp_and_a_missing_relay_are_told_apart(stack: Stack, chromium: Browser) -> None:
+async def test_blocked_udp_and_a_missing_relay_are_told_apart(own_stack: Stack, chromium: Browser) -> None:
     async def misled(route: Route) -> None:
         response = await route.fetch()
         answer = re.sub(r"a=candidate:.*\r\n", "", await response.text())
@@ -60,8 +60,8 @@ async def test_blocked_udp_and_a_missing_relay_are_told_apart(stack: Stack, chro
 
     async with open_console(chromium, "about:blank") as blocked, open_console(chromium, "about:blank") as relayed:
         await blocked.page.route(OFFERS, misled)
-        await blocked.page.goto(stack.operator)
-        await relayed.page.goto(stack.observer + "&relay=only")
+        await blocked.page.goto(own_stack.operator)
+        await relayed.page.goto(own_stack.observer + "&relay=only")
         await _says(blocked.page, "No path for pictures and commands", "A firewall blocks UDP")
         await _says(relayed.page, "No path through the relay", "Take relay=only off the link")
         await blocked.page.unroute_all(behavior="ignoreErrors")
