@@ -117,6 +117,21 @@ async def test_an_address_with_many_strangers_takes_no_place_from_another() -> N
             writer.transport.abort()
 
 
+async def test_who_has_said_hello_is_not_pushed_out_by_those_of_the_same_address_that_say_nothing() -> None:
+    async with bridge_with(SECRET, max_strangers=3) as bridge:
+        reader, early = await asyncio.open_connection(*bridge.address)
+        early.write(frame(encode_message(Hello(role="operator", nonce=b"n" * 32))))
+        async with asyncio.timeout(PATIENCE):
+            assert b"challenge" in await reader.read(1024)
+        silent = [(await asyncio.open_connection(*bridge.address))[1] for _ in range(9)]
+        await happens(lambda: bridge.counters.endings["full"] == 6)
+        early.write(frame(encode_message(Hello(role="operator", nonce=b"n" * 32, proof=b"p" * 32))))
+        async with asyncio.timeout(PATIENCE):
+            assert b"wrong link secret" in await reader.read()
+        for writer in (early, *silent):
+            writer.transport.abort()
+
+
 async def test_connections_are_accepted_at_a_bounded_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link_acceptor, "BURST", 2)
     monkeypatch.setattr(link_acceptor, "RATE", 0.001)

@@ -147,6 +147,14 @@ async def test_a_link_reads_nothing_that_was_recorded_before_it_was_made_and_all
         assert read == {"operator": 3, "supervisor": 1}
 
 
+@pytest.mark.parametrize("path", ["", "/one", "/one/chunks/0", "/one/records?from=1&to=9", "/one/file"])
+async def test_nothing_of_a_recording_is_kept_by_a_browser_whose_link_may_end(path: str, tmp_path: Path) -> None:
+    Story(events=20).write(tmp_path / "one.mcap")
+    async with running_rig(recording=RecordingSettings(directory=tmp_path, free_bytes=0)) as rig:
+        answer = await rig.http.get(f"/api/recordings{path}", headers=rig.token("supervisor"))
+        assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
+
+
 async def test_what_is_sent_for_long_ends_with_its_link(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ends: list[tuple[str, str]] = []
 
