@@ -9,6 +9,8 @@ export interface SoundBacklog {
 }
 
 export const MOST_MS = 250;
+/** So much is never of use, whether it is heard or not. */
+const TOO_MUCH_MS = 1000;
 /** After an outage the newest sound is far ahead for a moment, until the jitter buffer goes on with it. */
 const PATIENCE_MS = 300;
 const KEEP_MS = 40;
@@ -47,6 +49,8 @@ export function waitingMs(queued: number, playing: number, clockRate: number): n
 /**
  * Takes the last sound that went on to the decoder and the one being played; says from where to go on, or null: leave
  * nothing out. What was dropped before the decoder does not wait, else what comes next would be left out for it as well.
+ * `isTooOld`: what plays does not pass the gate. While it does, what waits is the browser's buffer against jitter, which
+ * fills again after each time that something is left out: sound would be lost for nothing.
  */
 export function skipTarget(
   backlog: SoundBacklog,
@@ -54,11 +58,12 @@ export function skipTarget(
   playing: number,
   clockRate: number,
   now: number,
+  isTooOld: boolean,
 ): number | null {
   if (backlog.skipTo !== null && rtpGap(backlog.skipTo, playing) > 0) return null;
   backlog.skipTo = null;
   const waiting = rtpGap(queued, playing);
-  if (waitingMs(queued, playing, clockRate) <= MOST_MS) {
+  if (waitingMs(queued, playing, clockRate) <= (isTooOld ? MOST_MS : TOO_MUCH_MS)) {
     backlog.overSinceMs = null;
     return null;
   }

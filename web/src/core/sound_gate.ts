@@ -14,7 +14,7 @@ import {
 /** When no new segment came for this long, what plays is the decoder's concealment: its own invention. */
 const CONCEALED_MS = 200;
 /** A browser that has not worked off the sound of its start by then is not about to. */
-const START_MS = 5000;
+export const START_MS = 5000;
 
 /** The gate of one audio stream. A segment counts by the verdict at its start. */
 export interface SoundGate {
@@ -22,6 +22,7 @@ export interface SoundGate {
   playing: number | null; // RTP timestamp of the segment being played
   playingSinceMs: number;
   judged: boolean; // whether that segment is counted
+  isTooOld: boolean; // what plays now
   starting: boolean; // nothing was heard yet, and the browser plays what waited while it opened its sound device
   playsSinceMs: number | null; // anything at all
 }
@@ -29,7 +30,14 @@ export interface SoundGate {
 const NOT_STARTED = { starting: true, playsSinceMs: null };
 
 export function createSoundGate(): SoundGate {
-  return { counts: createCounts(), playing: null, playingSinceMs: 0, judged: false, ...NOT_STARTED };
+  return {
+    counts: createCounts(),
+    playing: null,
+    playingSinceMs: 0,
+    judged: false,
+    isTooOld: false,
+    ...NOT_STARTED,
+  };
 }
 
 /**
@@ -65,6 +73,7 @@ export function observeSound(
     ageOf(mark, context),
   );
   if (stamp !== null) counts.stamp = stamp;
+  gate.isTooOld = verdict === "discard";
   gate.starting &&= verdict === "discard" && waiting > MOST_MS && now - gate.playsSinceMs < START_MS;
   if (gate.starting) return false;
   noteSeen(counts, gap);

@@ -1,7 +1,7 @@
 import { judge } from "../core/media_gate";
 import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../core/medium_counts";
 import { createSoundBacklog, skipTarget, waitingMs } from "../core/sound_backlog";
-import { createSoundGate, observeSound } from "../core/sound_gate";
+import { START_MS, createSoundGate, observeSound } from "../core/sound_gate";
 import { findMark } from "../core/stamp_book";
 import type { Section } from "../rtc/section";
 import type { StreamInfo } from "../wire";
@@ -17,6 +17,7 @@ export class SoundStream {
   private readonly output: SoundOutput;
   private readonly backlog = createSoundBacklog();
   private droppedAtStart = 0; // before decoding, to begin with the newest
+  private skipsStart = false; // what is left out, or was last, waited while the browser opened its sound device
 
   constructor(
     readonly info: StreamInfo,
@@ -49,10 +50,11 @@ export class SoundStream {
     now: number,
   ): boolean {
     const queued = this.section.stamps?.queued ?? null;
-    if (queued !== null) this.catchUp(playing, queued, now);
     const waiting = queued === null ? 0 : waitingMs(queued, playing, this.clockRate());
     const passes = observeSound(this.gate, playing, mark, context, audible, now, waiting);
-    if (this.isStarting()) this.droppedAtStart = this.section.stamps?.dropped ?? 0;
+    if (queued !== null) this.catchUp(playing, queued, now);
+    if (this.isStarting() || (this.skipsStart && this.backlog.skipTo !== null))
+      this.droppedAtStart = this.section.stamps?.dropped ?? 0;
     return passes;
   }
 
@@ -74,8 +76,10 @@ export class SoundStream {
   private catchUp(playing: number, queued: number, now: number): void {
     const { stamps } = this.section;
     if (this.reader === null || stamps === null) return;
-    const before = skipTarget(this.backlog, queued, playing, this.clockRate(), now);
-    if (before !== null) this.reader.skip(stamps, before);
+    const before = skipTarget(this.backlog, queued, playing, this.clockRate(), now, this.gate.isTooOld);
+    if (before === null) return;
+    this.skipsStart = now - (this.gate.playsSinceMs ?? now) < START_MS;
+    this.reader.skip(stamps, before);
   }
 
   private clockRate(): number {
