@@ -280,7 +280,10 @@ async def _list(
     request: Request, library: Library, caller: Right, before: int = 0, limit: int = MAX_LISTED
 ) -> RecordingList:
     right = _right(request, caller)
-    entries = await _service(request).in_thread(library.entries)
+    try:
+        entries = await _service(request).in_thread(library.entries)
+    except (RecordingError, OSError) as error:
+        raise _told(error) from error
     found = [each for each in entries if right.sees(each.ended) and (not before or each.started < before)]
     return RecordingList(state=library.state(), recordings=found[:limit], older=max(0, len(found) - limit))
 

@@ -47,6 +47,8 @@ class AuditFile:
 
     def write(self, records: list[AuditRecord]) -> None:
         """All of them, safely on disk, or none."""
+        if self._handle is not None and not self._is_there(self._handle):
+            self.close()  # somebody moved or deleted it, or has put something else in its place
         self.open()
         data, head = self._chained(records)
         if self._size and self._size + len(data) > self._max_bytes:
@@ -70,10 +72,19 @@ class AuditFile:
         if self._handle is None:
             self._opened()
             try:
-                self.last, self.head = _end_of(self._path)
+                last, head = _end_of(self._path)
             except OSError:
                 self.close()  # else the next record would begin a chain of its own
                 raise
+            if last >= self.last:  # else records of this run are gone: the chain goes on behind them, which shows that
+                self.last, self.head = last, head
+
+    def _is_there(self, handle: int) -> bool:
+        """Whether what is written here can be found at the path."""
+        try:
+            return os.path.samestat(os.fstat(handle), os.stat(self._path))
+        except FileNotFoundError:
+            return False
 
     def _chained(self, records: list[AuditRecord]) -> tuple[bytes, str]:
         """Their lines, and the hash of the last one."""

@@ -241,7 +241,7 @@ OPERATIONS: tuple[Operation, ...] = (
     ),
     Operation(
         *("get", "/api/recordings", "Whether the session is recorded, and what was.", 200, RecordingList),
-        errors=(BadParameter,),
+        errors=(BadParameter, RecordingUnreadable, RecordingFailed),
         parameters=(BEFORE, LISTED),
     ),
     Operation(

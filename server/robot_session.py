@@ -1,13 +1,14 @@
 """One robot's whole session: console, media, seat, recorder, scene, audit. Everything that one robot does not share."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
 from server.audit_log import AuditLog, open_audit_log
 from server.console import Console
 from server.event_clock import EventClock
 from server.evidence.anchors import anchor_text
+from server.faults import Faults
 from server.house import House
 from server.link_warden import LinkWarden
 from server.log_context import follow_clock
@@ -32,6 +33,8 @@ from server.voice import VoiceService
 
 __all__ = ["running_session"]
 
+RESTART_AFTER = 1.0  # s until a background task that failed runs again
+
 
 @asynccontextmanager
 async def running_session(
@@ -42,7 +45,7 @@ async def running_session(
     robot: str = "",
     stops: StopKeeper | None = None,
 ) -> AsyncIterator[Services]:
-    """While entered, the session runs. A fault in a task of its own ends it, and comes out as an ExceptionGroup.
+    """While entered, the session runs. A fault of what drives ends it, and comes out as an ExceptionGroup.
 
     Args:
         directory: where it keeps what is its own
@@ -51,7 +54,7 @@ async def running_session(
     """
     with open_audit_log(directory, settings, robot, house.state.signer) as audit:
         async with (
-            _running_stops(settings, house, directory, stops) as keeper,
+            _running_stops(settings, house, directory, stops, metrics) as keeper,
             _session(settings, house, metrics, directory, robot, audit, keeper) as made,
         ):
             house.wardens.append(made.warden)
@@ -63,7 +66,7 @@ async def running_session(
 
 @asynccontextmanager
 async def _running_stops(
-    settings: Settings, house: House, directory: StateDir, stops: StopKeeper | None
+    settings: Settings, house: House, directory: StateDir, stops: StopKeeper | None, metrics: Metrics
 ) -> AsyncIterator[StopKeeper]:
     if stops is not None:
         yield stops
@@ -71,9 +74,21 @@ async def _running_stops(
     keeper = StopKeeper(directory.path, settings.robot, lasts=house.state.lasts)
     await keeper.load()
     async with asyncio.TaskGroup() as tasks:
-        running = tasks.create_task(keeper.run(), name="kept stops")
+        running = tasks.create_task(_run_on("kept stops", keeper.run, metrics.faults), name="kept stops")
         yield keeper
         running.cancel()
+
+
+async def _run_on(name: str, run: Callable[[], Awaitable[None]], faults: Faults) -> None:
+    """Until cancelled, or until it is done. What serves besides takes nobody's control and no STOP with it."""
+    while True:
+        try:
+            await run()
+        except Exception as error:
+            faults.caught(name, error, what="a background task, which runs again")
+            await asyncio.sleep(RESTART_AFTER)
+        else:
+            return
 
 
 @asynccontextmanager
@@ -155,14 +170,19 @@ async def _session(
         async with asyncio.TaskGroup() as tasks:
             running = [
                 tasks.create_task(console.run(), name="console"),
-                tasks.create_task(sources.run(), name="sources"),
-                tasks.create_task(voice.run(), name="voice"),
-                tasks.create_task(publishers.run(), name="publishers"),
-                tasks.create_task(recorder.run(), name="recorder"),
-                tasks.create_task(relays.run(), name="relays"),
+                *(
+                    tasks.create_task(_run_on(name, run, metrics.faults), name=name)
+                    for name, run in (
+                        ("sources", sources.run),
+                        ("voice", voice.run),
+                        ("publishers", publishers.run),
+                        ("recorder", recorder.run),
+                        ("relays", relays.run),
+                    )
+                ),
             ]
             if scene is not None:
-                running.append(tasks.create_task(scene.run(), name="scene"))
+                running.append(tasks.create_task(_run_on("scene", scene.run, metrics.faults), name="scene"))
             yield made
             for task in running:
                 task.cancel()

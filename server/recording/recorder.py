@@ -136,7 +136,7 @@ class Recorder(SessionTap):
                     self._tell(self.state())
                     ticks += 1
                     if ticks % PRUNE_TICKS == 1:
-                        self._tell_pruned(await asyncio.to_thread(self.shelf.prune))
+                        self._tell_pruned(await asyncio.to_thread(self._prune))
         finally:
             await asyncio.shield(self.close())
 
@@ -148,6 +148,14 @@ class Recorder(SessionTap):
             return self.shelf.prune()
         except OSError as error:
             log.error("the directory of recordings cannot be used", reason=str(error))
+            return []
+
+    def _prune(self) -> list[str]:
+        """As `_prepare`; it is tried again."""
+        try:
+            return self.shelf.prune()
+        except OSError as error:
+            log.error("the directory of recordings cannot be read", reason=str(error))
             return []
 
     def _tell_pruned(self, gone: list[str]) -> None:

@@ -75,15 +75,16 @@ class Shelf:
         self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
 
     def files(self) -> list[Path]:
+        """Raises OSError: the directory cannot be read."""
         return [path for path in self.directory.glob(f"*{SUFFIX}") if path.is_file()]
 
     def path(self, recording_id: str) -> Path | None:
-        """None: there is none of that id."""
+        """None: there is none of that id. Raises OSError."""
         alike = (path for path in self.directory.glob(f"*{SUFFIX}") if path.stem == recording_id)
         return next((path for path in alike if path.is_file()), None)
 
     def entries(self) -> list[RecordingEntry]:
-        """The newest first. Files that are being written are not among them."""
+        """The newest first. Files that are being written are not among them. Raises OSError."""
         with self._busy:
             if not self._is_still(self._listed):
                 self._listed = self._list()
@@ -151,7 +152,11 @@ class Shelf:
         return count
 
     def prune(self, keep: Collection[Path] = ()) -> list[str]:
-        """Delete recordings that are too old, and the oldest while there are too many bytes; returns their ids."""
+        """Delete recordings that are too old, and the oldest while there are too many bytes; returns their ids.
+
+        Raises:
+            OSError: the directory cannot be read.
+        """
         dated = []
         for path in self.files():
             with suppress(OSError):  # somebody else deletes too

@@ -1,6 +1,7 @@
 import os
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from server.audit import AuditRecord
@@ -184,3 +185,25 @@ def test_while_the_end_of_the_log_cannot_be_read_nothing_begins_another_chain(
 
 def _unreadable(path: Path) -> list[tuple[AuditRecord, bytes]]:
     raise OSError(5, "Input/output error")
+
+
+def test_a_log_that_somebody_moves_deletes_or_replaces_meanwhile_is_written_again_behind_what_was_written(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "audit.jsonl"
+    file = _file(path)
+    file.write([_record(1), _record(2)])
+    path.rename(tmp_path / "moved")
+    path.mkdir()
+    with pytest.raises(OSError, match="directory"):
+        file.write([_record(3)])
+    path.rmdir()
+    file.write([_record(3)])
+    path.unlink()
+    file.write([_record(4)])
+    file.close()
+    assert _numbers(tmp_path / "moved") == [1, 2]
+    (line,) = path.read_bytes().splitlines()
+    assert _numbers(path) == [4]
+    gone = msgspec.json.decode(line)["before"]
+    assert gone not in ("0" * 64, line_hash((tmp_path / "moved").read_bytes().splitlines()[-1])), "record 3 is missed"
