@@ -11,10 +11,10 @@ import pytest
 from robot_bridge.protocol.console import Notice, SilenceStops
 from robot_bridge.protocol.serial import event_after
 from server.audit import Actor
+from server.console import Console
 from server.fleet import session
 from server.fleet.tiles import FAILED
 from server.media.plane import MediaPlane
-from server.recording.recorder import Recorder
 from server.robot_session import running_session
 from server.services import Services
 from server.stop_presses import MAX_PENDING, new_press
@@ -26,19 +26,19 @@ class Faults:
     """Ends a robot's session by a fault, when told to."""
 
     def __init__(self) -> None:
-        self._told: dict[Recorder, asyncio.Event] = {}
+        self._told: dict[Console, asyncio.Event] = {}
         self.may_begin = asyncio.Event()  # the next session
         self.may_begin.set()
 
-    async def until_told(self, recorder: Recorder) -> None:
-        told = self._told[recorder] = asyncio.Event()
+    async def until_told(self, console: Console) -> None:
+        told = self._told[console] = asyncio.Event()
         await told.wait()
         raise RuntimeError("a fault of ours")
 
     async def end(self, rig: FleetRig, name: str) -> None:
         """Returns while there is no session, and there is none until `back`."""
         self.may_begin.clear()
-        self._told[rig.session(name).recorder].set()
+        self._told[rig.session(name).console].set()
         await eventually(lambda: rig.fleet.sessions[name].services is None)
 
     async def back(self, rig: FleetRig, name: str) -> None:
@@ -52,8 +52,12 @@ class Faults:
 def faults(monkeypatch: pytest.MonkeyPatch) -> Faults:
     made = Faults()
 
-    async def run(recorder: Recorder) -> None:
-        await made.until_told(recorder)
+    serve = Console.run
+
+    async def run(console: Console) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(serve(console))
+            await made.until_told(console)
 
     @asynccontextmanager
     async def running(*arguments: Any) -> AsyncIterator[Services]:
@@ -61,7 +65,7 @@ def faults(monkeypatch: pytest.MonkeyPatch) -> Faults:
         async with running_session(*arguments) as services:
             yield services
 
-    monkeypatch.setattr(Recorder, "run", run)
+    monkeypatch.setattr(Console, "run", run)
     monkeypatch.setattr(session, "running_session", running)
     return made
 
