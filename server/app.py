@@ -16,7 +16,7 @@ from server.log_context import LogContext
 from server.metrics import Metrics
 from server.openapi import openapi_document
 from server.page import page_router
-from server.robot_session import running_session
+from server.robot_session import run_on, running_session
 from server.services import Services
 from server.settings import Settings
 from server.state import ConsoleState
@@ -38,7 +38,12 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
             async with asyncio.TaskGroup() as tasks:
                 running = [
                     tasks.create_task(house.run(), name="links"),
-                    tasks.create_task(sweep_forever(lambda: peers.ended, lambda: clock.moving), name="sweeper"),
+                    tasks.create_task(
+                        run_on(
+                            "sweeper", lambda: sweep_forever(lambda: peers.ended, lambda: clock.moving), metrics.faults
+                        ),
+                        name="sweeper",
+                    ),
                 ]
                 yield
                 for task in running:

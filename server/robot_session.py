@@ -31,7 +31,7 @@ from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
 from server.voice import VoiceService
 
-__all__ = ["running_session"]
+__all__ = ["run_on", "running_session"]
 
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
@@ -74,12 +74,12 @@ async def _running_stops(
     keeper = StopKeeper(directory.path, settings.robot, lasts=house.state.lasts)
     await keeper.load()
     async with asyncio.TaskGroup() as tasks:
-        running = tasks.create_task(_run_on("kept stops", keeper.run, metrics.faults), name="kept stops")
+        running = tasks.create_task(run_on("kept stops", keeper.run, metrics.faults), name="kept stops")
         yield keeper
         running.cancel()
 
 
-async def _run_on(name: str, run: Callable[[], Awaitable[None]], faults: Faults) -> None:
+async def run_on(name: str, run: Callable[[], Awaitable[None]], faults: Faults) -> None:
     """Until cancelled, or until it is done. What serves besides takes nobody's control and no STOP with it."""
     while True:
         try:
@@ -171,7 +171,7 @@ async def _session(
             running = [
                 tasks.create_task(console.run(), name="console"),
                 *(
-                    tasks.create_task(_run_on(name, run, metrics.faults), name=name)
+                    tasks.create_task(run_on(name, run, metrics.faults), name=name)
                     for name, run in (
                         ("sources", sources.run),
                         ("voice", voice.run),
@@ -182,7 +182,7 @@ async def _session(
                 ),
             ]
             if scene is not None:
-                running.append(tasks.create_task(_run_on("scene", scene.run, metrics.faults), name="scene"))
+                running.append(tasks.create_task(run_on("scene", scene.run, metrics.faults), name="scene"))
             yield made
             for task in running:
                 task.cancel()

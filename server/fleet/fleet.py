@@ -79,7 +79,9 @@ class Fleet:
                 tasks.create_task(house.run(), name="links"),
                 tasks.create_task(self._guard("fleet", self._look), name="fleet"),
                 tasks.create_task(self._guard("board", board.run), name="board"),
-                tasks.create_task(sweep_forever(self._ended, self._moving), name="sweeper"),
+                tasks.create_task(
+                    self._guard("sweeper", lambda: sweep_forever(self._ended, self._moving)), name="sweeper"
+                ),
             ]
             settled = [tasks.create_task(each.settled.wait()) for each in self.sessions.values()]
             await asyncio.wait(settled, timeout=START_SECONDS)

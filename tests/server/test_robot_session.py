@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from server import robot_session
+from server import app, robot_session
 from server.media.sources.desk import SourceDesk
 from server.recording import recorder
 from server.recording.recorder import Recorder
@@ -48,6 +48,23 @@ async def test_a_fault_of_a_background_task_is_counted_and_takes_neither_the_ses
         answer = await rig.http.post("/api/stop", headers=rig.token("observer"), json={})
         assert (answer.status_code, answer.json()["delivered"]) == (200, True)
         assert not peer.closed.is_set()
+
+
+async def test_a_machine_that_gives_no_more_threads_takes_neither_the_session_nor_stop_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(robot_session, "RESTART_AFTER", 0.01)
+    runs: list[object] = []
+
+    async def fails(ended: object, moving: object) -> None:
+        runs.append(ended)
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(app, "sweep_forever", fails)
+    async with running_rig() as rig:
+        await eventually(lambda: len(runs) > 2)
+        answer = await rig.http.post("/api/stop", headers=rig.token("observer"), json={})
+        assert (answer.status_code, answer.json()["delivered"]) == (200, True)
 
 
 async def test_a_disk_whose_recordings_cannot_be_read_any_more_takes_neither_the_session_nor_stop_with_it(
