@@ -135,7 +135,14 @@ async def _without_pages(keeper: ChromiumKeeper) -> AsyncIterator[Browser]:
         await context.close()
 
 
-@pytest_asyncio.fixture(loop_scope="session")
-async def firefox(sound_card: SoundCard) -> AsyncIterator[Firefox]:
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def file_firefox(sound_card: SoundCard) -> AsyncIterator[Firefox]:
     async with running_firefox(sound_card.environment) as browser:
         yield browser
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def firefox(file_firefox: Firefox) -> AsyncIterator[Firefox]:
+    """With the sound card and an empty page, before and after."""
+    yield file_firefox
+    await file_firefox.open("about:blank")
