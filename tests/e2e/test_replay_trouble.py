@@ -19,6 +19,7 @@ from tests.support.stack import Stack
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
 EVENTS = 100  # to drive for: about five chunks
+DRAWN = {"/camera/overview", "/camera/front", "/lockstep/feedback"}  # each in a figure of its own
 CAMERAS = ("overview", "front")
 PCMU_BYTES = 160  # of 20 ms
 HEARD = re.compile(r"packets? · (silent|\S+ dB)")  # it was decoded
@@ -56,14 +57,17 @@ async def _record_a_drive_in_vp8_and_pcmu(stack: Stack) -> str:
     return found
 
 
-def _damage_the_last_chunk(path: Path) -> None:
+def _damage_the_last_chunk(path: Path) -> set[str]:
+    """The topics in it: a machine that was busy at the end may have brought no picture of a camera any more."""
     with RecordingReader(path) as reader:
         offset = reader.index.chunks[-1].offset + 500
+        records = list(reader.records())
     with path.open("r+b") as file:
         file.seek(offset)
         byte = file.read(1)
         file.seek(offset)
         file.write(bytes([byte[0] ^ 1]))
+    return {record.topic for record in records if record.chunk == records[-1].chunk}
 
 
 async def _seek(page: Page, event: int) -> None:
@@ -83,7 +87,7 @@ async def test_vp8_and_pcmu_are_played_and_damage_and_deletion_are_said_and_leav
 ) -> None:
     recording = await _record_a_drive_in_vp8_and_pcmu(own_stack)
     path = tmp_path / "state" / "recordings" / f"{recording}.mcap"
-    await asyncio.to_thread(_damage_the_last_chunk, path)
+    lost = await asyncio.to_thread(_damage_the_last_chunk, path)
     with RecordingReader(path) as reader:
         chunks = reader.index.chunks
         whole, later, damaged = chunks[0].last_event - 2, chunks[-1].first_event - 1, chunks[-1].last_event
@@ -104,7 +108,8 @@ async def test_vp8_and_pcmu_are_played_and_damage_and_deletion_are_said_and_leav
         await _seek(page, damaged)
         await replay.until(f"s.ready && s.event === {damaged} && s.unreadable.damaged === 1")
         await expect(page.get_by_text("1 damaged part", exact=True)).to_be_visible()
-        await expect(page.locator("figure").get_by_text("This part of the recording is damaged")).to_have_count(3)
+        say_so = page.locator("figure").get_by_text("This part of the recording is damaged")
+        await expect(say_so).to_have_count(len(lost & DRAWN))
         await _fits(page)
         await _ask(own_stack, "DELETE", f"/api/recordings/{recording}")
         await _seek(page, whole)  # it is loaded

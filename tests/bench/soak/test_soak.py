@@ -26,6 +26,6 @@ async def test_minutes_of_trouble_break_no_promise(minutes: str, observers: str)
     assert {name: verdict[name] for name in broken} == dict.fromkeys(broken, 0)
     assert verdict["violations"] == 0
     assert isinstance(verdict["memory_growth"], float)
-    assert verdict["executed"] > 100, "the operator drove"
+    assert verdict["executed"] > 20, "the operator drove"
     assert verdict["epochs"] == 2, "the bridge was killed and came back"
     assert verdict["refused"]["no_seat"] > 0, "the intruders tried"
