@@ -66,6 +66,8 @@ class SignatureChecker:
         self._last: SignatureRecord | None = None
         self._chunks: list[int] = []  # offsets
         self._index_chunks: list[int] = []  # as the summary has them
+        self._spans: list[tuple[int, int]] = []  # of the chunks: times of the first and last message, as they say
+        self._index_spans: list[tuple[int, int]] = []  # as the summary has them
         # Of the last chunk's messages, by channel, as far as no index has named them; None: it could not be read.
         self._positions: dict[int, list[tuple[int, int]]] | None = {}
         self._metadata = 0
@@ -92,7 +94,9 @@ class SignatureChecker:
         elif raw.opcode == Opcode.CHANNEL:
             self._channel(Channel.read(stream))
         elif raw.opcode == Opcode.CHUNK_INDEX:
-            self._index_chunks.append(ChunkIndex.read(stream).chunk_start_offset)
+            entry = ChunkIndex.read(stream)
+            self._index_chunks.append(entry.chunk_start_offset)
+            self._index_spans.append((entry.message_start_time, entry.message_end_time))
         elif raw.opcode == Opcode.DATA_END:
             self._behind_data = True
             if raw.content != NO_CHECKSUM:
@@ -135,6 +139,7 @@ class SignatureChecker:
         if self._positions:
             self._fault(f"chunk {number - 1} has no message index")
         self._positions = None
+        self._spans.append((chunk.message_start_time, chunk.message_end_time))
         try:
             check_packed(chunk)
             stream, length = get_chunk_data_stream(chunk, validate_crc=True)
@@ -154,7 +159,14 @@ class SignatureChecker:
             else:
                 stream.read(size)
                 self._fault(f"chunk {number} holds a record of kind {opcode} that nobody signed")
+        self._check_span(number)
         self._end_chunk(number)
+
+    def _check_span(self, number: int) -> None:
+        """A reader that looks for a time passes over chunks that say they have none of it."""
+        times = [time for found in (self._positions or {}).values() for time, _ in found]
+        if times and self._spans[number] != (min(times), max(times)):
+            self._fault(f"chunk {number} says that it is of another time than its messages are")
 
     def _message(self, message: Message, at: int) -> None:
         channel = self._channels[message.channel_id]
@@ -244,5 +256,7 @@ class SignatureChecker:
     def _compare_indexes(self) -> None:
         if self._index_chunks != self._chunks:
             self._fault("the summary names other chunks than there are")
+        elif self._index_spans != self._spans:
+            self._fault("the summary says that chunks are of another time than they are")
         if self._index is not None and [chunk.offset for chunk in self._index.chunks] != self._chunks:
             self._fault("the index names other chunks than there are")

@@ -144,6 +144,35 @@ def test_any_flipped_byte_is_named_wherever_it_lies(whole: bytes, path: Path) ->
         assert not verdict.ok or content(path) == meant, f"byte {at} of {len(whole)}"
 
 
+def _hidden_from(raw: RawRecord, at: int) -> RawRecord:
+    """The same, with the time of its first message (at byte `at`) behind that of its last."""
+    content = bytearray(raw.content)
+    content[at : at + 8] = (2**62).to_bytes(8, "little")
+    return RawRecord(raw.opcode, raw.offset, bytes(content))
+
+
+def test_a_chunk_that_hides_from_who_looks_for_its_time_is_named(path: Path) -> None:
+    rebuilt(path, lambda blocks: [[_hidden_from(blocks[0][0], 0), *blocks[0][1:]], *blocks[1:]])
+    assert "chunk 0 says that it is of another time than its messages are" in faults(verify_file(path))
+
+
+def test_a_summary_that_hides_a_chunk_from_who_looks_for_its_time_is_named(whole: bytes, path: Path) -> None:
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        records = list(raw_records(file))
+    changed, summary = bytearray(whole), bytearray()
+    index = next(raw for raw in records if raw.opcode == Opcode.CHUNK_INDEX)
+    changed[index.offset + 9 : index.offset + 17] = (2**62).to_bytes(8, "little")
+    end = next(raw for raw in records if raw.opcode == Opcode.DATA_END)
+    footer = next(raw for raw in records if raw.opcode == Opcode.FOOTER)
+    behind = end.offset + 9 + len(end.content)
+    at = footer.offset + 9 + len(footer.content) - 4
+    summary += changed[behind:at]
+    changed[at : at + 4] = zlib.crc32(summary).to_bytes(4, "little")
+    path.write_bytes(changed)
+    assert faults(verify_file(path)) == "the summary says that chunks are of another time than they are"
+
+
 def test_a_chunk_that_was_taken_out_is_named(path: Path) -> None:
     rebuilt(path, lambda blocks: [*blocks[:2], *blocks[3:]])
     verdict = verify_file(path)
