@@ -1,5 +1,6 @@
 """The page as its user handles it, and what it says of itself, for tests in Chromium."""
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -110,6 +111,19 @@ class ConsolePage:
         await self.press(RB)
         await self.tilt(LEFT_Y, -1)
         await self.until("s.driving && s.at_rest === false")
+
+    async def drive_on_until(self, condition: str, seconds: float = 60.0) -> None:
+        """Arm and drive forward until `condition`; again wherever the page has disarmed, as a bad network makes it."""
+        async with asyncio.timeout(seconds):
+            while True:
+                await self.arm()
+                await self.press(RB)
+                await self.tilt(LEFT_Y, -1)
+                await self.until(f"!s.armed || ({condition})", seconds)
+                if await self._missed(condition, 0) is None:
+                    return
+                await self.press(RB, False)
+                await self.tilt(LEFT_Y, 0)
 
     async def open_full_scene(self) -> None:
         """The 3D scene as the large view: where it is not shown, it is asked for first."""

@@ -26,10 +26,8 @@ async def test_with_bursts_of_loss_the_page_drives_and_shows_nothing_outside_the
         open_console(chromium, network.link(stack.operator)) as console,
     ):
         await console.until_live()
-        await console.arm()
-        await console.drive_forward()
         event = (await console.stats())["event"]
-        await console.until(f"s.event > {event + 30}")
+        await console.drive_on_until(f"s.event > {event + 30}")
         statistics = await console.stats()
         counts = network.statistics().paths
     streams = statistics["streams"]
