@@ -7,6 +7,7 @@ from server.recording.payload import own_record_of
 from server.recording.raw_records import MAGIC, raw_records
 from server.recording.reader import Record, RecordingReader
 from server.recording.records import RobotRecord
+from server.recording.scan import scan_file
 from server.recording.topics import stream_of
 from server.recording.verify import Verdict, Verifier
 from server.recording.verify_signature import SignatureChecker, SignatureReport
@@ -50,6 +51,7 @@ def _signatures(path: Path, reader: RecordingReader, key: str) -> SignatureRepor
         file.seek(len(MAGIC))
         for raw in raw_records(file):
             checker.take(raw)
+    checker.compare(scan_file(path, reader.info).index)
     return checker.report()
 
 

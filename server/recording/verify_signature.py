@@ -235,6 +235,14 @@ class SignatureChecker:
         if len(report.faults) < MOST:
             report.faults.append(SignatureFault(max(1, report.until_event), report.until_time, text))
 
+    def compare(self, records: EventIndex) -> None:
+        """`records`: the index that the records themselves give. Lists and timelines show the one in the file."""
+        if self._index is None or not self._report.signatures:
+            return
+        for name in ("first_event", "last_event", "started", "ended", "marks"):
+            if getattr(self._index, name) != getattr(records, name):
+                self._fault(f"the index has other {name.replace('_', ' ')} than the records")
+
     def report(self) -> SignatureReport:
         """After the last record."""
         report, last = self._report, self._last

@@ -18,6 +18,7 @@ from mcap.stream_reader import breakup_chunk
 
 from server.evidence.signer import Signer
 from server.recording.errors import RecordingError
+from server.recording.marks import Mark
 from server.recording.raw_records import MAGIC, RawRecord, raw_records
 from server.recording.reader import RecordingReader
 from server.recording.records import SignatureRecord
@@ -142,6 +143,18 @@ def test_any_flipped_byte_is_named_wherever_it_lies(whole: bytes, path: Path) ->
         except RecordingError:
             continue
         assert not verdict.ok or content(path) == meant, f"byte {at} of {len(whole)}"
+
+
+def test_an_index_that_shows_what_nobody_recorded_or_hides_it_is_named(path: Path) -> None:
+    path.unlink()
+    writer = Story(events=EVENTS).write(path, close=False, signing=signing())
+    mark = Mark(50, 0, "stop", "Mallory")
+    writer._builder.index = msgspec.structs.replace(writer._builder.index, marks=[mark], first_event=3)
+    writer.close()
+    assert faults(verify_file(path)).splitlines() == [
+        "the index has other first event than the records",
+        "the index has other marks than the records",
+    ]
 
 
 def _hidden_from(raw: RawRecord, at: int) -> RawRecord:
