@@ -145,6 +145,19 @@ def test_any_flipped_byte_is_named_wherever_it_lies(whole: bytes, path: Path) ->
         assert not verdict.ok or content(path) == meant, f"byte {at} of {len(whole)}"
 
 
+def test_a_chunk_that_cannot_be_read_is_named_and_those_behind_it_are_judged(whole: bytes, path: Path) -> None:
+    """Its compression has a name longer than the chunk."""
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        offset = [raw.offset for raw in raw_records(file) if raw.opcode == Opcode.CHUNK][3]
+    changed = bytearray(whole)
+    changed[offset + 9 + 28 : offset + 9 + 32] = b"\xff\xff\xff\x7f"
+    path.write_bytes(changed)
+    named = faults(verify_file(path))
+    assert f"the record at byte {offset} cannot be read" in named
+    assert "of another time" not in named
+
+
 def test_an_index_that_shows_what_nobody_recorded_or_hides_it_is_named(path: Path) -> None:
     path.unlink()
     writer = Story(events=EVENTS).write(path, close=False, signing=signing())
