@@ -4,6 +4,8 @@ import math
 import unicodedata
 from collections.abc import Iterable, Sequence
 
+import msgspec
+
 from robot_bridge.check_limits import check_limits
 from robot_bridge.errors import DescriptionError
 from robot_bridge.protocol.description import (
@@ -30,6 +32,7 @@ MAX_LAYERS = 32
 MAX_LIMITS = 256
 FARTHEST = 1e6  # m, of what is drawn; other numbers of it alike
 MAX_NAME = 200  # characters, of a name or a label
+MAX_BYTES = 60_000  # of JSON: a peer that says nothing else takes messages of 65,536 bytes (RFC 8841 6.1)
 SIDES = range(1, 8193)  # pixels
 FRAME_RATES = 240.0  # Hz
 SAMPLE_RATES = range(8000, 192_001)  # Hz
@@ -45,6 +48,8 @@ def check_description(description: RobotDescription) -> None:
     if not description.axes:
         raise DescriptionError("a robot needs at least one axis")
     check_bounds(description)
+    if (size := len(msgspec.json.encode(description))) > MAX_BYTES:
+        raise DescriptionError(f"{size} bytes of JSON, the bound is {MAX_BYTES}: fewer geoms or shorter names")
     if not 0 < description.hold <= 5:
         raise DescriptionError(f"hold must be in (0, 5] s, not {description.hold}")
     if description.watchdog is not None and not 0 < description.watchdog < description.hold:

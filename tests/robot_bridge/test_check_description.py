@@ -44,6 +44,7 @@ def test_the_planar_robots_description_is_sound() -> None:
     ("description", "message"),
     [
         (with_change(axes=()), "at least one axis"),
+        (with_change(bodies=tuple(Body(name=f"{each:0200}", parent="") for each in range(300))), "bytes of JSON"),
         (with_change(hold=0.0), "hold"),
         (with_change(hold=math.nan), "hold"),
         (with_change(max_event_age=11.0), "max_event_age"),
