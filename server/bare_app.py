@@ -1,6 +1,8 @@
 """What every app of a console begins and ends with, for one robot or several: house, errors, front door."""
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 
 import structlog
 from fastapi import Depends, FastAPI
@@ -31,10 +33,13 @@ LOOPBACK = "127.0.0.1"
 
 
 def bare_app(title: str, settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
-    """Without a route. It needs `app.state.house` before the first request."""
+    """Without a route. It needs `app.state.house` before the first request.
+
+    `app.state.failed` is set when what its lifespan runs has failed: then it serves nobody any more.
+    """
     app = FastAPI(
         title=title,
-        lifespan=lifespan,
+        lifespan=None if lifespan is None else _noticed(lifespan),
         dependencies=[Depends(_same_origin)],
         docs_url=None,
         redoc_url=None,
@@ -43,6 +48,20 @@ def bare_app(title: str, settings: Settings, lifespan: Lifespan[FastAPI] | None 
     app.state.settings = settings
     answer_errors(app)
     return app
+
+
+def _noticed(lifespan: Lifespan[FastAPI]) -> Lifespan[FastAPI]:
+    @asynccontextmanager
+    async def noticed(app: FastAPI) -> AsyncIterator[None]:
+        app.state.failed = asyncio.Event()
+        try:
+            async with lifespan(app):
+                yield
+        except BaseException:
+            app.state.failed.set()
+            raise
+
+    return noticed
 
 
 def open_house(

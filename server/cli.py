@@ -51,7 +51,7 @@ from server.heap import share_arenas
 from server.link_access import link_access
 from server.logs import LogFormat, configure_logs
 from server.media_addresses import NoSuchAddress, check_media_addresses
-from server.run_console import run_console, say
+from server.run_console import ConsoleFailed, run_console, say
 from server.serve import PortTaken, bind
 from server.settings import Settings
 from server.state import open_state
@@ -61,6 +61,7 @@ from server.unknown_settings import unknown_settings
 __all__ = ["app", "main"]
 
 DEFAULT_ROBOT = "mobile-manipulator"
+EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_PORT_TAKEN = 3
 EXIT_BRIDGE = 4
@@ -372,6 +373,9 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     except BridgeFailed as error:
         say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error
+    except ConsoleFailed as error:
+        say("the console has failed, as the log says, and ends; start it again")
+        raise typer.Exit(EXIT_FAILED) from error
 
 
 def _check_files(settings: Settings) -> None:

@@ -29,10 +29,14 @@ from server.state import ConsoleState
 from server.state_dir import StateDirUnusable
 from server.tls import Certificate, ends_at, fingerprint, own_names, self_signed
 
-__all__ = ["run_console", "say"]
+__all__ = ["ConsoleFailed", "run_console", "say"]
 
 PATIENCE = 2.0  # s until somebody who waits for a robot is told so
 GC_THRESHOLDS = (5_000, 20, 10)  # allocations, young collections, middle collections
+
+
+class ConsoleFailed(Exception):
+    """What the console runs has failed. Whoever started it should start it anew: it would answer nobody any more."""
 
 
 async def run_console(
@@ -46,6 +50,9 @@ async def run_console(
 
     Args:
         bridges: of our own, by the robots' names; "" is the only robot of a console
+
+    Raises:
+        ConsoleFailed: the log says why.
     """
     certificate = _certificate(settings, state.directory.path)
     stopping = asyncio.get_running_loop().create_task(wait_for_signal())
@@ -66,9 +73,12 @@ async def run_console(
             with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
                 write_address(state.directory, url)
             background.append(tasks.create_task(_announce(application, links, as_json)))
-            await stopping
-            for task in background:
+            failed = tasks.create_task(application.state.failed.wait())
+            await asyncio.wait((stopping, failed), return_when=asyncio.FIRST_COMPLETED)
+            for task in (*background, failed):
                 task.cancel()
+        if not stopping.done():
+            raise ConsoleFailed
     finally:
         listener.close()
         stopping.cancel()
