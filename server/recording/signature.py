@@ -94,12 +94,12 @@ class Signatures:
     def head(self) -> str:
         return self._chain.head
 
-    def add(self, topic: str, event: int, arrived: int, captured: int, data: bytes, *, own: bool) -> None:
-        """`own`: it says which event held, and not which one it is stamped with."""
+    def add(self, topic: str, event: int, arrived: int, captured: int, data: bytes, *, feedback: bool) -> None:
+        """`feedback`: it is one. Other records may name an event that is still to come, or one long past."""
+        if feedback or not self._until:
+            self._event = event
         self._chain.add(topic, event, arrived, captured, data)
         self._until = arrived
-        if own or self._number == 0:
-            self._event = event
 
     def sign(self, *, final: bool) -> SignatureRecord:
         """What ends the chunk; `final`: and the file."""

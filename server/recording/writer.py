@@ -127,15 +127,13 @@ class RecordingWriter:
             return
         self._writer.add_message(channel, entry.arrived, entry.data, publish_time=entry.captured, sequence=entry.event)
         self._newest = entry.arrived
+        feedback = isinstance(entry.record, FeedbackRecord)
         if self._signatures is not None:
-            self._signatures.add(
-                entry.topic, entry.event, entry.arrived, entry.captured, entry.data, own=entry.record is not None
-            )
+            self._signatures.add(entry.topic, entry.event, entry.arrived, entry.captured, entry.data, feedback=feedback)
         if self._chunk_since is None:
             self._chunk_since = entry.arrived
         self._waiting += len(entry.data)
         micros = entry.arrived // 1000
-        feedback = isinstance(entry.record, FeedbackRecord)
         self._builder.add(entry.topic, entry.event, micros, keyframe=entry.keyframe, feedback=feedback)
         if entry.record is not None:
             for mark in self._marks.find(entry.record, micros):

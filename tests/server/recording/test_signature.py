@@ -23,7 +23,7 @@ from server.recording.raw_records import MAGIC, RawRecord, raw_records
 from server.recording.reader import RecordingReader
 from server.recording.records import SignatureRecord
 from server.recording.scan import complete_file
-from server.recording.signature import RecordingSigning
+from server.recording.signature import RecordingSigning, Signatures
 from server.recording.topics import SIGNATURE
 from server.recording.verify import Verdict
 from server.recording.verify_file import verify_file
@@ -112,6 +112,15 @@ def test_a_signed_recording_verifies_names_its_signer_and_is_signed_to_its_end(p
     found = verdict.signature
     assert (found.state, found.signer, found.signatures) == ("signed", KEY.public_key, chunks)
     assert (found.until_event, found.until_time) == (last, ended)
+
+
+@pytest.mark.parametrize("named", [17, 19])
+def test_a_signature_names_the_event_of_the_last_feedback_whatever_the_records_behind_it_name(named: int) -> None:
+    """A command names the event that it asks for, a report one that a peer has heard of."""
+    signatures = Signatures(signing(), INFO, [], "")
+    signatures.add("/lockstep/feedback", 18, 1, 1, b"{}", feedback=True)
+    signatures.add("/lockstep/command", named, 2, 2, b"{}", feedback=False)
+    assert signatures.sign(final=False).event == 18
 
 
 def test_the_file_stays_one_that_the_mcap_library_reads_with_a_schema_for_the_signatures(path: Path) -> None:

@@ -1,11 +1,12 @@
 """A ROS 2 robot for tests: a real node in a process of its own, over DDS on loopback."""
 
+import asyncio
 import json
 import platform
 import random
 import socket
 import sys
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,8 @@ from bench.processes import Running, running_process
 
 __all__ = [
     "EXAMPLES",
+    "PATIENCE",
+    "STAY",
     "RosBridge",
     "RosRobot",
     "have_ros",
@@ -29,6 +32,8 @@ NODE = Path(__file__).with_name("robot_node.py")
 # RTPS well-known ports (DDSI-RTPS 9.6.1.1): 7400 + 250 x domain is where a domain's participants find each other.
 DOMAINS = range(1, 100)
 FIRST_PORT, PORTS_PER_DOMAIN = 7400, 250
+PATIENCE = 30.0  # s; DDS takes a while to find everybody on a busy machine
+STAY = [0.0, 0.0]
 
 
 def have_ros() -> bool:
@@ -92,6 +97,27 @@ class RosRobot:
     async def tell(self, line: str) -> None:
         """`hush /odom`, `speak /odom` …, see robot_node.py. Returns after the robot's next tick."""
         await self.process.ask(line, 20)
+
+    async def noted(self, kind: str, condition: Callable[[list[dict[str, Any]]], bool]) -> list[dict[str, Any]]:
+        """Its notes of a kind, once they meet the condition."""
+        async with asyncio.timeout(PATIENCE):
+            while not condition(notes := list(self.notes(kind))):
+                await self.tell("tick")
+        return notes
+
+    async def ended_in_one_zero(self, motions: int = 1) -> list[dict[str, Any]]:
+        """The commands that reached it, once they ended in a zero, and every motion had one and no second one."""
+        await self.noted("twist", lambda twists: _zeros(twists) >= motions and twists[-1]["values"] == STAY)
+        for _ in range(5):  # a further word of the bridge would come within two of its repeats, 40 ms
+            await self.tell("tick")
+        twists = list(self.notes("twist"))
+        assert _zeros(twists) == motions
+        assert twists[-1]["values"] == STAY
+        return twists
+
+
+def _zeros(twists: list[dict[str, Any]]) -> int:
+    return sum(twist["values"] == STAY for twist in twists)
 
 
 @asynccontextmanager

@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +15,8 @@ from robot_bridge.robots.event_strip import read_event_strip
 from tests.robot_bridge.bridge_helpers import Operator
 from tests.support.ros2 import (
     EXAMPLES,
+    PATIENCE,
+    STAY,
     RosBridge,
     RosRobot,
     have_ros,
@@ -29,9 +30,7 @@ pytestmark = [
     pytest.mark.timeout(120),
 ]
 
-PATIENCE = 20.0  # s; DDS takes a while to find everybody on a busy machine
 GO = [0.4, 0.3]
-STAY = [0.0, 0.0]
 
 
 @pytest.fixture
@@ -81,28 +80,6 @@ async def driver(bridge: RosBridge) -> AsyncIterator[Driver]:
         yield operator
 
 
-async def noted(node: RosRobot, kind: str, condition: Callable[[list[Any]], bool]) -> list[Any]:
-    """The node's notes of a kind, once they meet the condition."""
-    async with asyncio.timeout(PATIENCE):
-        while not condition(notes := list(node.notes(kind))):
-            await node.tell("tick")
-    return notes
-
-
-def zeros(notes: list[Any]) -> int:
-    return sum(note["values"] == STAY for note in notes)
-
-
-async def ended_in_one_zero(node: RosRobot, motions: int = 1) -> None:
-    """The topic fell silent after a zero, and every motion had one."""
-    await noted(node, "twist", lambda twists: zeros(twists) >= motions and twists[-1]["values"] == STAY)
-    for _ in range(5):  # a further word of the bridge would come within two of its repeats, 40 ms
-        await node.tell("tick")
-    notes = list(node.notes("twist"))
-    assert zeros(notes) == motions
-    assert notes[-1]["values"] == STAY
-
-
 async def test_every_motion_ends_in_exactly_one_zero(bridge: RosBridge, node: RosRobot) -> None:
     """However it ends: hold ended, let go, stopped, link lost, bridge ended."""
     async with RobotLink(*bridge.address, "operator", name="test") as link:
@@ -111,14 +88,14 @@ async def test_every_motion_ends_in_exactly_one_zero(bridge: RosBridge, node: Ro
 
         await driver.drive(GO)
         await driver.until(lambda feedback: feedback.at_rest and feedback.issue > 1)
-        await ended_in_one_zero(node, motions=1)
+        await node.ended_in_one_zero(motions=1)
         assert len(list(node.notes("twist"))) > 5, "the command was not repeated"
 
         await driver.driven(GO, lambda feedback: feedback.axes == GO)
         for _ in range(5):  # repeats of a rest say nothing new
             driver.link.send(Rest(event=driver.feedback.event))
         await driver.until(lambda feedback: feedback.at_rest)
-        await ended_in_one_zero(node, motions=2)
+        await node.ended_in_one_zero(motions=2)
         x, _, yaw = driver.feedback.joints
         assert x > 0
         assert yaw > 0
@@ -129,18 +106,18 @@ async def test_every_motion_ends_in_exactly_one_zero(bridge: RosBridge, node: Ro
         driver.link.send(Stop(by="test"))
         await driver.until(lambda feedback: feedback.stop.stopped and feedback.at_rest)
         await driver.reset()
-        await ended_in_one_zero(node, motions=3)
+        await node.ended_in_one_zero(motions=3)
 
         await driver.arm()
         await driver.driven(GO, lambda feedback: feedback.axes == GO)
-    await ended_in_one_zero(node, motions=4)
+    await node.ended_in_one_zero(motions=4)
 
     async with RobotLink(*bridge.address, "operator", name="test") as link:
         driver = Driver(link)
         await driver.ready()
         await driver.driven(GO, lambda feedback: feedback.axes == GO)
         await bridge.process.end()
-        await ended_in_one_zero(node, motions=5)
+        await node.ended_in_one_zero(motions=5)
     assert all(forward <= GO[0] and turn <= GO[1] for forward, turn in (note["values"] for note in node.notes("twist")))
 
 
@@ -164,7 +141,7 @@ async def test_late_and_repeated_commands_do_not_reach_the_topic(
     await driver.next(Feedback)
     assert (await driver.refused(Command(event=first + 7, issue=1, values=[0.0, 1.2]))).reason == "out_of_order"
     await driver.until(lambda feedback: feedback.at_rest)
-    await ended_in_one_zero(node)
+    await node.ended_in_one_zero()
     twists = [note["values"] for note in node.notes("twist")]
     assert all(forward >= 0 and turn == 0 for forward, turn in twists), "a late or repeated command reached the topic"
     moving = [record["event"] for record in bridge.records("executed") if any(record["values"])]
@@ -186,13 +163,13 @@ async def test_old_odometry_is_a_fault_is_not_shown_as_fresh_and_stops(driver: D
         assert driver.feedback.unknown == ["base.vx", "base.wz", "base.x", "base.y", "base.yaw"]
         assert any(fault.startswith("/odom: nothing for") for fault in driver.feedback.faults)
         assert not driver.feedback.at_rest
-        await ended_in_one_zero(node, motion + 1)
+        await node.ended_in_one_zero(motion + 1)
         await node.tell("speak /odom")
         # Back again, but the stick was never let go: the robot must not start off by itself.
         await driver.driven(GO, lambda feedback: not feedback.unknown)
         await driver.drive(GO)
         assert any("let go once" in fault for fault in driver.feedback.faults)
-        await ended_in_one_zero(node, motion + 1)
+        await node.ended_in_one_zero(motion + 1)
         await driver.driven(STAY, lambda feedback: feedback.faults == [])
 
 
@@ -257,7 +234,7 @@ async def test_an_arm_is_driven_a_short_way_ahead_and_told_to_stay_once(tmp_path
         assert operator.feedback.axes[0] > 0.1
         assert operator.feedback.wrench[2] < -1.0
         await operator.until(lambda feedback: feedback.at_rest)
-    notes = await noted(node, "trajectory", lambda notes: len(notes) > 5)
+    notes = await node.noted("trajectory", lambda notes: len(notes) > 5)
     assert all(note["span"] == pytest.approx(0.1) for note in notes)
     ahead = [note["positions"][0] - note["measured"][0] for note in notes]
     assert max(ahead) < 0.8 * 0.5 + 0.8 * 0.1, "the arm was told to go farther than it may"
@@ -287,7 +264,7 @@ async def test_plain_twists_and_joint_states_are_spoken_too(tmp_path: Path, node
         await operator.ready()
         await operator.driven([0.3, 0.0, 0.5] + [0.0] * 5, lambda feedback: feedback.joints[3] > 0.1)
         await operator.until(lambda feedback: feedback.at_rest)
-        await ended_in_one_zero(node)
+        await node.ended_in_one_zero()
     joints = list(node.notes("joints"))
     assert max(note["velocities"][0] for note in joints) <= 0.5
     assert [any(note["velocities"]) for note in joints].count(False) == 1

@@ -14,16 +14,14 @@ from robot_bridge.link_client import RobotLink
 from robot_bridge.protocol.errors import LinkError
 from robot_bridge.protocol.messages import Feedback
 from tests.robot_bridge.bridge_helpers import Operator
-from tests.support.ros2 import EXAMPLES, RosRobot, have_ros, ros_python, running_ros_robot
+from tests.support.ros2 import EXAMPLES, PATIENCE, STAY, RosRobot, have_ros, ros_python, running_ros_robot
 
 pytestmark = [
     pytest.mark.skipif(not have_ros(), reason="there are no wheels of ROS 2 for this machine"),
     pytest.mark.timeout(120),
 ]
 
-PATIENCE = 30.0  # s; DDS takes a while to find everybody on a busy machine
 GO = [0.4, 0.3]
-STAY = [0.0, 0.0]
 
 # `lockstep robot --ros2`, and one of its calls that hangs while the file `hang` is there.
 A_BRIDGE = """
@@ -89,11 +87,8 @@ async def drive(bridge: RunningBridge, before: Callable[[], None]) -> None:
                 await driver.drive(GO)
 
 
-async def noted(node: RosRobot, condition: Callable[[list[Any]], bool]) -> list[Any]:
-    async with asyncio.timeout(PATIENCE):
-        while not condition(twists := [note["values"] for note in node.notes("twist")]):
-            await node.tell("tick")
-    return twists
+def ends_at_rest(twists: list[dict[str, Any]]) -> bool:
+    return any(twist["values"] == GO for twist in twists) and twists[-1]["values"] == STAY
 
 
 @pytest.mark.parametrize("how", ["tick", "executor", "interpreter", "frozen", "killed"])
@@ -115,7 +110,7 @@ async def test_a_base_that_is_driven_gets_a_zero_whatever_hangs(how: str, tmp_pa
                 bridge.process.pause()
             elif how == "killed":
                 await bridge.process.kill()
-            twists = await noted(node, lambda twists: GO in twists and twists[-1] == STAY)
+            twists = await node.noted("twist", ends_at_rest)
             for _ in range(10):
                 await node.tell("tick")
         finally:
