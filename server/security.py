@@ -9,7 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from server.errors import OriginRefused
 from server.robot_paths import below_robot
 
-__all__ = ["PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "check_origin", "scene_policy"]
+__all__ = ["FILE_POLICY", "PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "check_origin", "scene_policy"]
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 
@@ -20,6 +20,10 @@ PAGE_POLICY = (
     "img-src 'self' data: blob:; media-src 'self' blob:; font-src 'self' data:; connect-src 'self'; "
     "frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+
+# What is no document, a script or an answer of the API, loads nothing: a policy of the page's length in front of each
+# would be a twentieth of what a page's opening takes. SVG and what somebody opens by its address keep to it as well.
+FILE_POLICY = "default-src 'none'; frame-ancestors 'none'"
 
 # viser's client is one HTML file: inline script, script made from text, WebAssembly, workers and fonts from data and
 # blob URLs. So it is in an origin of its own that has no storage, no token and no rights (`sandbox` without
@@ -41,12 +45,14 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "X-Permitted-Cross-Domain-Policies": "none",
-    "Permissions-Policy": (
-        "gamepad=(self), fullscreen=(self), screen-wake-lock=(self), clipboard-write=(self), autoplay=(self), "
-        "microphone=(self), camera=(), geolocation=(), usb=(), serial=(), hid=(), midi=(), payment=(), "
-        "display-capture=(), browsing-topics=()"
-    ),
 }
+# For documents alone (Permissions Policy, 4.1).
+PERMISSIONS = (
+    "gamepad=(self), fullscreen=(self), screen-wake-lock=(self), clipboard-write=(self), autoplay=(self), "
+    "microphone=(self), camera=(), geolocation=(), usb=(), serial=(), hid=(), midi=(), payment=(), "
+    "display-capture=(), browsing-topics=()"
+)
+DOCUMENTS = ("text/html", "application/xhtml+xml")
 HSTS = "max-age=31536000"  # RFC 6797; no sub-domains: they are not ours to decide for
 
 
@@ -72,7 +78,11 @@ class SecurityHeaders:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 own = headers.get("Content-Security-Policy", "")
-                headers["Content-Security-Policy"] = scene_policy(scope) if of_scene else self._policy_with(own)
+                is_document = headers.get("content-type", "").startswith(DOCUMENTS)
+                policy = self._policy_with(own) if is_document else FILE_POLICY
+                headers["Content-Security-Policy"] = scene_policy(scope) if of_scene else policy
+                if is_document:
+                    headers["Permissions-Policy"] = PERMISSIONS
                 for name, value in self._headers.items():
                     headers[name] = value
             await send(message)

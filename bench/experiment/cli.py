@@ -17,7 +17,7 @@ from bench.experiment.endurance_run import EnduranceClient, run_endurance
 from bench.experiment.findings import Cell, Findings
 from bench.experiment.growth import run_growth
 from bench.experiment.matrix import GROWTH_SECONDS, OUTAGE_SECONDS, matrix_of, thesis_matrix_of
-from bench.experiment.outage import run_outages
+from bench.experiment.outage import OUTAGE_PROFILE, run_outages
 from bench.experiment.results import result_of
 from bench.experiment.run import run_experiment
 from bench.experiment.table import render_table
@@ -35,6 +35,7 @@ GROWTH_PROFILE = "hong-kong"
 OWN_ROBOT = "planar"
 RUN_SECONDS = 25.0
 ENDURANCE_SECONDS = 600.0
+ENDURANCE_NETWORK = "satellite"
 ENDURANCE_WORDS = ("connections", "reconnections", "seat_losses", "pictures", "violations")
 OWN_TOLERANCE = -1  # the profile's
 
@@ -69,7 +70,13 @@ def experiment_command(
         typer.Option(help=f"{', '.join(robot_names())}; unless given planar, and for thesis one of the thesis' kind."),
     ] = None,
     browser: Annotated[bool, typer.Option("--browser", help="The operator is a page in Chromium.")] = False,
-    network: Annotated[str, typer.Option(help="Of endurance: a network, or the file of one.")] = "satellite",
+    network: Annotated[
+        str | None,
+        typer.Option(
+            help="Of endurance and outage: a network, or the file of one; unless given satellite, and for outage "
+            "one of 40 ms round trip."
+        ),
+    ] = None,
     client: Annotated[
         EnduranceClient | None, typer.Option(help="Of endurance; unless given, as --browser says.")
     ] = None,
@@ -98,25 +105,25 @@ def experiment_command(
     session = _Session(report)
     try:
         if profile == "endurance":
-            lasting = replace(choices, profile=network, seconds=seconds or ENDURANCE_SECONDS)
+            lasting = replace(choices, profile=network or ENDURANCE_NETWORK, seconds=seconds or ENDURANCE_SECONDS)
             session.endure(lasting, client or ("chromium" if browser else "headless"))
         else:
-            _work(session, choices, seconds, robot)
+            _work(session, choices, seconds, robot, network)
     except KeyboardInterrupt:
         _say("interrupted: this is what was found so far")
     session.publish(json_to)
 
 
-def _work(session: "_Session", choices: Choices, seconds: float | None, robot: str | None) -> None:
+def _work(session: "_Session", choices: Choices, seconds: float | None, robot: str | None, network: str | None) -> None:
     if choices.profile == "outage":
-        session.outage(replace(choices, seconds=seconds or OUTAGE_SECONDS))
+        session.outage(replace(choices, seconds=seconds or OUTAGE_SECONDS), network)
     elif choices.profile == "growth":
         session.grow(replace(choices, seconds=seconds or GROWTH_SECONDS))
     elif choices.profile == "all":
         session.grow(replace(choices, seconds=GROWTH_SECONDS))
         for each in matrix_of(choices):
             session.drive(each)
-        session.outage(replace(choices, seconds=OUTAGE_SECONDS))
+        session.outage(replace(choices, seconds=OUTAGE_SECONDS), network)
     elif choices.profile == "thesis":
         for each in thesis_matrix_of(choices, robot):
             session.drive(each)
@@ -147,8 +154,9 @@ class _Session:
         self._findings.growth = self._run("growth", run_growth(choices, profile, _say))
         self._keep()
 
-    def outage(self, choices: Choices) -> None:
-        found = self._run("outage", run_outages(choices, _say))
+    def outage(self, choices: Choices, network: str | None) -> None:
+        profile = OUTAGE_PROFILE if network is None else _loaded(network)
+        found = self._run("outage", run_outages(choices, profile, _say))
         if found is not None:
             self._findings.outages.append(found)
             self._keep()
@@ -199,13 +207,17 @@ def _reason(error: BaseException) -> str:
     return f"{type(error).__name__} {error}".strip()
 
 
-def _fitted(choices: Choices) -> tuple[Profile, Choices]:
-    """The profile, and the choices with its tolerance unless they have one."""
+def _loaded(network: str) -> Profile:
     try:
-        profile = load_profile(choices.profile)
+        return load_profile(network)
     except ProfileError as error:
         _say(str(error))
         raise typer.Exit(EXIT_USAGE) from error
+
+
+def _fitted(choices: Choices) -> tuple[Profile, Choices]:
+    """The profile, and the choices with its tolerance unless they have one."""
+    profile = _loaded(choices.profile)
     tolerance = media_of(profile).tolerance if choices.tolerance < 0 else choices.tolerance
     return profile, replace(choices, profile=profile.name, tolerance=tolerance)
 

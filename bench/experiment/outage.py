@@ -12,7 +12,7 @@ from bench.driving import drive_on
 from bench.emulator.delay import Constant
 from bench.emulator.impairment import Impairment
 from bench.emulator.profile import Profile, TwoWay
-from bench.experiment.choices import Choices, media_of
+from bench.experiment.choices import Choices, media_of, round_trip_of
 from bench.experiment.outage_judge import Cut, Finding, judge_outage
 from bench.experiment.robot_log import records
 from bench.experiment.stage import Stage, running_stage
@@ -41,11 +41,12 @@ class Stick(Protocol):
 
 
 async def run_outages(
-    choices: Choices, say: Callable[[str], None], ways: Sequence[bool] = (False, True)
+    choices: Choices, profile: Profile, say: Callable[[str], None], ways: Sequence[bool] = (False, True)
 ) -> dict[str, Any]:
     """An outage for each of `ways`: whether packets wait in the network, or are lost. Raises ProcessFailed."""
     found = []
-    async with running_stage(choices.robot, OUTAGE_PROFILE, media_of(OUTAGE_PROFILE), choices.seed) as stage:
+    round_trip = round_trip_of(profile)
+    async with running_stage(choices.robot, profile, media_of(profile), choices.seed) as stage:
         for held in ways:
             say(f"outage of {choices.seconds:g} s, packets {'wait in the network' if held else 'are lost'}")
             cut, stick, description = await _cut(stage, choices, held)
@@ -56,9 +57,11 @@ async def run_outages(
                 max_event_age=description.max_event_age,
                 intentions=stick.intentions,
             )
-            found.append(_said(finding, held))
+            found.append(_said(finding, held, round_trip))
     return {
         "experiment": "outage",
+        "network": profile.name,
+        "round_trip_ms": round(round_trip * 1000, 1),
         "seconds": choices.seconds,
         "robot": choices.robot,
         "client": "chromium" if choices.browser else "headless",
@@ -72,7 +75,7 @@ async def run_outages(
     }
 
 
-def _said(finding: Finding, held: bool) -> dict[str, Any]:
+def _said(finding: Finding, held: bool, round_trip: float) -> dict[str, Any]:
     def ms(seconds: float | None) -> float | None:
         return None if seconds is None else round(seconds * 1000, 1)
 
@@ -85,6 +88,7 @@ def _said(finding: Finding, held: bool) -> dict[str, Any]:
         "oldest_intention_ms": ms(finding.oldest_intention),
         "max_event_age_ms": ms(finding.max_event_age),
         "control_ms": ms(control),
+        "control_round_trips": None if control is None or not round_trip else round(control / round_trip, 1),
         "rested_within_hold": finding.rested_within_hold,
         "nothing_queued_executed": finding.nothing_queued_executed,
         "control_within_2_s": control is not None and control <= RETURN_SECONDS,

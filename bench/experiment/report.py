@@ -306,10 +306,10 @@ def _outage_section(outages: Sequence[dict[str, Any]]) -> str:
     rows = [
         [
             _text(found["client"]),
-            f"{found['seconds']:g} s, packets {_text(each['packets'])}",
+            f"{found['seconds']:g} s, packets {_text(each['packets'])}, {_text(found['network'])}",
             _verdict(each["rested_within_hold"], f"{each['rest_ms']} of {each['hold_ms']} ms"),
             _verdict(each["nothing_queued_executed"], f"{each['oldest_answer_ms']} of {each['max_event_age_ms']} ms"),
-            _verdict(each["control_within_2_s"], f"{each['control_ms']} ms"),
+            _verdict(each["control_within_2_s"], f"{each['control_ms']} ms, {each['control_round_trips']} round trips"),
         ]
         for found in outages
         for each in found["outages"]

@@ -6,10 +6,11 @@ from pathlib import Path
 import httpx
 import pytest
 from fastapi import FastAPI, Response
+from fastapi.responses import HTMLResponse
 
 from server.errors import NotFound
 from server.page import page_router, script_policy
-from server.security import PAGE_POLICY, SecurityHeaders
+from server.security import FILE_POLICY, PAGE_POLICY, SecurityHeaders
 
 
 async def _get(directory: Path, path: str, encoding: str = "identity") -> httpx.Response:
@@ -127,10 +128,16 @@ async def test_a_page_may_run_the_script_that_stands_in_it_and_no_other(built: P
 @pytest.mark.parametrize("policy", ["script-src *", "script-src 'self' 'unsafe-inline'", "default-src *", "x"])
 async def test_an_answer_opens_nothing_else_of_the_policy(policy: str) -> None:
     app = FastAPI()
-    app.add_api_route("/", lambda: Response("", headers={"Content-Security-Policy": policy}), response_model=None)
+    own = {"Content-Security-Policy": policy}
+    app.add_api_route("/", lambda: HTMLResponse("", headers=own), response_model=None)
+    app.add_api_route("/file", lambda: Response("", headers=own, media_type="image/svg+xml"), response_model=None)
     app.add_middleware(SecurityHeaders)
     async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://console") as http:
-        assert (await http.get("/")).headers["content-security-policy"] == PAGE_POLICY
+        page, file = await http.get("/"), await http.get("/file")
+    assert page.headers["content-security-policy"] == PAGE_POLICY
+    assert "microphone=(self)" in page.headers["permissions-policy"]
+    assert file.headers["content-security-policy"] == FILE_POLICY, "what is no document loads nothing"
+    assert "permissions-policy" not in file.headers
 
 
 def test_a_page_without_scripts_asks_for_no_policy_of_its_own() -> None:

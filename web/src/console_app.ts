@@ -36,7 +36,7 @@ import type { FirstOpening } from "./rtc/first_opening";
 import type { ChannelName, Peer, PeerOptions } from "./rtc/peer";
 import { newReader } from "./rtc/stamp_reader";
 import { SessionDesk } from "./session_desk";
-import { reportOf } from "./statistics";
+import { reportOf } from "./report";
 import { StopSender } from "./stop_sender";
 import type { VoiceDesk } from "./voice_desk";
 import type { ClientMessage, Feedback, RobotState, ServerMessage, StreamInfo, Welcome } from "./wire";

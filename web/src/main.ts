@@ -1,6 +1,5 @@
 import "./style/console_page.css";
 import { readFragment } from "./core/fragment";
-import { installHook } from "./lockstep_hook";
 import { Page } from "./page";
 import { ConsoleApi } from "./rtc/console_api";
 import { takeFirst } from "./rtc/first_opening";
@@ -8,7 +7,6 @@ import { styled } from "./styled";
 
 const link = readFragment(location.hash);
 const page = new Page(new ConsoleApi(link.token ?? ""), link, link.name, takeFirst());
-installHook(page);
 if (link.token === null) page.app.link = { kind: "no_token" };
 void styled().then(() => {
   page.start();

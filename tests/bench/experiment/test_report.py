@@ -14,6 +14,8 @@ PROFILE = load_profile("micro-lan")
 MODES: tuple[Mode, ...] = ("off",)  # a figure takes a moment
 OUTAGE = {
     "experiment": "outage",
+    "network": "outage",
+    "round_trip_ms": 40.0,
     "seconds": 10.0,
     "client": "headless",
     "outages": [
@@ -24,6 +26,7 @@ OUTAGE = {
             "oldest_answer_ms": 80.0,
             "max_event_age_ms": 2000.0,
             "control_ms": 250.0,
+            "control_round_trips": 6.2,
             "rested_within_hold": True,
             "nothing_queued_executed": True,
             "control_within_2_s": True,

@@ -13,7 +13,7 @@ from bench.experiment.growth import MEDIA
 from bench.experiment.headless import headless_client
 from bench.experiment.measures import beyond
 from bench.experiment.operator_script import OperatorScript
-from bench.experiment.outage import run_outages
+from bench.experiment.outage import OUTAGE_PROFILE, run_outages
 from bench.experiment.stage import running_stage
 from server.cli import app
 from tests.bench.experiment.made_up import choices
@@ -85,7 +85,7 @@ def test_the_robots_of_the_thesis_kind_draw_the_event_that_is_looked_for_in_thei
 
 
 async def test_after_an_outage_nothing_that_was_queued_is_executed_and_the_operator_drives_again() -> None:
-    found = await run_outages(choices(seconds=2.5), lambda _: None, ways=[True])
+    found = await run_outages(choices(seconds=2.5), OUTAGE_PROFILE, lambda _: None, ways=[True])
     [outage] = found["outages"]
     assert outage["nothing_queued_executed"], outage
     assert outage["rest_ms"] is not None

@@ -3,7 +3,7 @@ import { note, robotIsUp } from "../core/console_state";
 import { staleAge } from "../core/freshness";
 import { sourceWords } from "../core/source_words";
 import { planViews, smallShape, type MovableCard, type ViewPlan } from "../core/view_room";
-import { stalenessOf } from "../statistics";
+import { stalenessOf } from "../report";
 import type { StreamInfo } from "../wire";
 import { h, setData, setHidden, setText } from "./dom";
 import type { SceneSwitch } from "./scene_switch";
