@@ -221,7 +221,7 @@ class LinkServer:
 
     def admit(self, peer: LinkPeer, hello: Hello) -> Hello | Goodbye:
         """Called once the peer has proven the secret, where there is one."""
-        if len(self._known) >= self._max_links:
+        if not self._has_room(hello):
             return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
         if hello.role == "operator" and self._operator is not None:
             return Goodbye(error="taken", detail="another operator link is open")
@@ -240,6 +240,11 @@ class LinkServer:
             case _:
                 self._media.add(peer)
         return self._hello
+
+    def _has_room(self, hello: Hello) -> bool:
+        """The last place is the operator's: whatever others open, a console comes back."""
+        others = len(self._known) - (self._operator is not None)
+        return others < (self._max_links if hello.role == "operator" else self._max_links - 1)
 
     def _is_kept_from(self, name: str) -> bool:
         """Whether somebody else's operator link broke just now: a stall gives the robot to nobody."""

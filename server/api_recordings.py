@@ -257,7 +257,7 @@ async def download(request: Request, recording_id: str, ticket: str = "") -> Res
     if not ticket:
         _told_audit(request, caller, "downloaded", recording_id)
     answer = FileResponse(
-        path, media_type="application/x-mcap", filename=path.name, headers={"Cache-Control": "no-store"}
+        path, media_type="application/x-mcap", filename=f"{recording_id}.mcap", headers={"Cache-Control": "no-store"}
     )
     return EndingResponse(answer, caller)
 

@@ -13,6 +13,7 @@ import msgspec
 
 from server.audit import AuditRecord
 from server.evidence.chain import GENESIS, ChainedLine, Place, line_hash
+from server.regular_file import bounded_lines, open_regular
 
 __all__ = ["AuditFile", "chained_lines", "chatter_path", "last_records", "rotated", "stored_records"]
 
@@ -153,12 +154,12 @@ def _stored(path: Path) -> Iterator[AuditRecord]:
 
 def chained_lines(path: Path) -> Iterator[ChainedLine]:
     """Of one file and of those that were set aside, oldest first."""
-    numbers = [int(each.suffix[1:]) for each in path.parent.glob(f"{path.name}.*") if each.suffix[1:].isdigit()]
-    for number in (*sorted(numbers, reverse=True), 0):
+    numbers = {int(each.suffix[1:]) for each in path.parent.glob(f"{path.name}.*") if each.suffix[1:].isdecimal()}
+    for number in (*sorted(numbers - {0}, reverse=True), 0):
         try:
-            with open(rotated(path, number), "rb") as file:
-                for count, line in enumerate(file, 1):
-                    yield ChainedLine(Place(rotated(path, number).name, count), line.rstrip(b"\n"))
+            with open_regular(rotated(path, number)) as file:
+                for count, line in enumerate(bounded_lines(file), 1):
+                    yield ChainedLine(Place(rotated(path, number).name, count), line)
         except FileNotFoundError:
             continue
 
@@ -183,7 +184,7 @@ def _end_of(path: Path) -> tuple[int, str]:
 def _last_lines(path: Path) -> Iterator[tuple[AuditRecord, bytes]]:
     for each in (rotated(path, 1), path):
         try:
-            with open(each, "rb") as file:
+            with open_regular(each) as file:
                 file.seek(max(0, os.fstat(file.fileno()).st_size - TAIL_BYTES))
                 lines = file.read(TAIL_BYTES).split(b"\n")
         except FileNotFoundError:

@@ -26,7 +26,7 @@ from server.evidence.anchors import ANCHORS_NAME
 from server.evidence.signer import KEY_FILE, evidence_signer, is_public_key
 from server.invitations import Invitation
 from server.links import console_link
-from server.names import printable
+from server.names import escaped, printable
 from server.recording.errors import RecordingError
 from server.settings import Settings
 from server.state import ConsoleState, open_state, robot_directory, state_path
@@ -241,7 +241,7 @@ def _state_words(invitation: Invitation, now: float) -> str:
 def _line(record: AuditRecord, as_json: bool) -> str:
     if as_json:
         return msgspec.json.encode(record).decode()
-    when = datetime.fromtimestamp(record.time).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    when = _when(record.time)
     who = f"{record.who} ({record.role})" if record.role else record.who
     # What stands in the file may be from anybody, and a terminal obeys what it prints.
     words = "  ".join(printable(each) for each in (who, record.what, record.detail) if each)
@@ -249,9 +249,17 @@ def _line(record: AuditRecord, as_json: bool) -> str:
     return f"{record.n:6}  {when}  s={record.event:<7} {record.kind:10}  {words}{times}"
 
 
+def _when(time: float) -> str:
+    """`time`: s since 1970, as a file says, which may be any number."""
+    try:
+        return datetime.fromtimestamp(time).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    except (ValueError, OverflowError, OSError):
+        return f"at {time:g} s"
+
+
 def _print_json(answer: object) -> None:
     sys.stdout.write(json.dumps(answer) + "\n")
 
 
 def _say(text: str) -> None:
-    typer.echo(f"lockstep: {text}", err=True)
+    typer.echo(f"lockstep: {escaped(text)}", err=True)

@@ -10,6 +10,7 @@ from server.audit_file import chained_lines, chatter_path
 from server.audit_store import audit_name
 from server.evidence.anchors import Anchor, AnchorFile, AnchorNote, check_anchors, parse_anchor
 from server.evidence.chain import ChainReport, check_chain
+from server.names import escaped
 from server.recording.payload import own_record
 from server.recording.reader import RecordingReader
 from server.recording.records import SignatureRecord
@@ -32,8 +33,8 @@ class AuditVerdict(NamedTuple):
     def say(self, path: Path) -> None:
         """Print it."""
         for name, report in ((path.name, self.own), (chatter_path(path).name, self.chatter)):
-            sys.stdout.write("\n".join(_chain_words(name, report)) + "\n")
-        sys.stdout.write("\n".join(_anchor_words(self)) + "\n")
+            sys.stdout.write("\n".join(map(escaped, _chain_words(name, report))) + "\n")
+        sys.stdout.write("\n".join(map(escaped, _anchor_words(self))) + "\n")
 
     def as_json(self) -> bytes:
         shown = [msgspec.structs.replace(each, hashes={}) for each in (self.own, self.chatter)]

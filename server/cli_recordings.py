@@ -1,6 +1,7 @@
 """The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`."""
 
 import asyncio
+import os
 import secrets
 import sys
 from collections.abc import Callable
@@ -8,6 +9,7 @@ from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
+from urllib.parse import quote
 
 import httpx
 import msgspec
@@ -19,11 +21,11 @@ from server.cli_extras import load_extra
 from server.console_address import read_address
 from server.evidence.anchors import parse_anchor
 from server.evidence.signer import is_public_key
-from server.names import printable
+from server.names import escaped, printable
 from server.recording.errors import RecordingError
 from server.recording.replay_app import create_replay_app
 from server.recording.settings import recordings_directory
-from server.recording.shelf import RecordingEntry, Shelf
+from server.recording.shelf import RecordingEntry, Shelf, recording_id
 from server.recording.verify import Verdict
 from server.recording.verify_file import verify_file
 from server.recording.verify_signature import SignatureReport
@@ -130,7 +132,8 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
             raise _usage("a public key has 64 hexadecimal digits")
         verdict = _or_usage(lambda: verify_file(path, key))
         if as_json:
-            sys.stdout.write(msgspec.json.encode({"file": str(path), **msgspec.to_builtins(verdict)}).decode() + "\n")
+            told = os.fsencode(path).decode(errors="replace")
+            sys.stdout.write(msgspec.json.encode({"file": told, **msgspec.to_builtins(verdict)}).decode() + "\n")
         else:
             sys.stdout.write(_in_words(verdict))
         if not verdict.ok:
@@ -154,7 +157,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         exporter: Any = load_extra(f"server.recording.export_{to.value}", "export")
         written = _or_usage(lambda: exporter.export(path, out, task))
         for each in written:
-            sys.stdout.write(f"{each}\n")
+            sys.stdout.write(f"{escaped(each)}\n")
 
 
 async def _replay(path: Path, host: str, port: int, as_json: bool) -> None:
@@ -163,16 +166,15 @@ async def _replay(path: Path, host: str, port: int, as_json: bool) -> None:
         access = Access(secrets.token_urlsafe(32), token_seconds=30 * 86_400.0, ticket_seconds=TICKET_SECONDS)
         own_host, own_port = listener.getsockname()[:2]
         url = f"http://{f'[{own_host}]' if ':' in own_host else own_host}:{own_port}"
-        link = f"{url}/recordings#token={access.issue('observer', 'replay')}&recording={path.stem}"
+        told = recording_id(path)
+        link = f"{url}/recordings#token={access.issue('observer', 'replay')}&recording={quote(told, safe='')}"
         app = create_replay_app(path, access, host)
         await asyncio.to_thread(app.state.recordings.library.entries)  # so that its index is known when it is asked for
         async with running(app, listener):
             if as_json:
-                sys.stdout.write(
-                    msgspec.json.encode({"console": url, "recording": path.stem, "link": link}).decode() + "\n"
-                )
+                sys.stdout.write(msgspec.json.encode({"console": url, "recording": told, "link": link}).decode() + "\n")
             else:
-                sys.stdout.write(f"\n  To look at {path.name}, open:   {link}\n\n")
+                sys.stdout.write(f"\n  To look at {escaped(path.name)}, open:   {link}\n\n")
             sys.stdout.flush()
             await wait_for_signal()
     finally:
@@ -282,4 +284,4 @@ def _usage(text: str) -> typer.Exit:
 
 
 def _say(text: str) -> None:
-    typer.echo(f"lockstep: {text}", err=True)
+    typer.echo(f"lockstep: {escaped(text)}", err=True)

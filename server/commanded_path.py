@@ -5,10 +5,11 @@ forwarded under each event; each counts from its own feedback until the next one
 than the robot holds a command. At rest nothing counts.
 """
 
+import copy
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from robot_bridge.protocol.description import BodyTwist, PlanarBase, RobotDescription
 from robot_bridge.protocol.messages import Feedback
@@ -72,6 +73,12 @@ class CommandedPath:
         self._records.append(_Record(feedback.event, feedback.time, tuple(feedback.joints), at_rest))
         while len(self._records) > 1 and self._records[1].time <= feedback.time - self.seconds:
             self._records.popleft()
+
+    def as_of_now(self) -> Self:
+        """To be asked for `poses` in another thread: for a robot of many parts that takes a while."""
+        found = copy.copy(self)
+        found._commands, found._records = dict(self._commands), self._records.copy()
+        return found
 
     def poses(self) -> dict[str, Pose] | None:
         """In the world, of every body; None where nothing was commanded, or the description does not say enough."""

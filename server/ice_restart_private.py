@@ -13,6 +13,7 @@ Private parts of aiortc and aioice that are used; tests pin every one of them:
 
 - `RTCIceGatherer._connection`, `._remote_candidates_end`, `RTCIceTransport._connection`, `._recv`, `._send`: what DTLS
   sends and receives with
+- `RTCDtlsTransport._state`: whether DTLS is connected
 - `RTCIceTransport.__monitor_task`, `._monitor`: it takes the end of the connection that it watches for the end of all
 - `aioice.Connection._queue`, `._query_consent_task`: the receive queue, and the checks that would end an old connection
 """
@@ -24,7 +25,8 @@ from typing import Any, NamedTuple
 
 import structlog
 from aioice.ice import Connection, StunProtocol
-from aiortc import RTCIceCandidate, RTCIceGatherer, RTCPeerConnection
+from aiortc import RTCDtlsTransport, RTCIceCandidate, RTCIceGatherer, RTCPeerConnection
+from aiortc.rtcdtlstransport import State
 from aiortc.rtcicetransport import RTCIceTransport, candidate_to_aioice
 
 from robot_bridge.protocol.ice_consent import keep_consent, require_consent_hooks
@@ -80,6 +82,7 @@ class IceSession:
         """`on_refused` gets the name of what a peer had too much of, `on_round_trip` each that was measured, in s."""
         self.tag = _new_tag()
         self.username = username  # the peer's, of the newest session
+        self._dtls = _dtls_of(pc)
         self._transport = _transport_of(pc)
         self._gatherer = gatherer
         self._connect_timeout = connect_timeout
@@ -155,8 +158,11 @@ class IceSession:
         await asyncio.gather(*self._lingering, return_exceptions=True)
 
     def _prepare(self, connection: Any) -> None:
-        guard_ice(connection, self._on_refused)
+        guard_ice(connection, self._on_refused, self._is_secured)
         keep_consent(connection, lambda: self._expired(connection), self._on_round_trip)
+
+    def _is_secured(self) -> bool:
+        return self._dtls is not None and self._dtls._state is State.CONNECTED
 
     def _expired(self, connection: Any) -> bool:
         """Whether the connection stays open, silent, for a restart that is under way."""
@@ -215,11 +221,16 @@ def keep_path(pc: RTCPeerConnection) -> None:
         keep_consent(transport._connection)
 
 
-def _transport_of(pc: RTCPeerConnection) -> RTCIceTransport | None:
+def _dtls_of(pc: RTCPeerConnection) -> RTCDtlsTransport | None:
     """The one transport: all sections are bundled."""
     for transceiver in pc.getTransceivers():
-        return transceiver.receiver.transport.transport
-    return None if pc.sctp is None else pc.sctp.transport.transport
+        return transceiver.receiver.transport
+    return None if pc.sctp is None else pc.sctp.transport
+
+
+def _transport_of(pc: RTCPeerConnection) -> RTCIceTransport | None:
+    dtls = _dtls_of(pc)
+    return None if dtls is None else dtls.transport
 
 
 def _queue_of(transport: Any) -> Any:

@@ -40,15 +40,18 @@ def body_pose(body: Body, joints: Mapping[str, float]) -> Pose:
 
 def scene_paths(description: RobotDescription) -> dict[str, str]:
     """The path of every body in the scene tree, "/robot/base/arm": parents first, no orphans."""
-    bodies = {body.name: body for body in description.bodies}
+    parents = {body.name: body.parent for body in description.bodies}
     paths: dict[str, str] = {}
     for body in description.bodies:
-        chain = [body.name]
-        while (parent := bodies[chain[-1]].parent) in bodies and len(chain) <= len(bodies):
-            chain.append(parent)
-        if parent == "":
-            paths[body.name] = "/robot/" + "/".join(name.replace("/", "_") for name in reversed(chain))
-    return dict(sorted(paths.items(), key=lambda item: item[1].count("/")))
+        chain, name = list[str](), body.name  # those whose path is not known yet: each is looked at once
+        while name in parents and name not in paths and len(chain) <= len(parents):
+            chain.append(name)
+            name = parents[name]
+        if name == "" or name in paths:
+            for each in reversed(chain):
+                paths[each] = f"{paths.get(parents[each], '/robot')}/{each.replace('/', '_')}"
+    found = {body.name: paths[body.name] for body in description.bodies if body.name in paths}
+    return dict(sorted(found.items(), key=lambda item: item[1].count("/")))
 
 
 def world_positions(description: RobotDescription, joints: Mapping[str, float]) -> list[Vector]:

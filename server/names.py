@@ -4,7 +4,7 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from enum import IntEnum
 
-__all__ = ["MAX_NAME", "clean_name", "printable", "unique_names"]
+__all__ = ["MAX_NAME", "clean_name", "escaped", "printable", "unique_names"]
 
 MAX_NAME = 40  # characters
 MAX_MARKS = 4  # on one character: more are drawn over the lines above and below
@@ -86,6 +86,11 @@ def _shown(text: str) -> Iterator[str]:
         marks = marks + 1 if unicodedata.category(each) in ("Mn", "Me") else 0
         if marks <= MAX_MARKS and ord(each) not in _BLANK:
             yield each
+
+
+def escaped(text: object) -> str:
+    """One line that a terminal only shows: a path, say, as it is but for what cannot be printed."""
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in str(text))
 
 
 def clean_name(wanted: str, fallback: str) -> str:

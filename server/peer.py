@@ -211,13 +211,13 @@ class Peer(ABC):
             self.send_text(channel, encode_console_message(message))
 
     def send_text(self, channel: ChannelName, text: str) -> None:
-        """Ignored while the channel is not open: a newcomer is told everything when it opens."""
-        if channel in self._writers:
+        """Ignored while the channel is not open: a newcomer is told everything when it opens. So is who has ended."""
+        if channel in self._writers and not self.ended:
             with self.contained("message out"):
                 self._writers[channel].send(text)
 
     def send_feedback(self, text: str) -> None:
-        if "control" in self._writers:
+        if "control" in self._writers and not self.ended:
             with self.contained("message out"):
                 self._writers["control"].send_newest(text)
 

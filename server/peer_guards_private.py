@@ -10,6 +10,8 @@ What is used and why:
   with false credentials would be parsed, hashed and answered, and anybody can send ten thousand a second
 - `aioice.Connection.check_incoming`, `._remote_candidates`: every address that an authenticated check comes from
   becomes a candidate, and every candidate a check of ours
+- `aioice.Connection._nominated`, `aioice.Candidate._network_host`: where the peer is. aioice hands on what is no STUN
+  from any address, and until DTLS is connected anybody's alert or hello ends the handshake
 """
 
 import struct
@@ -35,6 +37,8 @@ ENOUGH_GAPS = 64  # so many, and what is missing before them is looked at
 GIVEN_UP_SECONDS = 5.0  # after which a chunk that may be given up is not repeated any more
 MAX_ADDRESSES = 200  # of one peer; a browser has a few
 CHECK_RATE, CHECK_BURST = 200.0, 1000.0  # Hz, connectivity checks of one peer; it paces them at 50 (RFC 8445 14.2)
+STRAY_RATE, STRAY_BURST = 200.0, 400.0  # Hz, what comes from elsewhere once DTLS knows what is the peer's
+COMPONENT = 1  # of ICE: RTP and RTCP are multiplexed
 STUN_HEADER = 20  # bytes
 STUN_BELOW = 4  # RFC 7983 7: the first byte of a STUN message
 
@@ -125,8 +129,11 @@ def _too_much(sctp: Any, chunk: Any) -> str:
     return ""
 
 
-def guard_ice(connection: Any, on_refused: Refused) -> None:
+def guard_ice(connection: Any, on_refused: Refused, is_secured: Callable[[], bool] = lambda: True) -> None:
     """Ignore checks from further addresses once there are many. `connection` is one of aioice.
+
+    `is_secured`: whether DTLS is connected. Before that nothing passes from an address that neither the peer has named
+    nor a check of it has come from; afterwards a little, so that a NAT may give the peer another address.
 
     aioice takes every datagram for a STUN message whose third and fourth byte are its length, as the sequence number
     of an RTP packet may be. What is none after all passes for data, process-wide, and raises nothing.
@@ -134,6 +141,8 @@ def guard_ice(connection: Any, on_refused: Refused) -> None:
     aioice.stun.parse_message = _parse_or_refuse
     vars(aioice.ice)["StunProtocol"].datagram_received = _take_datagram
     connection.stun_budget = TokenBucket(CHECK_RATE, CHECK_BURST, time.monotonic())
+    connection.stray_budget = TokenBucket(STRAY_RATE, STRAY_BURST, time.monotonic())
+    connection.is_secured = is_secured
     connection.stun_refused = on_refused
     check = connection.check_incoming
 
@@ -155,10 +164,10 @@ def _parse_or_refuse(data: bytes) -> aioice.stun.Message:
 
 
 def _take_datagram(protocol: Any, data: bytes, address: tuple[Any, ...]) -> None:
-    """Before anything is parsed: STUN that cannot be for us, or is more than a peer has to say, goes no further."""
+    """Before anything is parsed: what cannot be for us, or is more than a peer has to say, goes no further."""
     connection = protocol.receiver
-    if data and data[0] < STUN_BELOW and hasattr(connection, "stun_budget"):
-        wrong = _no_stun_of_ours(protocol, data)
+    if data and hasattr(connection, "stun_budget"):
+        wrong = _no_stun_of_ours(protocol, data) if data[0] < STUN_BELOW else _stray(connection, address)
         if wrong:
             connection.stun_refused(wrong)
             return
@@ -175,3 +184,15 @@ def _no_stun_of_ours(protocol: Any, data: bytes) -> str:
     if f"{connection.local_username}:".encode() not in data:
         return "stun_unknown_user"
     return "" if connection.stun_budget.take(time.monotonic()) else "stun_too_often"
+
+
+def _stray(connection: Any, address: tuple[Any, ...]) -> str:
+    """Why data from this address are not looked at; "" when they are."""
+    where = address[0], address[1]
+    pair = connection._nominated.get(COMPONENT)
+    if pair is not None and pair.remote_addr == where:
+        return ""
+    if any((each._network_host, each.port) == where for each in connection._remote_candidates):
+        return ""
+    passes = connection.is_secured() and connection.stray_budget.take(time.monotonic())
+    return "" if passes else "unknown_address"

@@ -2,9 +2,11 @@
 
 import asyncio
 import logging
+import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 
 import rich
 import structlog
@@ -15,17 +17,17 @@ from robot_bridge.protocol.messages import Command, Feedback
 from server.access import SceneTicket
 from server.commanded_path import CommandedPath
 from server.errors import SceneUnavailable
-from server.kinematics import Pose
 from server.metrics import Metrics
 from server.scene_model import SceneModel
 from server.scene_page import ScenePage, read_scene_page
 from server.scene_scale import SceneScale
 
-__all__ = ["SceneView"]
+__all__ = ["SceneView", "pause"]
 
 log = structlog.get_logger(__name__)
 
 STOP_TIMEOUT = 5.0  # s
+SHARE = 0.25  # of the time, for building and posing: whatever the robot is like, their thread holds up all others
 LINK_PART = 4  # one link gets this part of the places
 RESERVED_PART = 5  # this part is not for observers
 
@@ -118,6 +120,7 @@ class SceneView:
         while True:
             await self._news.wait()
             self._news.clear()
+            began = time.monotonic()
             if self._description is not None and self._server is not None:
                 description, self._description = self._description, None
                 self._scale = SceneScale(description)
@@ -125,9 +128,9 @@ class SceneView:
                 self._model = await self._built(self._server, magnified, self._scale.factor)
             if self._viewers and self._feedback is not None and self._model is not None and self._scale is not None:
                 feedback, self._feedback = self._feedback, None
-                commanded = None if self._path is None else self._scale.poses(self._path.poses())
-                await self._pose(self._model, self._scale.feedback(feedback), commanded)
-                await asyncio.sleep(self._interval)
+                path = None if self._path is None else self._path.as_of_now()
+                await self._pose(partial(_pose, self._model, self._scale, feedback, path))
+            await asyncio.sleep(pause(time.monotonic() - began, self._interval))
 
     async def _built(
         self, server: viser.ViserServer, description: RobotDescription, factor: float
@@ -139,9 +142,9 @@ class SceneView:
             self._failed("built", error)
             return None
 
-    async def _pose(self, model: SceneModel, feedback: Feedback, commanded: dict[str, Pose] | None) -> None:
+    async def _pose(self, pose: Callable[[], None]) -> None:
         try:
-            await asyncio.to_thread(model.pose, feedback, commanded)
+            await asyncio.to_thread(pose)
         except Exception as error:
             self._failed("posed", error)
             self._model = None  # rather no picture than one that stands still
@@ -156,6 +159,15 @@ class SceneView:
         if server is not None:
             async with asyncio.timeout(STOP_TIMEOUT):
                 await asyncio.to_thread(server.stop)
+
+
+def pause(took: float, interval: float) -> float:
+    """s to the next picture of the scene, after one that took so many s."""
+    return max(interval, took * (1 / SHARE - 1))
+
+
+def _pose(model: SceneModel, scale: SceneScale, feedback: Feedback, path: CommandedPath | None) -> None:
+    model.pose(scale.feedback(feedback), None if path is None else scale.poses(path.poses()))
 
 
 def _start_viser() -> viser.ViserServer:

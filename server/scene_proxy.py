@@ -21,6 +21,7 @@ from server.errors import BadParameter, ConsoleError, NotFound
 from server.scene import SceneView
 from server.security import check_origin
 from server.services import services
+from server.token_bucket import TokenBucket
 
 __all__ = ["is_allowed", "router", "scene_query"]
 
@@ -30,6 +31,7 @@ UPSTREAM_TIMEOUT = 5.0  # s
 MAX_DOWN = 16 << 20  # bytes of one message from viser; meshes are the largest
 DOWN_QUEUE = 2  # messages read ahead; then viser waits, and keeps only the newest of each kind
 ALLOWED_UP = frozenset({"ViewerCameraMessage"})
+UP_RATE, UP_BURST = 60.0, 120.0  # Hz, messages of one viewer; what comes faster waits where it is sent
 TRY_AGAIN_LATER = 1013  # RFC 6455 7.4.1 and the IANA registry
 POLICY_VIOLATION = 1008
 GOING_AWAY = 1001
@@ -78,7 +80,11 @@ def _check_query(request: Request, ticket: str) -> None:
 
 @router.websocket("/scene/ws/{ticket}")
 async def stream(websocket: WebSocket, ticket: str) -> None:
-    here = services(websocket)
+    try:
+        here = services(websocket)
+    except ConsoleError:
+        await websocket.close(TRY_AGAIN_LATER)  # this robot's session is started again
+        return
     try:
         valid = here.access.verify_ticket(ticket)
         if websocket.headers.get("origin") != OPAQUE:
@@ -146,10 +152,14 @@ async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> 
 
 
 async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> None:
-    here = services(websocket)
+    here, clock = services(websocket), asyncio.get_running_loop().time
+    budget = TokenBucket(UP_RATE, UP_BURST, clock())
     try:
         while True:
             data = await websocket.receive_bytes()
+            if not budget.take(clock()):  # viser's thread, which gets it, takes its time from everybody
+                await asyncio.sleep(budget.wait(clock()))
+                budget.take(clock())
             if is_allowed(data):
                 await upstream.send(data)
             else:

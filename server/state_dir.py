@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from server.regular_file import open_regular
+
 __all__ = ["KEY_FILE", "StateDamaged", "StateDir", "StateDirUnusable", "default_state_dir"]
 
 KEY_FILE = "signing.key"
@@ -76,14 +78,14 @@ class StateDir:
                 finally:
                     os.unlink(made)
             _set_mode(path, 0o600)
-            return path.read_bytes()
+            return _bytes_of(path)
 
     def read(self, name: str) -> bytes | None:
         """None when there is no such file."""
         path = self.path / name
         with _named(path):
             try:
-                return path.read_bytes()
+                return _bytes_of(path)
             except FileNotFoundError:
                 return None
 
@@ -168,6 +170,11 @@ class StateDir:
             os.unlink(name)
             raise
         return name
+
+
+def _bytes_of(path: Path) -> bytes:
+    with open_regular(path) as file:
+        return file.read()
 
 
 def _set_mode(path: Path, mode: int) -> None:

@@ -1,5 +1,6 @@
 """The body of a STOP by HTTP: whatever it is, it is a stop. What cannot be read of it is left out."""
 
+import asyncio
 from typing import Annotated
 
 import msgspec
@@ -7,10 +8,12 @@ from fastapi import Request
 
 from server.body import read_json
 from server.error_answers import count_refused
-from server.errors import RequestError, http_error
+from server.errors import BodyTooSlow, RequestError, http_error
 from server.stop_presses import MAX_REASON, stop_text
 
-__all__ = ["StopRequest", "read_stop"]
+__all__ = ["BODY_SECONDS", "StopRequest", "read_stop"]
+
+BODY_SECONDS = 1.0  # that a stop waits for the rest of its request
 
 
 class StopRequest(msgspec.Struct, frozen=True):
@@ -26,10 +29,21 @@ class _AnyBody(msgspec.Struct, frozen=True):
 
 
 async def read_stop(request: Request) -> StopRequest:
-    """What the body says, its id as it was given. What is wrong with it is counted, and refuses nothing."""
+    """What the body says, its id as it was given. What is wrong with it is counted, and refuses nothing.
+
+    Also that it does not come: the network may have lost it, and the robot is not to move on until that is repaired.
+    """
     try:
-        found = await read_json(request, _AnyBody)
+        found = await _read_in_time(request)
     except RequestError as error:
         count_refused(request.scope, http_error(error).name)
         return StopRequest()
     return StopRequest(stop_text(found.reason)[:MAX_REASON], stop_text(found.press))
+
+
+async def _read_in_time(request: Request) -> _AnyBody:
+    try:
+        async with asyncio.timeout(BODY_SECONDS):
+            return await read_json(request, _AnyBody)
+    except TimeoutError as error:
+        raise BodyTooSlow("the body did not come in time") from error

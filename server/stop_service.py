@@ -48,7 +48,7 @@ AGAIN_SECONDS = 0.5  # until what has no answer is sent again, on a link that li
 WATCH_SECONDS = 0.1  # between two looks, while something has no answer
 MAX_LISTENERS = 16  # connections that are told of one press
 PRESSES, PRESS_RATE = 20, 20.0  # Hz, of one link by whatever they come: new ones, and answers to repeats
-RECORDS, RECORD_RATE = 5, 0.2  # of stops of one link in full; what is more becomes one record a second
+RECORDS, RECORD_RATE = 5, 0.2  # Hz, of stops of one link, in full and in the log; the audit counts what is more
 RESETS, RESET_RATE = 5, 1.0  # Hz, of one link
 ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
 
@@ -147,6 +147,7 @@ class StopService:
         self._link_presses = RateLimits(PRESS_RATE, PRESSES)
         self._link_repeats = RateLimits(PRESS_RATE, PRESSES)
         self._records = RateLimits(RECORD_RATE, RECORDS)
+        self._logged = RateLimits(RECORD_RATE, RECORDS)
         self._listeners: dict[str, list[tuple[str, str]]] = {}  # press -> who waits for it, and calls it what
         self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
         self._deadlines: dict[str, float] = {}  # press -> until when its answer is waited for
@@ -222,7 +223,8 @@ class StopService:
     def _send_new(self, press: Press) -> None:
         sent = self._robot.send_stop(press.message())
         self._tap.stop_asked(press.by, press.where, press.reason, press.id, delivered=sent)
-        log.warning("stop", by=press.by.name, where=press.where, reason=press.reason, sent=sent)
+        if self._logged.spend(press.by.link or press.by.name, time.monotonic()):
+            log.warning("stop", by=press.by.name, where=press.where, reason=press.reason, sent=sent)
         if not sent:
             if len(self._presses.pending) == 1:
                 self._peers.tell("session", Notice(level="error", text=UNDELIVERED))

@@ -12,6 +12,7 @@ import msgspec
 
 from server.evidence.chain import ChainReport
 from server.evidence.signer import Signer, is_signed
+from server.regular_file import bounded_lines, open_regular
 
 __all__ = [
     "ANCHORS_NAME",
@@ -153,8 +154,9 @@ class AnchorFile:
         found: list[Anchor] = []
         for path in (self._older, self.path):
             if path.exists():
-                anchors = map(parse_anchor, path.read_bytes().splitlines())
-                found += [anchor for anchor in anchors if anchor is not None and anchor.log == log]
+                with open_regular(path) as file:
+                    anchors = map(parse_anchor, bounded_lines(file))
+                    found += [anchor for anchor in anchors if anchor is not None and anchor.log == log]
         return found
 
     @property

@@ -10,6 +10,7 @@ from server.recording.known_indexes import KnownIndexes
 from server.recording.reader import RecordingReader
 from server.recording.recorder import Recorder
 from server.recording.shelf import RecordingEntry, entry_of
+from server.recording.shelf import recording_id as id_of
 
 __all__ = ["ConsoleLibrary", "FileLibrary", "Library"]
 
@@ -114,7 +115,7 @@ class FileLibrary:
         return [entry]
 
     def open(self, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
-        if recording_id != self._path.stem:
+        if recording_id != id_of(self._path):
             raise NotFound("no such recording")
         return _open(self._path, self._indexes)
 

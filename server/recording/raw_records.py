@@ -10,11 +10,24 @@ from mcap.records import Chunk, McapRecord
 from mcap.stream_reader import CRCValidationError, breakup_chunk
 from zstandard import ZstdError, frame_content_size
 
-__all__ = ["BROKEN", "HEAD", "MAGIC", "MAX_RECORD", "RawRecord", "check_packed", "chunk_records", "raw_records"]
+from server.recording.errors import RecordingDamaged
+
+__all__ = [
+    "BROKEN",
+    "HEAD",
+    "MAGIC",
+    "MAX_RECORD",
+    "MAX_UNPACKED",
+    "RawRecord",
+    "check_packed",
+    "chunk_records",
+    "raw_records",
+]
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = 9  # bytes of opcode and length
-MAX_RECORD = 256 * 1024 * 1024  # bytes, of a chunk also unpacked
+MAX_RECORD = 256 * 1024 * 1024  # bytes; the index of a long recording is the largest
+MAX_UNPACKED = 32 * 1024 * 1024  # bytes, of a chunk; ours have one megabyte and one picture more
 
 # What the mcap library raises where bytes are not what they should be.
 BROKEN = (McapError, CRCValidationError, ZstdError, struct.error, ValueError, KeyError, EOFError, RuntimeError)
@@ -31,7 +44,7 @@ class RawRecord(NamedTuple):
 
 
 def raw_records(file: BinaryIO) -> Iterator[RawRecord]:
-    """From where `file` stands on, as far as they are whole."""
+    """From where `file` stands on, as far as they are whole. Raises RecordingDamaged: one is too large."""
     size = os.fstat(file.fileno()).st_size
     while True:
         offset = file.tell()
@@ -39,6 +52,8 @@ def raw_records(file: BinaryIO) -> Iterator[RawRecord]:
         length = int.from_bytes(head[1:], "little")
         if len(head) < HEAD or offset + HEAD + length > size:
             return
+        if length > MAX_RECORD:  # a file with holes is as long as it says, and takes no room on the disk
+            raise RecordingDamaged(f"a record of {length} bytes at byte {offset}, the bound is {MAX_RECORD}")
         yield RawRecord(head[0], offset, file.read(length))
 
 
@@ -50,7 +65,7 @@ def check_packed(chunk: Chunk) -> None:
     if chunk.compression not in ("", "zstd"):
         raise ValueError(f"compressed as {chunk.compression!r}")
     unpacked = frame_content_size(chunk.data) if chunk.compression else len(chunk.data)
-    if unpacked != chunk.uncompressed_size or unpacked > MAX_RECORD:
+    if unpacked != chunk.uncompressed_size or unpacked > MAX_UNPACKED:
         raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes, or {unpacked}")
 
 

@@ -32,6 +32,7 @@ from server.recording.raw_records import BROKEN, HEAD, MAGIC, MAX_RECORD, chunk_
 from server.recording.records import RobotRecord
 from server.recording.scan import scan_file
 from server.recording.topics import OWN_TOPICS
+from server.regular_file import open_regular
 
 __all__ = ["Record", "RecordingReader"]
 
@@ -85,7 +86,7 @@ class RecordingReader:
     def __init__(self, path: Path, index: EventIndex | None = None) -> None:
         self.path = path
         self.interrupted = False  # neither closed nor still written: the index was made from what is there
-        self._file = path.open("rb")
+        self._file = open_regular(path)
         try:
             self.info = self._read_info()
             self.index = index or self._read_index() or self._scan()
@@ -236,7 +237,10 @@ class RecordingReader:
     def _attachment(self, footer: Footer, end: int) -> AttachmentIndex | None:
         """Where the index is: the summary's last groups are short, so they are read from their own beginning."""
         self._seek(footer.summary_offset_start or footer.summary_start)
-        summary = self._file.read(end - self._file.tell() - FOOTER)
+        length = end - self._file.tell() - FOOTER
+        if length > MAX_RECORD:
+            raise RecordingDamaged(f"a summary of {length} bytes, the bound is {MAX_RECORD}")
+        summary = self._file.read(length)
         at = 0
         while at + HEAD <= len(summary):
             opcode, length = summary[at], int.from_bytes(summary[at + 1 : at + HEAD], "little")

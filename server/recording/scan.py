@@ -33,6 +33,7 @@ from server.recording.marks import MarkFinder
 from server.recording.payload import VIDEO, own_record_of, picture_of
 from server.recording.raw_records import BROKEN, HEAD, MAGIC, RawRecord, chunk_records, raw_records
 from server.recording.records import Degraded, FeedbackRecord
+from server.regular_file import open_regular
 
 __all__ = ["Scan", "complete_file", "scan_file"]
 
@@ -120,7 +121,7 @@ def scan_file(path: Path, info: RecordingInfo) -> Scan:
         OSError: it cannot be read.
     """
     scan = Scan(info)
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise RecordingDamaged(f"{path.name} is no MCAP file")
         try:

@@ -2,6 +2,7 @@
 
 import fcntl
 import math
+import os
 import threading
 import time
 from collections.abc import Collection
@@ -19,7 +20,7 @@ from server.recording.reader import RecordingReader
 from server.recording.scan import complete_file
 from server.recording.settings import RecordingSettings
 
-__all__ = ["RecordingEntry", "Shelf", "entry_of"]
+__all__ = ["RecordingEntry", "Shelf", "entry_of", "recording_id"]
 
 log = structlog.get_logger(__name__)
 
@@ -32,7 +33,7 @@ SETTLED_NS = 100_000_000  # since when a directory is unchanged, or a change may
 class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
     """One file. Times in µs since 1970."""
 
-    id: str  # the file's name without its suffix
+    id: str  # as `recording_id`
     recording: str
     part: int
     name: str
@@ -59,8 +60,15 @@ class _Listed(NamedTuple):
     entries: list[RecordingEntry]
 
 
+def recording_id(path: Path) -> str:
+    """The file's name without its suffix; bytes that are no UTF-8 cannot be told, and are replaced."""
+    return os.fsencode(path.stem).decode(errors="replace")
+
+
 class Shelf:
-    """One directory. Files that are no recordings are passed over. From any thread."""
+    """One directory. Files that are no recordings are passed over, and so are symbolic links: whoever may read what is
+    here may not read what somewhere else is. From any thread.
+    """
 
     def __init__(self, directory: Path, settings: RecordingSettings) -> None:
         self.directory = directory
@@ -76,12 +84,11 @@ class Shelf:
 
     def files(self) -> list[Path]:
         """Raises OSError: the directory cannot be read."""
-        return [path for path in self.directory.glob(f"*{SUFFIX}") if path.is_file()]
+        return [path for path in self.directory.glob(f"*{SUFFIX}") if path.is_file() and not path.is_symlink()]
 
-    def path(self, recording_id: str) -> Path | None:
+    def path(self, wanted: str) -> Path | None:
         """None: there is none of that id. Raises OSError."""
-        alike = (path for path in self.directory.glob(f"*{SUFFIX}") if path.stem == recording_id)
-        return next((path for path in alike if path.is_file()), None)
+        return next((path for path in self.files() if recording_id(path) == wanted), None)
 
     def entries(self) -> list[RecordingEntry]:
         """The newest first. Files that are being written are not among them. Raises OSError."""
@@ -176,7 +183,7 @@ class Shelf:
                 log.error("a recording cannot be deleted", file=path.name, reason=error.strerror)
                 continue
             total -= size
-            gone.append(path.stem)
+            gone.append(recording_id(path))
             log.warning("a recording was deleted to make room", file=path.name)
         return gone
 
@@ -191,7 +198,7 @@ def entry_of(
     for mark in index.marks:
         marks[mark.kind] = marks.get(mark.kind, 0) + 1
     return RecordingEntry(
-        id=path.stem,
+        id=recording_id(path),
         recording=info.recording,
         part=info.part,
         name=info.name,

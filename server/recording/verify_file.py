@@ -10,7 +10,8 @@ from server.recording.records import RobotRecord
 from server.recording.scan import scan_file
 from server.recording.topics import stream_of
 from server.recording.verify import Verdict, Verifier
-from server.recording.verify_signature import SignatureChecker, SignatureReport
+from server.recording.verify_signature import SignatureChecker
+from server.regular_file import open_regular
 
 __all__ = ["verify_file"]
 
@@ -41,18 +42,22 @@ def verify_file(path: Path, key: str = "") -> Verdict:
             except RecordingError as error:
                 verifier.fail("readable", error.detail)
         _compare(verifier, reader, counts)
-        verifier.signed(_signatures(path, reader, key))
+        _show_signatures(verifier, path, reader, key)
         return verifier.verdict(ended)
 
 
-def _signatures(path: Path, reader: RecordingReader, key: str) -> SignatureReport:
+def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, key: str) -> None:
+    """Show it what the signatures say."""
     checker = SignatureChecker(reader.info, None if reader.interrupted else reader.index, key)
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         file.seek(len(MAGIC))
-        for raw in raw_records(file):
-            checker.take(raw)
+        try:
+            for raw in raw_records(file):
+                checker.take(raw)
+        except RecordingError as error:
+            verifier.fail("readable", error.detail)
     checker.compare(scan_file(path, reader.info).index)
-    return checker.report()
+    verifier.signed(checker.report())
 
 
 def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:

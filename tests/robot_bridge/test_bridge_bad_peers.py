@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+from contextlib import AsyncExitStack
 from random import Random
 
 import pytest
@@ -14,6 +15,7 @@ from robot_bridge.protocol.messages import (
     Feedback,
     Goodbye,
     Hello,
+    LinkRole,
     Ping,
     Refusal,
     Reset,
@@ -29,6 +31,8 @@ from tests.robot_bridge.bridge_helpers import (
     raw_link,
     running_bridge,
 )
+
+ROLES: tuple[LinkRole, ...] = ("events", "media")
 
 
 async def test_a_second_operator_is_told_that_the_place_is_taken_until_the_first_leaves() -> None:
@@ -155,6 +159,17 @@ async def test_closing_does_not_wait_long_for_a_peer_that_does_not_read() -> Non
                 await bridge.close()
         finally:
             greedy.close()
+
+
+async def test_however_many_links_others_open_the_place_of_the_operator_stays_free() -> None:
+    async with Bridge(RecordingRobot(), BridgeSettings(port=0, max_links=3)) as bridge, AsyncExitStack() as others:
+        for role in ROLES:
+            await others.enter_async_context(raw_link(bridge, role))
+        for _ in range(2):
+            with pytest.raises(LinkRefused, match="full"):
+                await RobotLink(*bridge.address, "media").connect()
+            async with operator(bridge) as driver:
+                await driver.drive()
 
 
 async def test_more_links_than_the_bridge_takes_are_turned_away() -> None:

@@ -7,6 +7,7 @@ import pytest
 from server.audit import AuditRecord
 from server.audit_file import AuditFile, chained_lines, last_records, rotated, stored_records
 from server.evidence.chain import check_chain, line_hash
+from server.regular_file import MAX_LINE
 
 
 def _record(n: int, detail: str = "") -> AuditRecord:
@@ -207,3 +208,31 @@ def test_a_log_that_somebody_moves_deletes_or_replaces_meanwhile_is_written_agai
     assert _numbers(path) == [4]
     gone = msgspec.json.decode(line)["before"]
     assert gone not in ("0" * 64, line_hash((tmp_path / "moved").read_bytes().splitlines()[-1])), "record 3 is missed"
+
+
+def test_what_somebody_puts_beside_it_is_neither_waited_for_nor_taken_for_a_number(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    file = _file(path)
+    file.write([_record(1), _record(2)])
+    file.close()
+    for name in ("audit.jsonl.\N{SUPERSCRIPT TWO}", "audit.jsonl.00", "audit.jsonl.x"):
+        (tmp_path / name).write_bytes(b"{}\n")
+    assert [line.place.line for line in chained_lines(path)] == [1, 2]
+    os.mkfifo(rotated(path, 1))
+    with pytest.raises(OSError, match="not a regular file"):
+        list(chained_lines(path))
+
+
+def test_a_line_without_an_end_takes_no_more_memory_than_a_line_may(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    file = _file(path)
+    file.write([_record(1)])
+    file.close()
+    with path.open("ab") as log:
+        log.write(b"x" * (5 * MAX_LINE) + b"\n")
+    file = _file(path, max_bytes=100 * MAX_LINE)
+    file.write([_record(2)])
+    file.close()
+    assert max(len(line.data) for line in chained_lines(path)) == MAX_LINE
+    report = check_chain(chained_lines(path))
+    assert (report.records, report.unreadable) == (2, ["audit.jsonl:2"])

@@ -289,3 +289,15 @@ async def test_observers_get_feedback_at_a_bounded_rate_and_the_last_one_always(
         await peer.feedback(lambda each: each.event == last.event)
         events = {each.event for each in peer.heard if isinstance(each, Feedback)}
         assert len(events) <= 20
+
+
+async def test_whoever_has_ended_is_told_nothing_more_while_the_connection_closes() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        await _id(peer)
+        (there,) = rig.webrtc_peers
+        there.end("link revoked")
+        rig.services.console.peers.tell("session", Notice(level="info", text="for those who are here"))
+        there.send_feedback('{"type": "pong", "id": 77}')
+        async with asyncio.timeout(PATIENCE):
+            await peer.closed.wait()
+        assert not [each for each in peer.heard if isinstance(each, Notice) or each == Pong(id=77)]

@@ -164,6 +164,29 @@ def test_the_audit_is_shown_for_people_and_from_a_number_on(tmp_path: Path) -> N
     assert json.loads(_lockstep(tmp_path, "audit", "--after", "1", "--json").stdout)["n"] == 2
 
 
+def test_a_record_of_an_impossible_time_is_shown_like_all_others(tmp_path: Path) -> None:
+    file = AuditFile(tmp_path / "audit.jsonl", 10_000, 2)
+    file.write([AuditRecord(n=n, time=time, kind="stop") for n, time in ((1, 1e300), (2, -1e18), (3, 0.0))])
+    file.close()
+    shown = _lockstep(tmp_path, "audit")
+    assert shown.exit_code == 0, shown.output
+    assert [line.split()[0] for line in shown.stdout.splitlines()] == ["1", "2", "3"]
+
+
+def test_a_key_that_is_a_folder_or_a_fifo_is_named_and_nothing_waits_for_it(tmp_path: Path) -> None:
+    file = AuditFile(tmp_path / "audit.jsonl", 10_000, 2)
+    file.write([AuditRecord(n=1, time=0.0, kind="stop")])
+    file.close()
+    for make in (Path.mkdir, os.mkfifo):
+        make(tmp_path / "evidence.key")
+        found = _lockstep(tmp_path, "audit", str(tmp_path), "--verify")
+        assert found.exit_code == 2
+        assert "evidence.key" in found.stderr
+        assert "Traceback" not in found.output
+        (tmp_path / "evidence.key").rmdir() if make is Path.mkdir else (tmp_path / "evidence.key").unlink()
+    assert _lockstep(tmp_path, "audit", str(tmp_path), "--verify").exit_code == 0
+
+
 async def test_the_audit_of_a_console_that_ran_is_verified_and_an_edit_and_a_cut_are_named(tmp_path: Path) -> None:
     async with running_stack(tmp_path):
         pass

@@ -1,6 +1,7 @@
 """`lockstep recordings`, `verify`, `export`, `report` and `record`, as their users call them."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -127,3 +128,21 @@ def test_without_a_console_recording_says_that_none_runs(directory: Path) -> Non
     done = _lockstep(directory, "record", "start")
     assert done.exit_code == 2
     assert "no console has run with this state directory" in done.stderr
+
+
+@pytest.mark.parametrize("command", [["verify"], ["verify", "--json"], ["export", "--to", "csv"], ["replay"]])
+def test_the_name_of_a_file_writes_no_line_of_its_own_and_commands_no_terminal(
+    directory: Path, command: list[str]
+) -> None:
+    name = os.fsdecode(b"\x1b[2J\xff\nok    forged")
+    (directory / f"{name}.mcap").write_text("no recording")
+    bad = _lockstep(directory, *command, str(directory / f"{name}.mcap"))
+    assert bad.exit_code == 2
+    assert "\\x1b[2J" in bad.stderr, "it is shown, as what it is"
+    if command != ["replay"]:  # which goes on until it is ended
+        (directory / "one.mcap").rename(directory / f"{name}.mcap")
+        good = _lockstep(directory, *command, str(directory / f"{name}.mcap"))
+        assert good.exit_code == 0, good.output
+        bad = good
+    assert "\x1b" not in bad.output
+    assert not any(line.startswith("ok    forged") for line in bad.output.splitlines())

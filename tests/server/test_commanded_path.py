@@ -164,3 +164,15 @@ def test_what_is_kept_is_bounded() -> None:
         _fed(path, event, event * 1e-4, [0.0])
     assert len(path._records) <= 256
     assert len(path._commands) <= 512
+
+
+def test_what_it_is_now_stays_so_for_another_thread() -> None:
+    path = _driven(LIFT, [0.5], [0.2])
+    kept = path.as_of_now()
+    path.command(5, [-0.5])
+    _fed(path, 5, 0.5, [0.9])
+    poses, later = kept.poses(), path.poses()
+    assert poses is not None
+    assert later is not None
+    assert poses["lift"].position == pytest.approx((0.0, 0.0, 0.2 - 0.3))
+    assert later["lift"].position != poses["lift"].position

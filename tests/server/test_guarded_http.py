@@ -87,6 +87,21 @@ async def test_a_stop_whose_body_does_not_come_is_a_stop_all_the_same() -> None:
         assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
 
 
+async def test_a_stop_does_not_wait_for_a_body_that_the_network_holds_up() -> None:
+    async with guarded_console(request_timeout=3600) as (rig, port):
+        head = HEAD.replace(b"GET /healthz", b"POST /api/stop")
+        authorization = b"Authorization: " + rig.token("observer")["Authorization"].encode()
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(head + authorization + b"\r\nContent-Length: 9\r\n\r\n{")
+        async with asyncio.timeout(PATIENCE):
+            assert b'"delivered":true' in await reader.readuntil(b"}")
+            await eventually(lambda: rig.services.console.clock.stop.stopped)
+            writer.write(b'"a": 10}' + HEAD + b"\r\n")
+            assert b'"robot_link"' in await reader.readuntil(b"}"), "the connection serves on"
+        writer.close()
+        assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
+
+
 async def test_a_head_that_is_too_large_is_refused() -> None:
     async with guarded_console() as (_, port):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)

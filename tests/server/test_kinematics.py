@@ -67,6 +67,24 @@ def test_paths_nest_parents_first_whatever_the_order() -> None:
     ]
 
 
+def test_a_long_chain_is_walked_once_and_those_beside_each_other_keep_their_order() -> None:
+    names = [f"link{number}" for number in range(1000)]
+
+    class Parent(str):
+        looked = 0
+
+        def __hash__(self) -> int:
+            Parent.looked += 1
+            return super().__hash__()
+
+    parents = ["", *names[:-1]]
+    chain = [Body(name=name, parent=Parent(parent)) for name, parent in zip(names, parents, strict=True)]
+    found = scene_paths(_robot(*reversed(chain), Body(name="b", parent="link0"), Body(name="a", parent="link0")))
+    assert list(found)[:4] == ["link0", "link1", "b", "a"]
+    assert found["link999"].count("/") == 1001
+    assert Parent.looked < 20 * len(names)
+
+
 def test_orphans_and_circles_are_left_out() -> None:
     robot = _robot(
         Body(name="a", parent="b"),

@@ -2,14 +2,17 @@
 
 import asyncio
 import os
+import re
+import socket
 import time
 from contextlib import ExitStack
 from typing import Any, cast
 
 import aioice.stun
 import pytest
-from aiortc import RTCConfiguration, RTCPeerConnection
+from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 from aiortc.rtcsctptransport import DataChunk, ForwardTsnChunk, InboundStream
+from OpenSSL import SSL
 
 from robot_bridge.protocol.console import Role
 from robot_bridge.protocol.messages import Ping, Pong, StopTaken
@@ -22,6 +25,7 @@ from server.peer_guards_private import (
     MAX_GAPS,
     MAX_STREAMS,
     RECEIVE_WINDOW,
+    STRAY_BURST,
     guard_data,
     guard_ice,
 )
@@ -53,6 +57,8 @@ async def test_the_private_parts_are_where_they_were() -> None:
         connection = sctp.transport.transport._connection
         assert connection.check_incoming.__name__ == "check_bounded", MOVED
         assert connection._remote_candidates, MOVED
+        assert {each._network_host for each in connection._remote_candidates} >= {"127.0.0.1"}, MOVED
+        assert connection._nominated[1].remote_addr[0] == "127.0.0.1", MOVED
 
 
 async def test_a_message_that_never_ends_is_not_kept() -> None:
@@ -344,3 +350,71 @@ async def test_checks_with_false_credentials_are_not_parsed_nor_answered_and_the
         assert rig.count("lockstep_bad_input_total", where="transport", reason="stun_too_often") > 0
         peer.send("control", Ping(id=3))
         await peer.until(lambda each: each == Pong(id=3))
+
+
+def _hello_of_a_stranger() -> bytes:
+    client = SSL.Connection(SSL.Context(SSL.DTLS_METHOD))
+    client.set_connect_state()
+    with pytest.raises(SSL.WantReadError):
+        client.do_handshake()
+    return client.bio_read(1500)
+
+
+ALERT = b"\x15\xfe\xfd" + bytes(8) + b"\x00\x02" + b"\x02\x28"  # RFC 6347 4.1, RFC 5246 7.2: fatal, handshake_failure
+
+
+class _Overtaken(TestPeer):
+    """Between the answer and its own first datagram a stranger writes to every port that the console has offered."""
+
+    def __init__(self, said: bytes) -> None:
+        super().__init__()
+        self.written = 0
+        self._said = said
+        self._accept = self.pc.setRemoteDescription
+        cast(Any, self.pc).setRemoteDescription = self._accept_late
+
+    async def _accept_late(self, answer: RTCSessionDescription) -> None:
+        ports = {int(port) for port in re.findall(r"a=candidate:\S+ 1 udp \d+ 127\.0\.0\.1 (\d+) ", answer.sdp)}
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind(("127.0.0.2", 0))
+            for port in ports:
+                stranger.sendto(self._said, ("127.0.0.1", port))
+                self.written += 1
+        await self._accept(answer)
+
+
+@pytest.mark.parametrize("said", [ALERT, _hello_of_a_stranger()], ids=["alert", "hello"])
+async def test_who_knows_only_the_port_does_not_take_part_in_the_handshake_of_who_connects(said: bytes) -> None:
+    async with running_rig() as rig:
+        peer = _Overtaken(said)
+        try:
+            await peer.join(rig, rig.token("operator"), ("control",))
+            peer.send("control", Ping(id=4))
+            await peer.until(lambda each: each == Pong(id=4))
+        finally:
+            await peer.close()
+        assert peer.written
+        refused = rig.count("lockstep_bad_input_total", where="transport", reason="unknown_address")
+        assert refused == peer.written
+
+
+async def test_of_a_flood_from_elsewhere_little_passes_and_a_peer_whose_address_changed_is_heard() -> None:
+    async with running_rig() as rig, rig.peer("observer") as peer:
+        assert rig.webrtc_peers[0].pc.sctp is not None
+        connection: Any = rig.webrtc_peers[0].pc.sctp.transport.transport._connection
+        protocol = connection._nominated[1].protocol
+        heard = protocol.datagram_received
+        protocol.datagram_received = lambda data, address: heard(data, ("192.0.2.9", 7))
+        peer.send("control", Ping(id=5))
+        await peer.until(lambda each: each == Pong(id=5))
+        del protocol.datagram_received
+        passed: list[bytes] = []
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("server.peer_guards_private._datagram_received", lambda _, data, __: passed.append(data))
+            for _ in range(3000):
+                protocol.datagram_received(b"\x80" + bytes(40), ("192.0.2.1", 5))
+        assert len(passed) < STRAY_BURST + 1000
+        refused = rig.count("lockstep_bad_input_total", where="transport", reason="unknown_address")
+        assert refused == 3000 - len(passed)
+        peer.send("control", Ping(id=6))
+        await peer.until(lambda each: each == Pong(id=6))

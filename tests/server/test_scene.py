@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
+from server import scene_proxy
 from server.access import Identity
 from server.scene_page import HOOK
 from server.scene_proxy import is_allowed
@@ -189,6 +190,32 @@ async def test_a_viewer_can_move_the_camera_and_nothing_else() -> None:
             assert websocket.close_code == 1003
         assert rig.count("lockstep_bad_input_total", where="scene", reason="not_allowed") == 1
         assert rig.count("lockstep_bad_input_total", where="scene", reason="text") == 1
+
+
+async def test_a_viewer_that_floods_is_read_at_a_pace_and_still_ends_with_its_link(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(scene_proxy, "UP_RATE", 1e-6)
+    monkeypatch.setattr(scene_proxy, "UP_BURST", 5.0)
+    async with running_rig(scene=True) as rig:
+        invited = await rig.http.post("/api/invitations", headers=rig.token("operator"), json={})
+        token = {"Authorization": f"Bearer {invited.json()['link'].partition('#token=')[2]}"}
+        address = await _scene_with(rig, token)
+
+        def read() -> float:
+            return rig.count("lockstep_bad_input_total", where="scene", reason="not_allowed")
+
+        async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None) as websocket:
+            for _ in range(100):
+                await websocket.send(msgspec.msgpack.encode({"type": "RunJavascriptMessage"}))
+            await eventually(lambda: read() == 5)
+            for _ in range(20):
+                await rig.http.get("/healthz")
+            assert read() == 5
+            await rig.http.delete(f"/api/invitations/{invited.json()['id']}", headers=rig.token("supervisor"))
+            async with asyncio.timeout(PATIENCE):
+                await websocket.wait_closed()
+            assert websocket.close_code == 1008
 
 
 async def test_files_that_viser_does_not_have_are_not_found() -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import threading
 
 import msgspec
 import pytest
@@ -10,8 +11,11 @@ from robot_bridge.protocol.description import Body, BodyJoint, Geom, RobotDescri
 from robot_bridge.protocol.messages import Feedback
 from robot_bridge.robots.micromanipulator.description import DESCRIPTION as MICRO
 from robot_bridge.robots.planar.description import DESCRIPTION as PLANAR
+from server.access import SceneTicket
+from server.commanded_path import CommandedPath
+from server.kinematics import Pose
 from server.metrics import Metrics
-from server.scene import SceneView
+from server.scene import SceneView, pause
 from server.scene_scale import SceneScale
 from tests.server.rig import eventually
 
@@ -74,6 +78,35 @@ async def test_a_shape_that_cannot_be_built_is_counted_and_the_next_robot_is_sho
         running.cancel()
         await asyncio.wait([running])
         await scene.close()
+
+
+async def test_a_robot_of_many_parts_is_posed_away_from_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    threads: set[int] = set()
+    poses = CommandedPath.poses
+
+    def noted(path: CommandedPath) -> dict[str, Pose] | None:
+        threads.add(threading.get_ident())
+        return poses(path)
+
+    monkeypatch.setattr(CommandedPath, "poses", noted)
+    scene = SceneView(15.0, 1, Metrics())
+    await scene.start()
+    running = asyncio.create_task(scene.run())
+    try:
+        scene.configure(PLANAR)
+        with scene.viewer(SceneTicket("link", "observer", math.inf)):
+            scene.feedback(Feedback(event=1, issue=1, time=0.0, axes=[0.0] * 3, joints=[0.0] * 3))
+            await eventually(lambda: bool(threads))
+        assert threading.get_ident() not in threads
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+        await scene.close()
+
+
+def test_a_robot_that_takes_long_to_pose_is_posed_more_rarely() -> None:
+    assert pause(0.001, 1 / 15) == 1 / 15
+    assert pause(0.5, 1 / 15) == pytest.approx(1.5)
 
 
 def test_a_body_on_a_slide_moves_as_far_as_the_rest_is_magnified() -> None:

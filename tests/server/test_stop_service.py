@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+from structlog.testing import capture_logs
 
 from robot_bridge.protocol.console import Notice, Role, ServerMessage
 from robot_bridge.protocol.messages import Feedback, Refusal, RefusalReason, Reset, Stop, StopState, StopTaken
@@ -421,6 +422,17 @@ async def test_a_flood_of_presses_becomes_few_records(bench: Bench) -> None:
     assert len(records) <= stop_service.RECORDS + 4
     assert sum(record.count for record in records if record.who == "olga") >= 199
     assert [each.what for each in records if each.who == "ann"] == ["stop, stop 201"]
+
+
+async def test_a_flood_of_presses_becomes_few_lines_of_the_log(bench: Bench) -> None:
+    with capture_logs() as logs:
+        for number in range(2 * stop_service.RECORDS):
+            bench.press("olga", str(number))
+            bench.take(str(number), number + 1)
+        bench.press("sue", "f")
+    written = [line["by"] for line in logs if line["event"] == "stop"]
+    assert 1 <= written.count("olga") < 2 * stop_service.RECORDS
+    assert written.count("sue") == 1
 
 
 # silence

@@ -160,7 +160,7 @@ static void admit(peer *of, const message *hello, double now) {
     if (hello->type != HELLO) say_goodbye(of, "handshake", now);
     else if (!hello->versioned) say_goodbye(of, "version", now);
     else if (hello->role == ANOTHER_ROLE) say_goodbye(of, "role", now);
-    else if (admitted >= MAX_LINKS) say_goodbye(of, "full", now);
+    else if (admitted - operators >= MAX_LINKS - (hello->role != OPERATOR)) say_goodbye(of, "full", now);
     else if (hello->role == OPERATOR && operators > 0) say_goodbye(of, "taken", now);
     else {
         of->role = hello->role;

@@ -129,13 +129,17 @@ async def test_who_does_not_read_is_dropped_and_holds_nobody_up(robot: Robot) ->
         await driver.drive(moving(driver))
 
 
-async def test_more_links_than_there_is_room_for_are_turned_away(robot: Robot) -> None:
-    links = [RobotLink(*robot.address, "events") for _ in range(32)]
+async def test_more_links_than_there_is_room_for_are_turned_away_and_an_operator_always_has_room(robot: Robot) -> None:
+    links = [RobotLink(*robot.address, "events") for _ in range(31)]
     try:
         for link in links:  # not all at once: more than 16 that nobody has admitted yet are too many
             await link.connect()
         with pytest.raises(LinkRefused, match="full"):
             await RobotLink(*robot.address, "events").connect()
+        async with operator(robot) as driver:
+            await driver.drive(moving(driver))
+            with pytest.raises(LinkRefused, match="full"):
+                await RobotLink(*robot.address, "events").connect()
     finally:
         await asyncio.gather(*(link.close() for link in links))
     async with operator(robot) as driver:

@@ -1,6 +1,7 @@
 """Recordings that somebody else has made: names lead nowhere, words are only printed, and chunks unpack small."""
 
 import csv
+import os
 import struct
 from pathlib import Path
 
@@ -18,15 +19,18 @@ from server.recording.errors import RecordingDamaged
 from server.recording.event_index import MAX_MARKS, EventIndex, TopicEntry, decode_index
 from server.recording.info import RecordingInfo
 from server.recording.marks import Mark
-from server.recording.raw_records import MAGIC, MAX_RECORD, chunk_records
-from server.recording.reader import RecordingReader
+from server.recording.raw_records import HEAD, MAGIC, MAX_UNPACKED, chunk_records
+from server.recording.reader import FOOTER, RecordingReader
 from server.recording.records import ReportRecord, RobotRecord
+from server.recording.scan import scan_file
 from server.recording.topics import CAMERA
+from server.recording.verify_file import verify_file
 from server.recording.writer import Entry, RecordingWriter
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story, own_entry, rewritten
 
 RING = RangeRing(name="r", body="base", count=3, angle_min=0.0, angle_increment=0.1, range_min=0.1, range_max=4.0)
 TURN = BodyJoint(joint="x", kind="revolute", axis=(0.0, 0.0, 1.0))
+HUGE = 1 << 40  # bytes, of which a hole in a file takes none
 ESCAPE = "\x1b[2J\x1b[1;1H\nverified and true\n"
 
 
@@ -103,10 +107,10 @@ def test_a_chunk_that_unpacks_to_more_than_it_says_or_than_fits_is_not_unpacked(
         chunk_records(chunk)
     honest = Chunk("zstd", zstandard.compress(b"\x99" + struct.pack("<Q", 3) + b"abc"), 0, 0, 0, 12)
     assert chunk_records(honest) == []
-    large = zstandard.ZstdCompressor().compressobj(size=MAX_RECORD + 1)
-    data = b"".join([*(large.compress(bytes(1 << 20)) for _ in range(256)), large.compress(b"\0"), large.flush()])
+    large = zstandard.ZstdCompressor().compressobj(size=MAX_UNPACKED + 1)
+    data = b"".join([*(large.compress(bytes(1 << 20)) for _ in range(32)), large.compress(b"\0"), large.flush()])
     with pytest.raises(ValueError, match="a chunk of"):
-        chunk_records(Chunk("zstd", data, 0, 0, 0, MAX_RECORD + 1))
+        chunk_records(Chunk("zstd", data, 0, 0, 0, MAX_UNPACKED + 1))
     with pytest.raises(ValueError, match="compressed as"):
         chunk_records(Chunk("lz4", b"", 0, 0, 0, 0))
 
@@ -178,3 +182,48 @@ def test_a_description_that_nobody_could_show_counts_as_damage(changed: dict[str
     writer.close()
     with RecordingReader(path) as reader, pytest.raises(RecordingDamaged, match="description"):
         reader.description()
+
+
+def test_a_record_in_a_file_with_holes_that_is_larger_than_memory_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    writer = Story(events=30).write(tmp_path / "open.mcap", close=False)
+    writer.flush()
+    path.write_bytes((tmp_path / "open.mcap").read_bytes())
+    writer.close()
+    whole = path.stat().st_size
+    with path.open("ab") as file:
+        file.write(b"\x99" + HUGE.to_bytes(8, "little"))
+    os.truncate(path, whole + HEAD + HUGE)
+    with RecordingReader(path) as reader:
+        assert reader.interrupted
+        assert scan_file(path, reader.info).whole == whole
+    verdict = verify_file(path)
+    assert "the bound is" in " ".join(each.text for each in verdict.checks["readable"].violations)
+
+
+def test_a_summary_in_a_file_with_holes_that_is_larger_than_memory_is_damage(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=10).write(path)
+    whole = path.read_bytes()
+    with path.open("r+b") as file:
+        file.truncate(len(whole) - FOOTER + HUGE)
+        file.seek(0, os.SEEK_END)
+        file.write(whole[-FOOTER:])
+    with pytest.raises(RecordingDamaged, match="a summary of"):
+        RecordingReader(path)
+
+
+def test_a_recording_that_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.mcap")
+    with pytest.raises(OSError, match="not a regular file"):
+        RecordingReader(tmp_path / "a.mcap")
+
+
+def test_a_recording_that_is_cut_while_it_is_read_is_damaged_from_there_on(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=200).write(path)
+    with RecordingReader(path) as reader:
+        assert list(reader.chunk(0))
+        os.truncate(path, reader.index.chunks[-1].offset + HEAD + 1)
+        with pytest.raises(RecordingDamaged):
+            list(reader.records())

@@ -6,6 +6,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path, PurePath
 
+import msgspec
 import pytest
 
 from server.recording import shelf as shelf_module
@@ -185,3 +186,30 @@ def test_whoever_asks_again_and_again_costs_a_look_and_what_changes_is_in_the_li
     monkeypatch.setattr(shelf_module, "LIST_SECONDS", 0.0)
     found.entries()
     assert len(times) == 4, "a file that somebody copies here grows without a sign"
+
+
+def test_a_link_to_what_is_elsewhere_is_neither_listed_nor_completed_nor_counted(tmp_path: Path) -> None:
+    here, elsewhere = tmp_path / "left", tmp_path / "right"
+    here.mkdir()
+    elsewhere.mkdir()
+    other = interrupted(elsewhere / "secret.mcap")
+    before = other.read_bytes()
+    (here / "secret.mcap").symlink_to(other)
+    (here / "passwords.mcap").symlink_to("/etc/passwd")
+    made(here / "own.mcap")
+    found = shelf(here, days=1)
+    assert [entry.id for entry in found.entries()] == ["own"]
+    assert found.path("secret") is None
+    assert found.recover() == 0
+    assert other.read_bytes() == before
+    (tmp_path / "link").symlink_to(here, target_is_directory=True)
+    assert [entry.id for entry in shelf(tmp_path / "link").entries()] == ["own"], "the folder itself may be one"
+
+
+def test_a_name_that_is_no_utf8_has_an_id_that_can_be_told_and_finds_it(tmp_path: Path) -> None:
+    path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\n1.mcap"))
+    made(path)
+    (entry,) = shelf(tmp_path).entries()
+    assert entry.id == "\N{REPLACEMENT CHARACTER}\n1"
+    assert msgspec.json.decode(msgspec.json.encode(entry))["id"] == entry.id
+    assert shelf(tmp_path).path(entry.id) == path
