@@ -18,6 +18,7 @@ from server.access import SceneTicket
 from server.commanded_path import CommandedPath
 from server.errors import SceneUnavailable
 from server.metrics import Metrics
+from server.rate_limits import RateLimits
 from server.scene_model import SceneModel
 from server.scene_page import ScenePage, read_scene_page
 from server.scene_scale import SceneScale
@@ -30,6 +31,7 @@ STOP_TIMEOUT = 5.0  # s
 SHARE = 0.25  # of the time, for building and posing: whatever the robot is like, their thread holds up all others
 LINK_PART = 4  # one link gets this part of the places
 RESERVED_PART = 5  # this part is not for observers
+OPENS, OPEN_RATE = 10, 0.5  # Hz, scenes that one link opens: viser tells each the whole scene
 
 
 class SceneView:
@@ -52,6 +54,7 @@ class SceneView:
         self._path: CommandedPath | None = None
         self._viewers = 0
         self._of_link: Counter[str] = Counter()
+        self._opens = RateLimits(OPEN_RATE, OPENS)
         self._page: ScenePage | None = None
         self._news = asyncio.Event()
 
@@ -84,8 +87,10 @@ class SceneView:
         """While entered, somebody watches. One link gets a quarter of the places, observers not the last ones.
 
         Raises:
-            SceneUnavailable: too many do.
+            SceneUnavailable: too many do, or this link begins too often.
         """
+        if not self._opens.spend(ticket.link, time.monotonic()):
+            raise SceneUnavailable("this link opens scenes too often")
         bound = self._max_viewers
         if ticket.role == "observer":
             bound = max(1, bound - max(1, bound // RESERVED_PART))

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
-from server import scene_proxy
+from server import scene, scene_proxy
 from server.access import Identity
 from server.scene_page import HOOK
 from server.scene_proxy import is_allowed
@@ -177,6 +177,22 @@ async def test_only_so_many_may_watch_and_one_link_cannot_take_all_places() -> N
         await eventually(lambda: rig.count("lockstep_scene_viewers") == 0)
         async with connect(await _scene_with(rig, links[0]), subprotocols=[VERSION], proxy=None):
             pass
+
+
+async def test_a_link_that_opens_scenes_again_and_again_is_turned_away_and_others_are_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(scene, "OPEN_RATE", 1e-6)
+    async with running_rig(scene=True) as rig:
+        address = await _scene_with(rig, rig.token("observer"))
+        for _ in range(scene.OPENS):
+            async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None):
+                pass
+        with pytest.raises(websockets.InvalidStatus):
+            await connect(address, subprotocols=[VERSION], proxy=None)
+        assert rig.count("lockstep_bad_input_total", where="scene", reason="SceneUnavailable") == 1
+        async with connect(await _scene_with(rig, rig.token("observer")), subprotocols=[VERSION], proxy=None):
+            assert rig.count("lockstep_scene_viewers") >= 1
 
 
 async def test_a_viewer_can_move_the_camera_and_nothing_else() -> None:
