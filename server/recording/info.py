@@ -1,6 +1,7 @@
 """What a recording says of itself at its beginning: MCAP metadata. No I/O."""
 
 from collections.abc import Mapping
+from typing import Annotated
 
 import msgspec
 
@@ -11,15 +12,18 @@ __all__ = ["METADATA_NAME", "RecordingInfo"]
 METADATA_NAME = "lockstep"
 
 
+Text = Annotated[str, msgspec.Meta(max_length=1000)]  # everybody's list has it, whoever made the file
+
+
 class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
     """The same in all parts of a recording, but for part and epoch."""
 
-    recording: str  # common to all parts
+    recording: Text  # common to all parts
     part: int = 1
-    epoch: str = ""
-    robot: str = ""  # the description's label
-    name: str = ""  # that somebody gave it
-    by: str = ""  # who started it; "" when it was the command line
+    epoch: Text = ""
+    robot: Text = ""  # the description's label
+    name: Text = ""  # that somebody gave it
+    by: Text = ""  # who started it; "" when it was the command line
 
     def metadata(self) -> dict[str, str]:
         return {name: str(value) for name, value in msgspec.structs.asdict(self).items()}

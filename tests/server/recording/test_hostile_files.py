@@ -227,3 +227,11 @@ def test_a_recording_that_is_cut_while_it_is_read_is_damaged_from_there_on(tmp_p
         os.truncate(path, reader.index.chunks[-1].offset + HEAD + 1)
         with pytest.raises(RecordingDamaged):
             list(reader.records())
+
+
+@pytest.mark.parametrize("field", ["recording", "epoch", "robot", "name", "by"])
+def test_what_a_recording_says_of_itself_is_short(field: str, tmp_path: Path) -> None:
+    info = msgspec.structs.replace(INFO, **{field: "x" * 100_000})
+    RecordingWriter(tmp_path / "a.mcap", info, DESCRIPTION, CODECS).close()
+    with pytest.raises(RecordingDamaged, match="not a recording of Lockstep"):
+        RecordingReader(tmp_path / "a.mcap")
