@@ -1,7 +1,8 @@
 """The HTTP API of invitations and of the audit (docs/console-api.md)."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import count
 from typing import Annotated, TypeVar
 
 import msgspec
@@ -26,6 +27,7 @@ Result = TypeVar("Result")
 DEFAULT_SECONDS = 8 * 3600.0
 UNWRITTEN = "the link has ended here; that is written down when the disk takes it, and not known to a start before that"
 MAX_RECORDS = 500  # of the audit in one answer
+MAX_ENDED = 500  # links that have ended, in one answer, besides all that are good
 
 
 class InvitationRequest(msgspec.Struct, frozen=True, kw_only=True):
@@ -53,7 +55,7 @@ class InvitationInfo(msgspec.Struct, frozen=True, kw_only=True):
 class InvitationList(msgspec.Struct, frozen=True, kw_only=True):
     """Answer of GET /api/invitations."""
 
-    invitations: list[InvitationInfo]
+    invitations: list[InvitationInfo]  # the newest first; of those that have ended the newest `MAX_ENDED`
     may_invite: list[Role]
 
 
@@ -75,13 +77,8 @@ class AuditPage(msgspec.Struct, frozen=True, kw_only=True):
 async def invitations(request: Request, caller: Caller) -> Response:
     here = services(request)
     _require_inviter(caller)
-    found = here.state.invitations.known.visible(caller.identity)
-    return _json(
-        InvitationList(
-            invitations=[_info(here, each) for each in found],
-            may_invite=list(may_invite(caller.role)),
-        )
-    )
+    found = _shown(here.state.invitations.known.visible(caller.identity), here.state.invitations.now())
+    return _json(InvitationList(invitations=_infos(here, found), may_invite=list(may_invite(caller.role))))
 
 
 @router.post("/api/invitations")
@@ -103,7 +100,7 @@ async def invite(request: Request, caller: Caller) -> Response:
     if made.robots == (here.robot,):
         base += str(request.scope.get("root_path", ""))  # to this robot, past the overview
     link = console_link(base, here.access.sign(made.identity, made.created))
-    return _json(NewInvitation(link=link, **msgspec.structs.asdict(_info(here, made))), 201)
+    return _json(NewInvitation(link=link, **msgspec.structs.asdict(_infos(here, [made])[0])), 201)
 
 
 @router.delete("/api/invitations/{invitation_id}")
@@ -121,7 +118,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
         here.console.audit.record("revocation", by, "not on the disk yet", invitation_id)
         raise StateUnavailable(f"{UNWRITTEN}; {error.detail}") from error
     here.house.enforce(revoked, by)
-    return _json(InvitationList(invitations=[_info(here, each) for each in revoked], may_invite=[]))
+    return _json(InvitationList(invitations=_infos(here, revoked), may_invite=[]))
 
 
 @router.get("/api/audit")
@@ -164,18 +161,27 @@ def _require_inviter(caller: HasRole) -> None:
         raise NotAllowed("observers invite nobody")
 
 
-def _info(here: Services, invitation: Invitation) -> InvitationInfo:
-    return InvitationInfo(
-        id=invitation.id,
-        role=invitation.role,
-        name=invitation.name,
-        by=invitation.by,
-        created=invitation.created,
-        expires=invitation.expires,
-        revoked=here.state.invitations.is_revoked(invitation.id),
-        connected=here.house.connected(invitation.id),
-        robots=list(invitation.robots),
-    )
+def _shown(found: Iterable[Invitation], now: float) -> list[Invitation]:
+    ended = count()
+    return [each for each in found if each.is_good(now) or next(ended) < MAX_ENDED]
+
+
+def _infos(here: Services, found: Iterable[Invitation]) -> list[InvitationInfo]:
+    connected = here.house.connected()
+    return [
+        InvitationInfo(
+            id=each.id,
+            role=each.role,
+            name=each.name,
+            by=each.by,
+            created=each.created,
+            expires=each.expires,
+            revoked=here.state.invitations.is_revoked(each.id),
+            connected=connected[each.id],
+            robots=list(each.robots),
+        )
+        for each in found
+    ]
 
 
 def _json(answer: msgspec.Struct, status: int = 200) -> Response:

@@ -2,11 +2,12 @@
 
 import asyncio
 import time
+from collections import Counter
 from collections.abc import Mapping
 from typing import Protocol
 
 import structlog
-from prometheus_client import Counter
+from prometheus_client import Counter as Metric
 
 from server.access import Identity
 from server.audit import Actor
@@ -34,7 +35,7 @@ class HouseMetrics(Protocol):
     """Where it counts what concerns no robot."""
 
     @property
-    def bad_input(self) -> Counter: ...
+    def bad_input(self) -> Metric: ...
     @property
     def faults(self) -> Faults: ...
 
@@ -118,9 +119,9 @@ class House:
         for warden in self.wardens:
             warden.enforce(changed, by, now)
 
-    def connected(self, link: str) -> int:
-        """Peers that are here with the link of this id, at any robot."""
-        return sum(warden.connected(link) for warden in self.wardens)
+    def connected(self) -> Counter[str]:
+        """Peers that are here, at any robot, by the ids of their links."""
+        return Counter(peer.identity.token_id for warden in self.wardens for peer in warden.peers)
 
     # silence
 

@@ -58,10 +58,6 @@ class LinkWarden:
         """The stops of this link are heard again, by themselves."""
         self._audit.record("silence", what="ended", detail=link)
 
-    def connected(self, link: str) -> int:
-        """Peers that are here with the link of this id."""
-        return sum(peer.identity.token_id == link for peer in self.peers)
-
     async def ended(self, link: str, expires: float) -> None:
         """Returns when the link with this id is revoked or has expired, at the next look at the latest."""
         while not self._invitations.has_ended(link, expires):

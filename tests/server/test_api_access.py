@@ -18,6 +18,7 @@ from robot_bridge.protocol.console import Notice, Role, SeatTake
 from robot_bridge.protocol.messages import Stop
 from robot_bridge.robots.registry import create_robot
 from robot_bridge.settings import BridgeSettings
+from server import api_access
 from server.access import Identity
 from server.invitation_store import InvitationStore
 from server.invitations import MAX_LIVE, MIN_SECONDS, Invitations
@@ -95,6 +96,24 @@ async def test_observers_see_no_invitations_and_revoke_none_and_only_supervisors
             ("observer", "not_allowed: GET /api/audit", 1),
             ("operator", "not_allowed: GET /api/audit", 1),
         }
+
+
+async def test_of_links_that_have_ended_the_newest_are_listed_and_all_that_are_good(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(api_access, "MAX_ENDED", 2)
+    async with running_console(NOWHERE) as rig:
+
+        def fill(known: Any) -> None:
+            now = time.time()
+            for number in range(8):
+                made = known.invite(None, "observer", f"n{number}", 3600, now + number)
+                if number % 2:
+                    known.revoke(None, made.id, now)
+
+        rig.services.state.invitations.update(fill)
+        listed = (await rig.http.get("/api/invitations", headers=rig.token("supervisor"))).json()["invitations"]
+        assert [each["name"] for each in listed] == ["n7", "n6", "n5", "n4", "n2", "n0"]
 
 
 async def test_there_are_only_so_many() -> None:
