@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from typing import TypeVar
 
 import rich
 import structlog
@@ -24,6 +25,8 @@ from server.scene_page import ScenePage, read_scene_page
 from server.scene_scale import SceneScale
 
 __all__ = ["SceneView", "pause"]
+
+Result = TypeVar("Result")
 
 log = structlog.get_logger(__name__)
 
@@ -53,6 +56,7 @@ class SceneView:
         self._feedback: Feedback | None = None  # not shown yet
         self._path: CommandedPath | None = None
         self._viewers = 0
+        self._worked = 0.0  # s, of threads for the picture that is being made
         self._of_link: Counter[str] = Counter()
         self._opens = RateLimits(OPEN_RATE, OPENS)
         self._page: ScenePage | None = None
@@ -125,7 +129,7 @@ class SceneView:
         while True:
             await self._news.wait()
             self._news.clear()
-            began = time.monotonic()
+            self._worked = 0.0
             if self._description is not None and self._server is not None:
                 description, self._description = self._description, None
                 self._scale = SceneScale(description)
@@ -135,24 +139,32 @@ class SceneView:
                 feedback, self._feedback = self._feedback, None
                 path = None if self._path is None else self._path.as_of_now()
                 await self._pose(partial(_pose, self._model, self._scale, feedback, path))
-            await asyncio.sleep(pause(time.monotonic() - began, self._interval))
+            await asyncio.sleep(pause(self._worked, self._interval))
 
     async def _built(
         self, server: viser.ViserServer, description: RobotDescription, factor: float
     ) -> SceneModel | None:
         """None: nothing can be made of it. A shape that viser does not take must not end the console."""
         try:
-            return await asyncio.to_thread(_build, server, description, factor)
+            return await asyncio.to_thread(self._timed, partial(_build, server, description, factor))
         except Exception as error:
             self._failed("built", error)
             return None
 
     async def _pose(self, pose: Callable[[], None]) -> None:
         try:
-            await asyncio.to_thread(pose)
+            await asyncio.to_thread(self._timed, pose)
         except Exception as error:
             self._failed("posed", error)
             self._model = None  # rather no picture than one that stands still
+
+    def _timed(self, work: Callable[[], Result]) -> Result:
+        """In a thread: what it does there, and not what it waits for on a busy machine, holds up the others."""
+        began = time.thread_time()
+        try:
+            return work()
+        finally:
+            self._worked += time.thread_time() - began
 
     def _failed(self, what: str, error: Exception) -> None:
         self._metrics.bad_input.labels(where="scene", reason=type(error).__name__).inc()
@@ -166,9 +178,9 @@ class SceneView:
                 await asyncio.to_thread(server.stop)
 
 
-def pause(took: float, interval: float) -> float:
-    """s to the next picture of the scene, after one that took so many s."""
-    return max(interval, took * (1 / SHARE - 1))
+def pause(worked: float, interval: float) -> float:
+    """s to the next picture of the scene, after one for which a thread has worked so many s."""
+    return max(interval, worked * (1 / SHARE - 1))
 
 
 def _pose(model: SceneModel, scale: SceneScale, feedback: Feedback, path: CommandedPath | None) -> None:
