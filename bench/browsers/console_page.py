@@ -42,6 +42,13 @@ READ_STRIP = """(name) => {
 }"""
 
 
+# The hook comes with what the page loads after its first picture.
+STATISTICS = """new Promise((resolve) => {
+  const look = () => (window.lockstep ? resolve(window.lockstep.stats()) : setTimeout(look, 20));
+  look();
+})"""
+
+
 class ConsolePage:
     """One open page. Waiting is always for something the page says, never for time to pass."""
 
@@ -49,8 +56,8 @@ class ConsolePage:
         self.page = page
 
     async def stats(self) -> dict[str, Any]:
-        """`window.lockstep.stats()`."""
-        statistics: dict[str, Any] = await self.page.evaluate("window.lockstep.stats()")
+        """`window.lockstep.stats()`, as soon as it is there."""
+        statistics: dict[str, Any] = await self.page.evaluate(STATISTICS)
         return statistics
 
     async def until(self, condition: str, seconds: float = 40.0) -> None:

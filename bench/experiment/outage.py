@@ -97,7 +97,8 @@ def _said(finding: Finding, held: bool, round_trip: float) -> dict[str, Any]:
 
 async def _cut(stage: Stage, choices: Choices, held: bool) -> tuple[Cut, Stick, RobotDescription]:
     async with _stick(stage, choices) as (stick, description):
-        await _until_driven(stage, time.monotonic())
+        async with asyncio.timeout(PATIENCE):
+            await _until_driven(stage, time.monotonic())
         await asyncio.sleep(BEFORE)
         began = time.monotonic()
         stage.network.outage(choices.seconds, hold=held)
