@@ -16,6 +16,7 @@ __all__ = ["BrowserStick", "browser_stick"]
 
 RIGHT_X = 2
 LOOK = 0.05  # s
+ARMS_SECONDS = 1.0
 
 
 class BrowserStick:
@@ -34,6 +35,8 @@ class BrowserStick:
                 await self._take_seat()
             elif seat and seat["mine"] and not found["armed"]:
                 await self._arm()
+                with contextlib.suppress(AssertionError):  # pressed again while it arms, START would disarm
+                    await self._page.until("s.armed", ARMS_SECONDS)
             await asyncio.sleep(LOOK)
 
     async def _take_seat(self) -> None:
