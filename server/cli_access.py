@@ -19,6 +19,7 @@ from server.audit import AuditRecord
 from server.audit_file import last_records, stored_records
 from server.audit_log import anchors_path
 from server.cli_audit import verify_audit
+from server.cli_options import RobotOption, StateDirOption
 from server.console_address import read_address
 from server.durations import duration_words, parse_duration
 from server.errors import ConsoleError
@@ -32,15 +33,13 @@ from server.settings import Settings
 from server.state import ConsoleState, open_state, robot_directory, state_path
 from server.state_dir import StateDir, StateDirUnusable
 
-__all__ = ["RobotOption", "StateDirOption", "add_access_commands"]
+__all__ = ["MakeSettings", "add_access_commands"]
 
 EXIT_BROKEN = 1  # the audit is not as it was written
 EXIT_USAGE = 2
 FOLLOW_SECONDS = 0.5  # between two looks at the log
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-RobotOption = Annotated[str, typer.Option(help="Of this robot of a fleet.")]
-StateDirOption = Annotated[Path | None, typer.Option(help="The console's state directory.")]
 MakeSettings = Callable[..., Settings]
 
 

@@ -16,7 +16,9 @@ __all__ = [
     "Speaker",
     "Record",
     "Relay",
+    "RobotOption",
     "SpeedCap",
+    "StateDirOption",
     "Stun",
     "Tls",
     "TlsCert",
@@ -25,6 +27,10 @@ __all__ = [
     "TurnSecret",
     "Whip",
 ]
+
+
+RobotOption = Annotated[str, typer.Option(help="Of this robot of a fleet.")]
+StateDirOption = Annotated[Path | None, typer.Option(help="The console's state directory.")]
 
 
 class SpeedCapChoice(StrEnum):

@@ -1,36 +1,30 @@
 """The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`."""
 
-import asyncio
 import os
-import secrets
 import sys
 from collections.abc import Callable
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
-from urllib.parse import quote
 
-import httpx
 import msgspec
 import typer
 
-from server.access import Access
-from server.cli_access import MakeSettings, RobotOption, StateDirOption
+from server.cli_access import MakeSettings
 from server.cli_extras import load_extra
+from server.cli_options import RobotOption, StateDirOption
 from server.console_address import read_address
 from server.evidence.anchors import parse_anchor
 from server.evidence.signer import is_public_key
 from server.names import escaped, printable
 from server.recording.errors import RecordingError
-from server.recording.replay_app import create_replay_app
 from server.recording.settings import recordings_directory
-from server.recording.shelf import RecordingEntry, Shelf, recording_id
+from server.recording.shelf import RecordingEntry, Shelf
 from server.recording.verify import Verdict
 from server.recording.verify_file import verify_file
 from server.recording.verify_signature import SignatureReport
 from server.robot_paths import ROBOTS
-from server.serve import PortTaken, bind, running, wait_for_signal
 from server.settings import Settings
 from server.state import ConsoleState, open_state, robot_directory
 from server.state_dir import StateDirUnusable
@@ -39,9 +33,7 @@ __all__ = ["DirectoryOption", "File", "add_recording_commands", "recording_file"
 
 EXIT_BROKEN = 1  # a promise is not kept
 EXIT_USAGE = 2
-EXIT_PORT_TAKEN = 3
 HTTP_SECONDS = 30.0
-TICKET_SECONDS = 600.0
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 File = Annotated[Path, typer.Argument(help="A recording, or its id in the recordings' directory.")]
@@ -108,14 +100,9 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         as_json: Json = False,
     ) -> None:
         """Serve the player for one recording, without a robot, and print its link."""
-        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
-        try:
-            asyncio.run(_replay(path, host, port, as_json))
-        except PortTaken as error:
-            _say(f"{error}; choose another with --port")
-            raise typer.Exit(EXIT_PORT_TAKEN) from error
-        except RecordingError as error:
-            raise _usage(str(error)) from error
+        from server.cli_replay import serve_replay
+
+        serve_replay(recording_file(file, make_settings(state_dir=state_dir), robot, directory), host, port, as_json)
 
     @app.command()
     def verify(
@@ -160,29 +147,10 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
             sys.stdout.write(f"{escaped(each)}\n")
 
 
-async def _replay(path: Path, host: str, port: int, as_json: bool) -> None:
-    listener = bind(host, port)
-    try:
-        access = Access(secrets.token_urlsafe(32), token_seconds=30 * 86_400.0, ticket_seconds=TICKET_SECONDS)
-        own_host, own_port = listener.getsockname()[:2]
-        url = f"http://{f'[{own_host}]' if ':' in own_host else own_host}:{own_port}"
-        told = recording_id(path)
-        link = f"{url}/recordings#token={access.issue('observer', 'replay')}&recording={quote(told, safe='')}"
-        app = create_replay_app(path, access, host)
-        await asyncio.to_thread(app.state.recordings.library.entries)  # so that its index is known when it is asked for
-        async with running(app, listener):
-            if as_json:
-                sys.stdout.write(msgspec.json.encode({"console": url, "recording": told, "link": link}).decode() + "\n")
-            else:
-                sys.stdout.write(f"\n  To look at {escaped(path.name)}, open:   {link}\n\n")
-            sys.stdout.flush()
-            await wait_for_signal()
-    finally:
-        listener.close()
-
-
 def _ask(settings: Settings, robot: str, method: str, path: str, body: dict[str, str] | None = None) -> dict[str, Any]:
     """What the console of this state directory answers."""
+    import httpx
+
     state = _state(settings)
     url = settings.public_url or read_address(state.directory)
     if not url:

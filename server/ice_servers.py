@@ -11,13 +11,11 @@ import re
 from typing import NamedTuple
 
 import msgspec
-from aiortc import RTCIceServer
 
 __all__ = [
     "IceServer",
     "IceServers",
     "TurnUri",
-    "for_aiortc",
     "ice_servers",
     "link_headers",
     "read_turn_uri",
@@ -89,10 +87,3 @@ def link_headers(servers: IceServers) -> list[str]:
                 line += f'; username="{server.username}"; credential="{server.credential}"; credential-type="password"'
             lines.append(line)
     return lines
-
-
-def for_aiortc(servers: IceServers) -> list[RTCIceServer]:
-    return [
-        RTCIceServer(each.urls, username=each.username or None, credential=each.credential or None)
-        for each in servers.ice_servers
-    ]

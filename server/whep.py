@@ -15,6 +15,7 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 from server.access import Identity, Right
 from server.advertised import advertised_candidates, with_advertised
 from server.agreed_channels import AgreedChannel, agreed_channels
+from server.aiortc_servers import for_aiortc
 from server.api_ice import servers_for
 from server.body import read_text
 from server.data_transport_private import tune_data_transport
@@ -31,7 +32,7 @@ from server.errors import (
     TooFewSections,
 )
 from server.ice_restart_private import IceSession
-from server.ice_servers import IceServers, for_aiortc, link_headers
+from server.ice_servers import IceServers, link_headers
 from server.media.aiortc_private import close_or_force, create_peer_connection
 from server.offer import (
     MAX_SECTIONS,

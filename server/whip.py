@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
 from server.access import Right
 from server.advertised import with_advertised
+from server.aiortc_servers import for_aiortc
 from server.api_ice import servers_for
 from server.body import read_text
 from server.errors import (
@@ -21,7 +22,7 @@ from server.errors import (
     RobotUnreachable,
 )
 from server.ice_restart_private import IceSession
-from server.ice_servers import for_aiortc, link_headers
+from server.ice_servers import link_headers
 from server.media.aiortc_private import create_peer_connection, offered_direction
 from server.media.published.published_camera import PublishedCamera
 from server.media.published.receiver_private import take_pictures

@@ -10,7 +10,7 @@ import typer
 
 from bench.session_report.figures import Figure, session_figures
 from bench.session_report.session import Session, read_session
-from server.cli_access import RobotOption, StateDirOption
+from server.cli_options import RobotOption, StateDirOption
 from server.cli_recordings import DirectoryOption, File, recording_file
 from server.recording.errors import RecordingError
 from server.recording.verify import Verdict

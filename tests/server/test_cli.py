@@ -4,6 +4,7 @@ import asyncio
 import os
 import signal
 import socket
+import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -11,9 +12,10 @@ from pathlib import Path
 
 import httpx
 import pytest
+from typer.main import get_group
 from typer.testing import CliRunner
 
-from server.cli import app
+from server.cli import LOADERS, app
 from tests.support.stack import running_fleet, running_stack
 
 LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
@@ -52,7 +54,7 @@ async def test_up_prints_one_line_that_works_and_leaves_nothing_running(tmp_path
             session = await http.get("/api/session", headers={"Authorization": f"Bearer {token}"})
             assert session.json()["link"]["up"] is True
             assert session.json()["you"]["role"] == "operator"
-        assert list(stack.events("start"))
+        assert await stack.events("start")
         assert stack.process.stdout is not None
     assert await stack.process.stdout.read() == b"", "nothing but the one line"
     assert stack.process.returncode == 0
@@ -72,8 +74,8 @@ async def test_a_bridge_that_dies_is_started_again_on_the_same_port(tmp_path: Pa
             async with asyncio.timeout(PATIENCE):
                 while not (await _is_back(http, before)):  # noqa: ASYNC110
                     await asyncio.sleep(0.1)
-        assert any("the robot bridge ended (signal 9, Killed)" in line for line in stack.output)
-        assert any(stack.robot in line for line in stack.output)
+        await stack.says("the robot bridge ended (signal 9, Killed)")
+        await stack.says(stack.robot)
 
 
 @pytest.fixture
@@ -96,9 +98,8 @@ async def test_a_console_that_crashes_in_native_code_says_where_it_was(tmp_path:
         os.kill(stack.process.pid, signal.SIGSEGV)
         async with asyncio.timeout(PATIENCE):
             assert await stack.process.wait() == -signal.SIGSEGV
-            while not any("most recent call first" in line for line in stack.output):  # noqa: ASYNC110
-                await asyncio.sleep(0.05)
-        assert any("Segmentation fault" in line for line in stack.output)
+        await stack.says("most recent call first")
+        await stack.says("Segmentation fault")
 
 
 async def test_a_port_in_use_is_said_clearly() -> None:
@@ -189,7 +190,7 @@ async def test_up_runs_several_robots_each_with_a_name_and_ends_them_all(tmp_pat
             token = fleet.operator.partition("#token=")[2]
             robots = (await http.get("/api/fleet", headers={"Authorization": f"Bearer {token}"})).json()["robots"]
         assert [(each["name"], each["link"]) for each in robots] == [("left", "up"), ("right", "up")]
-        assert all(list(fleet.events("start", name)) for name in fleet.robots)
+        assert all([await fleet.events("start", name) for name in fleet.robots])
     assert fleet.process.returncode == 0
     for address in fleet.robots.values():
         with socket.socket() as probe:
@@ -224,8 +225,10 @@ def test_each_robot_of_up_has_its_latch_by_its_name_whatever_the_port(
     robots: tuple[str, ...], places: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given: list[list[str]] = []
-    monkeypatch.setattr("server.cli.BridgeProcess", lambda kind, host, port, options, *more: given.append(options))
-    monkeypatch.setattr("server.cli._run", lambda *more: None)
+    monkeypatch.setattr(
+        "server.cli_console.BridgeProcess", lambda kind, host, port, options, *more: given.append(options)
+    )
+    monkeypatch.setattr("server.cli_console._run", lambda *more: None)
     for port in ("8000", "9000"):
         asked = CliRunner().invoke(app, ["up", *robots, "--port", port, "--state-dir", str(tmp_path)])
         assert asked.exit_code == 0, asked.output
@@ -259,3 +262,20 @@ async def test_a_misspelt_setting_of_the_environment_is_named_at_start(
     async with running_stack(tmp_path, extra=("--robot-port", "0")) as stack:
         pass
     assert any("LOCKSTEP_PORTT is no setting" in line for line in stack.output)
+
+
+def test_each_command_is_where_it_is_looked_for_and_help_names_them_all() -> None:
+    said = CliRunner().invoke(app, ["--help"], terminal_width=100).stdout
+    for load, names in LOADERS.items():
+        commands = get_group(load()).commands
+        assert set(commands) == set(names)
+        assert all(f" {name} " in said for name in names)
+
+
+@pytest.mark.parametrize("arguments", [("--version",), ("robot", "--help"), ("invite", "--help")])
+def test_a_command_that_runs_no_console_loads_nothing_of_media_and_the_web(arguments: tuple[str, ...]) -> None:
+    heavy = "{'aiortc', 'av', 'fastapi', 'uvicorn', 'viser'}"
+    look = f"import sys, atexit; atexit.register(lambda: print('loaded', sorted({heavy} & set(sys.modules)))); "
+    program = (sys.executable, "-c", look + "from server.cli import main; main()", *arguments)
+    done = subprocess.run(program, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.splitlines()[-1] == "loaded []"

@@ -1,9 +1,9 @@
 import pytest
 
+from server.aiortc_servers import for_aiortc
 from server.ice_servers import (
     IceServer,
     IceServers,
-    for_aiortc,
     ice_servers,
     link_headers,
     read_turn_uri,
