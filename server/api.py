@@ -136,7 +136,7 @@ async def reset(request: Request, caller: Caller) -> Response:
 async def scene(request: Request, caller: Caller) -> Response:
     """A path for an iframe that shows the 3D scene; its ticket is good for a few minutes."""
     here = services(request)
-    here.scene_or_error()
+    await here.scene_or_error().open()
     root = str(request.scope.get("root_path", ""))
     ticket = here.access.issue_ticket(caller.identity)
     return json_answer(ScenePath(f"{root}/scene/{ticket}/?{scene_query(request, ticket)}"))

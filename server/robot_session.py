@@ -103,7 +103,7 @@ async def _session(
 ) -> AsyncIterator[Services]:
     access = house.state.access.at(robot)
     media = MediaPlane(settings.media, metrics.registry, settings.sources, on_fault=metrics.faults.caught)
-    scene = await _start_scene(settings, metrics)
+    scene = SceneView(settings.scene_hz, settings.max_scene_viewers, metrics) if settings.scene else None
     clock = EventClock()
     shelf = Shelf(recordings_directory(settings.recording, directory.path), settings.recording)
     signing = RecordingSigning(house.state.signer, lambda: anchor_text(audit.newest_anchor()))
@@ -191,11 +191,3 @@ async def _session(
         await media.close()
         if scene is not None:
             await scene.close()
-
-
-async def _start_scene(settings: Settings, metrics: Metrics) -> SceneView | None:
-    if not settings.scene:
-        return None
-    scene = SceneView(settings.scene_hz, settings.max_scene_viewers, metrics)
-    await scene.start()
-    return scene

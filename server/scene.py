@@ -1,17 +1,14 @@
-"""The 3D scene: viser on a loopback port, posed from feedback while somebody watches."""
+"""The 3D scene: viser on a loopback port, started for the first who opens it, posed while somebody watches."""
 
 import asyncio
-import logging
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-import rich
 import structlog
-import viser
 
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback
@@ -20,9 +17,14 @@ from server.commanded_path import CommandedPath
 from server.errors import SceneUnavailable
 from server.metrics import Metrics
 from server.rate_limits import RateLimits
-from server.scene_model import SceneModel
-from server.scene_page import ScenePage, read_scene_page
+from server.scene_page import ScenePage
 from server.scene_scale import SceneScale
+from server.to_the_end import to_the_end
+
+if TYPE_CHECKING:
+    import viser
+
+    from server.scene_model import SceneModel
 
 __all__ = ["SceneView", "pause"]
 
@@ -30,6 +32,7 @@ Result = TypeVar("Result")
 
 log = structlog.get_logger(__name__)
 
+START_TIMEOUT = 20.0  # s, of a busy machine
 STOP_TIMEOUT = 5.0  # s
 SHARE = 0.25  # of the time, for building and posing: whatever the robot is like, their thread holds up all others
 LINK_PART = 4  # one link gets this part of the places
@@ -38,10 +41,10 @@ OPENS, OPEN_RATE = 10, 0.5  # Hz, scenes that one link opens: viser tells each t
 
 
 class SceneView:
-    """Enter `run` as a task. Building and posing happen in threads, the newest feedback wins.
+    """Enter `run` as a task. Starting, building and posing happen in threads, the newest feedback wins.
 
     Attributes:
-        port: where viser listens, on loopback; 0 before `start`
+        port: where viser listens, on loopback; 0 before somebody opens the scene
     """
 
     def __init__(self, rate: float, max_viewers: int, metrics: Metrics) -> None:
@@ -49,6 +52,8 @@ class SceneView:
         self._interval = 1 / rate
         self._max_viewers = max_viewers
         self._metrics = metrics
+        self._wanted = False  # somebody opens it, and viser is to be started
+        self._started = asyncio.Event()
         self._server: viser.ViserServer | None = None
         self._model: SceneModel | None = None
         self._scale: SceneScale | None = None
@@ -81,7 +86,7 @@ class SceneView:
 
     @property
     def page(self) -> ScenePage:
-        """Raises SceneUnavailable before `start`."""
+        """Raises SceneUnavailable before `open`."""
         if self._page is None:
             raise SceneUnavailable("the 3D scene has not started")
         return self._page
@@ -115,20 +120,30 @@ class SceneView:
             self._viewers -= 1
             self._metrics.scene_viewers.set(self._viewers)
 
-    async def start(self) -> None:
-        """Returns when viser listens."""
-        # viser announces itself and every refusal on standard output, which belongs to the console's own links.
-        rich.get_console().quiet = True
-        logging.getLogger("websockets.server").setLevel(logging.ERROR)
-        self._server = await asyncio.to_thread(_start_viser)
-        self.port = self._server.get_port()
-        self._page = await asyncio.to_thread(read_scene_page, self.port)
+    async def open(self) -> None:
+        """Returns when viser listens, which `run` starts for whoever comes first.
+
+        Raises:
+            SceneUnavailable: it does not start.
+        """
+        if self._started.is_set():
+            return
+        self._wanted = True
+        self._news.set()
+        try:
+            async with asyncio.timeout(START_TIMEOUT):
+                await self._started.wait()
+        except TimeoutError as error:
+            raise SceneUnavailable("the 3D scene does not start") from error
 
     async def run(self) -> None:
         """Until cancelled."""
         while True:
             await self._news.wait()
             self._news.clear()
+            if self._wanted and self._server is None:
+                self._wanted = False
+                await to_the_end(self._start())
             self._worked = 0.0
             if self._description is not None and self._server is not None:
                 description, self._description = self._description, None
@@ -141,9 +156,14 @@ class SceneView:
                 await self._pose(partial(_pose, self._model, self._scale, feedback, path))
             await asyncio.sleep(pause(self._worked, self._interval))
 
+    async def _start(self) -> None:
+        server, self._page = await asyncio.to_thread(_start_viser)
+        self._server, self.port = server, server.get_port()
+        self._started.set()
+
     async def _built(
-        self, server: viser.ViserServer, description: RobotDescription, factor: float
-    ) -> SceneModel | None:
+        self, server: "viser.ViserServer", description: RobotDescription, factor: float
+    ) -> "SceneModel | None":
         """None: nothing can be made of it. A shape that viser does not take must not end the console."""
         try:
             return await asyncio.to_thread(self._timed, partial(_build, server, description, factor))
@@ -183,18 +203,17 @@ def pause(worked: float, interval: float) -> float:
     return max(interval, worked * (1 / SHARE - 1))
 
 
-def _pose(model: SceneModel, scale: SceneScale, feedback: Feedback, path: CommandedPath | None) -> None:
+def _pose(model: "SceneModel", scale: SceneScale, feedback: Feedback, path: CommandedPath | None) -> None:
     model.pose(scale.feedback(feedback), None if path is None else scale.poses(path.poses()))
 
 
-def _start_viser() -> viser.ViserServer:
-    server = viser.ViserServer(host="127.0.0.1", port=0, label="Scene", verbose=False)
-    server.gui.main_panel.minimize()
-    server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
-    return server
+def _start_viser() -> "tuple[viser.ViserServer, ScenePage]":
+    from server.scene_server import start_viser
+
+    return start_viser()
 
 
-def _build(server: viser.ViserServer, description: RobotDescription, factor: float) -> SceneModel:
-    with server.atomic():
-        server.scene.reset()
-        return SceneModel(server, description, factor)
+def _build(server: "viser.ViserServer", description: RobotDescription, factor: float) -> "SceneModel":
+    from server.scene_server import build_model
+
+    return build_model(server, description, factor)

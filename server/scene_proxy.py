@@ -49,11 +49,12 @@ async def client(request: Request, ticket: str) -> Response:
     here = services(request)
     here.access.verify_ticket(ticket)
     _check_query(request, ticket)
-    page = here.scene_or_error().page
+    scene = here.scene_or_error()
+    await scene.open()
     headers = {"Cache-Control": "no-store", "Vary": "Accept-Encoding"}
     if "gzip" not in request.headers.get("accept-encoding", ""):
-        return Response(page.plain, media_type="text/html", headers=headers)
-    return Response(page.packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"})
+        return Response(scene.page.plain, media_type="text/html", headers=headers)
+    return Response(scene.page.packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"})
 
 
 @router.get("/scene/{path:path}")
@@ -90,6 +91,7 @@ async def stream(websocket: WebSocket, ticket: str) -> None:
         if websocket.headers.get("origin") != OPAQUE:
             check_origin(websocket.headers, here.settings.allowed_origins)
         scene = here.scene_or_error()
+        await scene.open()
         with scene.viewer(valid):
             await _join(websocket, scene, valid)
     except ConsoleError as error:

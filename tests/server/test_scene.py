@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import subprocess
+import sys
 import time
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -15,9 +17,9 @@ from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
-from server import scene, scene_proxy
+from server import scene, scene_proxy, scene_server
 from server.access import Identity
-from server.scene_page import HOOK
+from server.scene_page import HOOK, ScenePage
 from server.scene_proxy import is_allowed
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 
@@ -59,6 +61,47 @@ async def test_the_client_is_served_and_its_stream_shows_the_robot() -> None:
                     heard += bytes(await websocket.recv(decode=False))
             assert rig.count("lockstep_scene_viewers") == 1
         await eventually(lambda: rig.count("lockstep_scene_viewers") == 0)
+
+
+async def test_viser_is_started_once_for_the_first_who_open_the_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    starts: list[int] = []
+    start = scene_server.start_viser
+
+    def count() -> tuple[viser.ViserServer, ScenePage]:
+        starts.append(1)
+        return start()
+
+    monkeypatch.setattr(scene_server, "start_viser", count)
+    async with running_rig(scene=True) as rig:
+        scene = rig.services.scene_or_error()
+        assert (scene.port, starts) == (0, [])
+        await asyncio.gather(*(_scene_url(rig) for _ in range(5)))
+        assert scene.port
+        assert len(starts) == 1
+
+
+async def test_a_scene_that_does_not_start_is_said_to_be_unavailable_and_tried_again_for_the_next(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail() -> None:
+        raise OSError("no port")
+
+    monkeypatch.setattr("server.scene.START_TIMEOUT", 0.2)
+    with monkeypatch.context() as broken:
+        broken.setattr(scene_server, "start_viser", fail)
+        async with running_rig(scene=True) as rig:
+            answer = await rig.http.post("/api/scene", headers=rig.token("observer"))
+            assert (answer.status_code, answer.json()["error"]) == (503, "scene_unavailable")
+            assert rig.count("lockstep_internal_errors_total", where="scene") == 1
+            broken.undo()
+            monkeypatch.setattr("server.scene.START_TIMEOUT", PATIENCE)
+            await _scene_url(rig)
+
+
+def test_a_console_that_nobody_asks_for_the_scene_does_not_load_viser() -> None:
+    look = "import sys, server.cli, server.run_console; print(sorted({'viser', 'trimesh', 'PIL'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "[]"
 
 
 async def test_the_stream_needs_a_ticket_and_our_own_page() -> None:

@@ -66,9 +66,9 @@ async def test_a_shape_that_cannot_be_built_is_counted_and_the_next_robot_is_sho
             if sample.name.endswith("_total") and sample.labels["where"] == "scene"
         )
 
-    await scene.start()
     running = asyncio.create_task(scene.run())
     try:
+        await scene.open()
         scene.configure(bad)
         await eventually(lambda: failures() == 1)
         scene.configure(msgspec.structs.replace(MICRO, joints=MICRO.joints))
@@ -90,9 +90,9 @@ async def test_a_robot_of_many_parts_is_posed_away_from_the_loop(monkeypatch: py
 
     monkeypatch.setattr(CommandedPath, "poses", noted)
     scene = SceneView(15.0, 1, Metrics())
-    await scene.start()
     running = asyncio.create_task(scene.run())
     try:
+        await scene.open()
         scene.configure(PLANAR)
         with scene.viewer(SceneTicket("link", "observer", math.inf)):
             scene.feedback(Feedback(event=1, issue=1, time=0.0, axes=[0.0] * 3, joints=[0.0] * 3))

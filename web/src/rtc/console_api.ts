@@ -22,6 +22,7 @@ export interface MediaOffer {
 
 const FRAGMENT = "application/trickle-ice-sdpfrag";
 const RESTART_LIMIT_MS = 10_000;
+const SCENE_MS = 25_000; // the console may have to start it first
 
 /** The console's HTTP interface (docs/console-api.md), for the holder of one token. */
 export class ConsoleApi {
@@ -102,7 +103,7 @@ export class ConsoleApi {
 
   /** Path of the 3D scene, valid for a short time. */
   async scene(): Promise<string> {
-    const scene = await this.json("POST", "/api/scene", {}, AbortSignal.timeout(5000));
+    const scene = await this.json("POST", "/api/scene", {}, AbortSignal.timeout(SCENE_MS));
     const path = isRecord(scene) ? scene["path"] : undefined;
     if (typeof path !== "string" || !path.startsWith("/"))
       throw new ConsoleError(200, "malformed", "no path", null);
