@@ -63,7 +63,7 @@ def _module(item: pytest.Item) -> str:
 def _places(items: list[pytest.Item]) -> dict[Path, float]:
     """Of each file in the run: those with browsers and other slow ones evenly from 0 to 1, then the rest."""
     kinds: dict[str, dict[Path, None]] = {"browser": {}, "slow": {}, "fast": {}}
-    for item in sorted(items, key=_shares_a_console):
+    for item in sorted(items, key=_console_shared):
         kind = next((each for each in ("browser", "fast") if item.get_closest_marker(each)), "slow")
         kinds[kind].pop(item.path, None)
         kinds[kind][item.path] = None
@@ -73,9 +73,12 @@ def _places(items: list[pytest.Item]) -> dict[Path, float]:
     return places
 
 
-def _shares_a_console(item: pytest.Item) -> bool:
+def _console_shared(item: pytest.Item) -> int:
+    """Files that share one are neighbours: 0 for none, and one for each kind of it."""
     assert isinstance(item, pytest.Function)
-    return "stack_keeper" in item.fixturenames
+    if "stack_keeper" not in item.fixturenames:
+        return 0
+    return 1 if item.get_closest_marker("full_rate") else 2
 
 
 @pytest.fixture(autouse=True, scope="session")

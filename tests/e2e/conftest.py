@@ -8,7 +8,6 @@ because the browser belongs to the loop that started it.
 import os
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,6 +21,8 @@ from tests.e2e.as_new import as_new
 from tests.support.stack import Stack, running_stack
 
 HERE = Path(__file__).parent
+# Pictures cost the most of all, here and in the browser. Tests that judge them have all of them: `full_rate`.
+HALF_RATE = {"LOCKSTEP_MEDIA__VIDEO_FRAMES_PER_SECOND": "15"}
 
 expect.set_options(timeout=30_000)  # ms; a page shows what it hears when a busy machine lets it draw
 
@@ -34,10 +35,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def own_stack(tmp_path: Path) -> AsyncIterator[Stack]:
+async def own_stack(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator[Stack]:
     """A console of the test's own, which it may break."""
-    async with running_stack(tmp_path) as running:
+    async with running_stack(tmp_path, settings={} if _wants_all(request) else HALF_RATE) as running:
         yield running
+
+
+def _wants_all(request: pytest.FixtureRequest) -> bool:
+    return request.node.get_closest_marker("full_rate") is not None
 
 
 class StackKeeper:
@@ -47,14 +52,16 @@ class StackKeeper:
         self._directories = directories
         self._running = AsyncExitStack()
         self._stack: Stack | None = None
+        self._full_rate = True
 
-    async def stack(self) -> Stack:
+    async def stack(self, *, full_rate: bool) -> Stack:
         """Nobody is there, the robot is at rest, near where it starts and not stopped."""
-        if self._stack is None or not await as_new(self._stack):
+        if self._stack is None or self._full_rate != full_rate or not await as_new(self._stack):
             await self.close()
-            started = running_stack(self._directories.mktemp("shared"))
+            started = running_stack(self._directories.mktemp("shared"), settings={} if full_rate else HALF_RATE)
             self._stack = await self._running.enter_async_context(started)
-        return replace(self._stack, skipped=len(self._stack.event_log.read_text().splitlines()))
+            self._full_rate = full_rate
+        return await self._stack.from_here()
 
     async def close(self) -> None:
         self._stack = None
@@ -69,9 +76,9 @@ async def stack_keeper(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterato
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def stack(stack_keeper: StackKeeper) -> Stack:
+async def stack(request: pytest.FixtureRequest, stack_keeper: StackKeeper) -> Stack:
     """A console that other tests have used and will use."""
-    return await stack_keeper.stack()
+    return await stack_keeper.stack(full_rate=_wants_all(request))
 
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")
