@@ -18,6 +18,7 @@ __all__ = ["Pause", "Trip", "console_trips", "drive_on", "link_trips", "round_an
 SPEEDS = {"base.vx": 0.15, "base.wz": 0.6, "tool.vz": 0.03}  # the base drives a circle of 0.25 m; the tool nods
 TICK = 0.004  # s, the robot's control tick
 TIMER = 0.0015  # s, how exact a sleep is
+ARMINGS = 5  # one after another, of a robot that a busy machine holds up
 MARGIN = 0.0005  # s on top of the shortest interval between two events
 
 
@@ -66,15 +67,19 @@ class Pause:
 async def drive_on(console: Console, values: Mapping[str, float] | Sequence[float]) -> Feedback:
     """Drive, and arm first wherever the robot asks for it: nobody stands beside a simulated one.
 
+    A machine that is busy may hold the robot up again between the two.
+
     Raises:
+        NotArmed: it asked for it every time.
         CommandRefused: the robot is stopped, this console does not hold the seat, …
         ConsoleLost: the connection ended.
     """
-    try:
-        return await console.drive(values)
-    except NotArmed:
-        await console.arm()
-        return await console.drive(values)
+    for _ in range(ARMINGS):
+        try:
+            return await console.drive(values)
+        except NotArmed:
+            await console.arm()
+    return await console.drive(values)
 
 
 async def console_trips(console: Console, count: int, *, seconds: float = 60.0, seed: int = 1) -> list[Trip]:
@@ -84,7 +89,7 @@ async def console_trips(console: Console, count: int, *, seconds: float = 60.0, 
     it is sent by the call itself. The very first, which may meet a gate that is still shut, is not counted.
     """
     values, pause = round_and_round(console.description), Pause(console.description, seed)
-    await console.drive(values(time.monotonic()))
+    await drive_on(console, values(time.monotonic()))
     await pause.after(time.monotonic())
     trips: list[Trip] = []
     end = time.monotonic() + seconds

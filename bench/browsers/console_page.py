@@ -1,8 +1,9 @@
 """The page as its user handles it, and what it says of itself, for tests in Chromium."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from types import MappingProxyType
 from typing import Any
 
 from playwright.async_api import Browser, Page
@@ -13,7 +14,18 @@ __all__ = ["LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
 
 START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
 LEFT_X, LEFT_Y = 0, 1
-ARM_TRIES, ARM_SECONDS = 3, 3.0
+FORWARD = MappingProxyType({LEFT_Y: -1.0})
+ARM_TRIES, ARM_SECONDS = 3, 5.0
+# Why the page says that it has disarmed where a busy machine held up the robot, the console or itself.
+HELD_UP = (
+    "the robot interrupted the motion",
+    "the connection was lost",
+    "the robot cannot be reached",
+    "the control seat was lost",
+    "not connected to the console",
+    "get the control seat first",
+)
+HOLD_SECONDS, RESET_SECONDS = 10.0, 60.0  # for one hold of the button to take effect; for all of them
 
 # The true event, read out of the strip that the planar robot draws into its pictures (robots/event_strip.py),
 # together with the stamp that the page believes it has. One expression: no picture is drawn in between.
@@ -110,14 +122,63 @@ class ConsolePage:
             if missed is None:
                 return
         await self.press(START)
-        await self.until("s.armed", 5)
+        await self.until("s.armed", 20)
         await self.press(START, False)
 
-    async def drive_forward(self) -> None:
-        """Hold the deadman and push the left stick forward."""
-        await self.press(RB)
-        await self.tilt(LEFT_Y, -1)
-        await self.until("s.driving && s.at_rest === false")
+    async def drive_forward(self, tilts: Mapping[int, float] = FORWARD) -> None:
+        """Hold the deadman and tilt the sticks; armed anew where a busy machine ended that."""
+        for _ in range(ARM_TRIES):
+            await self.press(RB)
+            for axis, value in tilts.items():
+                await self.tilt(axis, value)
+            await self.until("!s.armed || (s.driving && s.at_rest === false)")
+            if not await self.was_held_up():
+                break
+            await self._arm_anew(tilts)
+        await self.until("s.driving && s.at_rest === false", 20)
+
+    @asynccontextmanager
+    async def driving(self, tilts: Mapping[int, float] = FORWARD) -> AsyncIterator[None]:
+        """It is armed and driven inside the block, anew where a busy machine ended that; deadman and sticks stay held.
+
+        Anything else that ends it, as a stop, lasts.
+        """
+        await self.arm()
+        await self.drive_forward(tilts)
+        going_on = asyncio.create_task(self._go_on(tilts))
+        try:
+            yield
+        finally:
+            going_on.cancel()
+            await asyncio.gather(going_on, return_exceptions=True)
+
+    async def _go_on(self, tilts: Mapping[int, float]) -> None:
+        while True:
+            await self._missed("!s.armed", 600)
+            if not await self.was_held_up():
+                return
+            await self._arm_anew(tilts)
+            await self.drive_forward(tilts)
+
+    async def _arm_anew(self, tilts: Mapping[int, float]) -> None:
+        await self.press(RB, False)
+        for axis in tilts:
+            await self.tilt(axis, 0)
+        await self.until("s.connected")
+        await self.arm()
+
+    async def let_go(self) -> None:
+        """Of the deadman and the left stick."""
+        await self.press(RB, False)
+        await self.tilt(LEFT_Y, 0)
+
+    async def was_held_up(self) -> bool:
+        """Whether it is disarmed because this machine held something up."""
+        if await self._missed("!s.armed", 0) is not None:
+            return False
+        await self._missed("document.querySelector('.arm').dataset.state === 'disarmed'", 5)  # it is drawn later
+        words = await self.page.locator(".arm-words").text_content() or ""
+        return any(why in words.casefold() for why in HELD_UP)
 
     async def drive_on_until(self, condition: str, seconds: float = 60.0) -> None:
         """Arm and drive forward until `condition`; again wherever the page has disarmed, as a bad network makes it."""
@@ -129,8 +190,7 @@ class ConsolePage:
                 await self.until(f"!s.armed || ({condition})", seconds)
                 if await self._missed(condition, 0) is None:
                     return
-                await self.press(RB, False)
-                await self.tilt(LEFT_Y, 0)
+                await self.let_go()
 
     async def open_full_scene(self) -> None:
         """The 3D scene as the large view: where it is not shown, it is asked for first."""
@@ -140,15 +200,14 @@ class ConsolePage:
         await self.page.get_by_role("button", name="Show 3D scene large").click()
 
     async def reset(self) -> None:
-        """Hold the button until the robot says that it is no longer stopped."""
-        await self.page.locator(".banner").wait_for(state="hidden")  # its row goes, and the button moves up
-        box = await self.page.get_by_role("button", name="Hold to reset").bounding_box()
-        if box is None:
-            raise AssertionError("the button to reset is not to be seen")
-        await self.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-        await self.page.mouse.down()
-        await self.until("!s.stop.stopped")
-        await self.page.mouse.up()
+        """Hold the button until the robot says that it is no longer stopped; anew where it slipped away."""
+        button = self.page.get_by_role("button", name="Hold to reset")
+        async with asyncio.timeout(RESET_SECONDS):
+            while await self._missed("!s.stop.stopped", 0) is not None:
+                await button.hover()
+                await self.page.mouse.down()
+                await self._missed("!s.stop.stopped", HOLD_SECONDS)
+                await self.page.mouse.up()
 
     async def strip(self, stream: str) -> tuple[int, int | None] | None:
         """The stamp the page believes its picture has, and the event that is drawn into it; None before the first."""

@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from bench.driving import drive_on
 from bench.hostile.crowd import KINDS
 from bench.hostile.run import memory_of
 from bench.processes import running_process
@@ -20,7 +21,6 @@ MEMORY = 150.0  # MiB that the crowd may cost: 60 peers that have not connected 
 NAMED = [("http", "unauthorized"), ("http", "too_large"), ("http", "not_allowed"), ("control", "flood")]
 
 
-@pytest.mark.timeout(150)
 async def test_an_operator_drives_on_among_peers_that_misbehave(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {
         "PEER_CONNECT_TIMEOUT": 5,
@@ -37,14 +37,14 @@ async def test_an_operator_drives_on_among_peers_that_misbehave(monkeypatch: pyt
     ):
         await console.take_seat()
         rest = [0.0] * len(console.description.axes)
-        first = last = await console.drive(rest)
+        first = last = await drive_on(console, rest)
         memory = memory_of(stack.console)
         command = (sys.executable, "-m", "bench.hostile.crowd", stack.observer, stack.operator, str(len(KINDS)), "1")
         async with asyncio.timeout(SECONDS):
             async with running_process(*command) as (crowd, _):
                 while not await _all_of_it_was_refused(stack):
                     for _ in range(5):
-                        last = await console.drive(rest)
+                        last = await drive_on(console, rest)
                 said = await crowd.ask("", SECONDS)
             async for feedback in bystander.feedbacks():
                 if feedback.event >= last.event:

@@ -55,14 +55,14 @@ async def test_every_stamp_is_the_truth(stack: Stack, carrier: Carrier, codec: s
 async def test_each_feedback_answers_its_own_command(stack: Stack) -> None:
     async with Console(stack.operator, video=False, audio=False) as console:
         await console.take_seat()
-        events = [(await console.drive([0.1, 0.0, 0.0])).event for _ in range(10)]
-        assert events == list(range(events[0], events[0] + 10))
+        sent = [[0.1 + number / 1000, 0.0, 0.0] for number in range(10)]
+        events = [(await drive_on(console, values)).event for values in sent]
+        assert events == sorted(set(events))  # where a busy machine waits, neutral ones come in between
         figures = console.stats().command_to_feedback_ms
         assert figures.count >= 10
-        executed = [record for record in stack.events("executed") if record["event"] in events]
-    last = await until_logged(stack, "executed", lambda record: record["event"] == events[-1])
-    assert last["values"] == [0.1, 0.0, 0.0]
-    assert len({record["event"] for record in executed}) == len(executed)
+        executed = [record for record in await stack.events("executed") if record["event"] in events]
+    assert [record["values"] for record in executed] == sent
+    assert [record["event"] for record in executed] == events
 
 
 async def test_an_axis_that_is_not_there_is_refused_before_it_is_sent(stack: Stack) -> None:
@@ -109,7 +109,7 @@ async def test_the_seat_is_one_and_passes_on_when_it_is_given_back(stack: Stack)
                 if not second.seat.holder:
                     break
         await second.take_seat()
-        assert (await second.drive([0.0, 0.0, 0.0])).event > 0
+        assert (await drive_on(second, [0.0, 0.0, 0.0])).event > 0
 
 
 async def test_a_stop_from_an_observer_latches_until_an_operator_resets(stack: Stack) -> None:
@@ -118,7 +118,7 @@ async def test_a_stop_from_an_observer_latches_until_an_operator_resets(stack: S
         Console(stack.observer, video=False, audio=False, name="visitor") as observer,
     ):
         await operator.take_seat()
-        await operator.drive([0.1, 0.0, 0.0])
+        await drive_on(operator, [0.1, 0.0, 0.0])
         state = await observer.stop("a person came in")
         assert (state.stopped, state.reason) == (True, "a person came in")
         with pytest.raises(CommandRefused, match="stopped"):
@@ -132,13 +132,13 @@ async def test_a_stop_from_an_observer_latches_until_an_operator_resets(stack: S
             await operator.drive([0.0, 0.0, 0.0])
         feedback = await operator.arm()
         assert (feedback.event, feedback.at_rest) == (stopped.event + 1, True)
-        assert (await operator.drive([0.1, 0.0, 0.0])).event == stopped.event + 2
+        assert (await drive_on(operator, [0.1, 0.0, 0.0])).event > feedback.event
 
 
 async def test_a_script_that_says_nothing_sends_neutral_and_then_rests(stack: Stack) -> None:
     async with Console(stack.operator, video=False, audio=False) as console:
         await console.take_seat()
-        driven = await console.drive([0.2, 0.0, 0.0])
+        driven = await drive_on(console, [0.2, 0.0, 0.0])
         assert console.stats().armed
         async with asyncio.timeout(20):
             async for feedback in console.feedbacks():
@@ -150,7 +150,7 @@ async def test_a_script_that_says_nothing_sends_neutral_and_then_rests(stack: St
         assert not console.stats().armed
         newest = console.feedback.event
     await until_logged(stack, "executed", lambda record: record["event"] == newest)
-    idle = [record["values"] for record in stack.events("executed") if driven.event < record["event"] <= newest]
+    idle = [record["values"] for record in await stack.events("executed") if driven.event < record["event"] <= newest]
     assert len(idle) >= 3
     assert all(values == [0.0, 0.0, 0.0] for values in idle)
 
@@ -158,7 +158,7 @@ async def test_a_script_that_says_nothing_sends_neutral_and_then_rests(stack: St
 async def test_leaving_brings_the_robot_to_rest_and_frees_the_seat(stack: Stack) -> None:
     async with Console(stack.operator, video=False, audio=False) as console:
         await console.take_seat()
-        driven = await console.drive([0.3, 0.0, 0.0])
+        driven = await drive_on(console, [0.3, 0.0, 0.0])
     await until_logged(stack, "rest", lambda record: record["event"] >= driven.event)
     await until_logged(stack, "feedback", lambda record: record["event"] >= driven.event and record["at_rest"])
     async with Console(stack.operator, video=False, audio=False) as console:
@@ -183,7 +183,7 @@ async def test_paced_by_media_every_event_is_seen(stack: Stack) -> None:
     async with Console(stack.operator, pacing="media", tolerance=0, audio=False) as console:
         await console.take_seat()
         async with collecting(console, sound=False) as found:
-            events = [(await console.drive([0.0, 0.0, 0.3])).event for _ in range(12)]
+            events = [(await drive_on(console, [0.0, 0.0, 0.3])).event for _ in range(12)]
         seen = {picture.stamp for picture in found[console.description.cameras[0].name]}
         assert set(events[:-1]) <= seen
         assert console.stats().streams[0].max_gap == 0
@@ -208,4 +208,4 @@ async def test_a_console_that_was_left_is_lost(stack: Stack) -> None:
         await console.drive([0.0, 0.0, 0.0])
     with pytest.raises(ConsoleLost):
         await Console(stack.operator).rest()
-    assert executed_after(stack, 0.0)
+    assert await executed_after(stack, 0.0)

@@ -29,7 +29,7 @@ async def _drive_until_refused(console: Console, values: list[float]) -> str:
     """As a person who does not let go; the reason of the refusal."""
     try:
         while True:
-            await console.drive(values)
+            await drive_on(console, values)
     except CommandRefused as refused:
         return refused.reason
 
@@ -68,14 +68,14 @@ async def _hand_over(how: str, first: Console, second: Console) -> None:
 async def test_in_a_hand_over_in_mid_drive_nothing_moves_between_the_two_drivers(stack: Stack, how: str) -> None:
     async with _two(stack, stack.supervisor if how == "taken" else stack.operator) as (first, second):
         await first.take_seat()
-        await first.drive(FIRST)
+        await drive_on(first, FIRST)
         driving = asyncio.create_task(_drive_until_refused(first, FIRST))
         await _hand_over(how, first, second)
         last = [await drive_on(second, SECOND) for _ in range(10)][-1]
         assert await driving == "no_seat"
         assert (second.seat.holder, second.seat.name, second.seat.why) == (second.peer, "Grace", how)
         await until_logged(stack, "feedback", lambda record: record["event"] >= last.event)
-    records = [record for record in stack.records() if record["kind"] in ("executed", "rest")]
+    records = [record for record in await stack.records() if record["kind"] in ("executed", "rest")]
     executed = [record for record in records if record["kind"] == "executed"]
     begin = next(
         i for i, record in enumerate(records) if record.get("values") == SECOND and record["event"] > last.event - 10
@@ -122,7 +122,7 @@ async def test_a_driver_who_vanishes_is_succeeded_by_who_asked(stack: Stack) -> 
     async with AsyncExitStack() as leaving, _console(stack.operator, "Grace") as second:
         first = await leaving.enter_async_context(_console(stack.operator, "Ada"))
         await first.take_seat()
-        await first.drive(FIRST)
+        await drive_on(first, FIRST)
         asking = asyncio.create_task(second.request_seat())
         await _until(first, lambda: bool(first.seat.claims))
         await leaving.aclose()
@@ -143,7 +143,7 @@ async def test_an_observer_asks_in_vain_and_an_operator_takes_nothing(stack: Sta
 async def test_everyone_sees_who_is_here_and_reads_the_notes(stack: Stack) -> None:
     async with _two(stack, stack.observer) as (first, second), _console(stack.operator, "Ada") as third:
         await first.take_seat()
-        event = (await first.drive(NEUTRAL)).event
+        event = (await drive_on(first, NEUTRAL)).event
         note = await second.note("mind the \x00step\n")
         assert (note.text, note.name, note.role) == ("mind the step", "Grace", "observer")
         assert note.event >= event

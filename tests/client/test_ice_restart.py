@@ -7,6 +7,7 @@ import socket
 import pytest
 from aiortc import RTCIceGatherer
 
+from bench.driving import drive_on
 from client import Console
 from client.aiortc_private import transport_of
 from client.errors import ConnectFailed, SignallingRefused
@@ -92,10 +93,10 @@ async def test_after_the_path_is_cut_a_restart_brings_commands_and_pictures_back
             async with Console(_link(rig), route=paths) as console:
                 await console.take_seat()
                 values = [0.1] * len(console.description.axes)
-                before = await console.drive(values)
+                before = await drive_on(console, values)
                 peer = console.peer
                 paths.forwarders[0].cut()
-                waiting = asyncio.create_task(console.drive(values))
+                waiting = asyncio.create_task(drive_on(console, values))
                 await console.restart_ice()
                 async with asyncio.timeout(PATIENCE):
                     after = await waiting
@@ -128,7 +129,7 @@ async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was() -> No
                 await console.take_seat()
                 with pytest.raises(ConnectFailed):
                     await console.restart_ice()
-                feedback = await console.drive([0.0] * len(console.description.axes))
+                feedback = await drive_on(console, [0.0] * len(console.description.axes))
                 assert feedback.event > 1
         finally:
             paths.close()
@@ -157,10 +158,10 @@ async def test_an_old_path_without_answers_ends_nothing_while_a_restart_is_under
             async with Console(_link(rig), route=paths, video=False, audio=False) as console:
                 await console.take_seat()
                 values = [0.1] * len(console.description.axes)
-                before = await console.drive(values)
+                before = await drive_on(console, values)
                 await _lapse(rig, paths)
                 await console.restart_ice()
-                after = await console.drive(values)
+                after = await drive_on(console, values)
                 assert after.event > before.event
                 assert len(rig.services.console.peers) == 1
         finally:
@@ -185,11 +186,11 @@ async def test_the_path_can_be_changed_again_and_again_without_a_repeat() -> Non
     async with running_rig(ice_hosts="127.0.0.1") as rig, Console(_link(rig), video=False, audio=False) as console:
         await console.take_seat()
         values = [0.1] * len(console.description.axes)
-        events = [(await console.drive(values)).event]
+        events = [(await drive_on(console, values)).event]
         for _ in range(3):
             await console.restart_ice()
             for _ in range(5):
-                events.append((await console.drive(values)).event)
+                events.append((await drive_on(console, values)).event)
         assert events == sorted(set(events))  # in between are the neutral ones of a long pause
 
 

@@ -49,7 +49,7 @@ async def test_vp8_that_a_headless_client_takes_is_recorded_and_nothing_else_is_
                 await drive_on(console, [0.3 if number // 15 % 2 == 0 else -0.3, 0.0, 0.2])
             await _ask(stack, "POST", "/api/recordings/stop")
             encoded = await _encoded(stack, *CAMERAS)
-        captured = {(each["stream"], each["event"]) for each in stack.events("media")}
+        captured = {(each["stream"], each["event"]) for each in await stack.events("media")}
     assert {codec for (codec, _), count in encoded.items() if count} == {"VP8"}
     (path,) = directory.glob("*.mcap")
     verdict = verify_file(path)

@@ -47,9 +47,9 @@ async def _recorded(directory: Path) -> Session:
     recordings = directory / "recordings"
     async with running_stack(directory, extra=("--record", str(recordings))) as stack:
         await _drive(stack)
-        newest = max(record["event"] for record in stack.events("executed"))
+        newest = max(record["event"] for record in await stack.events("executed"))
         await until_logged(stack, "feedback", lambda record: record["event"] >= newest)
-        log = list(stack.records())
+        log = await stack.records()
     (path,) = recordings.glob("*.mcap")
     return Session(path, directory / "state", log)
 

@@ -28,7 +28,7 @@ async def test_a_killed_consoles_recording_opens_and_is_completed(tmp_path: Path
             os.kill(stack.process.pid, signal.SIGKILL)
             killed = time.time()
             await stack.process.wait()
-        log = list(stack.records())
+        log = await stack.records()
     (path,) = directory.glob("*.mcap")
     with RecordingReader(path) as reader:
         assert reader.interrupted

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from aiortc import RTCIceServer
 
+from bench.driving import drive_on
 from client import Console
 from client.aiortc_private import transport_of
 from client.errors import ConnectFailed
@@ -25,8 +26,8 @@ async def test_with_only_a_relay_the_robot_is_driven_seen_and_moved_to_another_r
     ):
         await console.take_seat()
         rest, forward = ([value] * len(console.description.axes) for value in (0.0, 0.1))
-        first = await console.drive(rest)
-        await console.drive(forward)
+        first = await drive_on(console, rest)
+        await drive_on(console, forward)
         async for picture in console.pictures():
             assert picture.stamp is None or picture.stamp >= first.event - 4
             break
@@ -39,7 +40,7 @@ async def test_with_only_a_relay_the_robot_is_driven_seen_and_moved_to_another_r
         moved = transport_of(pc).transport._connection._nominated[1]
         assert moved.local_candidate.type == "relay"
         assert moved.local_candidate.port != pair.local_candidate.port
-        assert (await console.drive(forward)).event > first.event
+        assert (await drive_on(console, forward)).event > first.event
         await console.rest()
 
 
@@ -85,14 +86,14 @@ async def test_a_session_outlives_the_credentials_that_it_began_with_and_a_resta
     ):
         await console.take_seat()
         forward = [0.1] * len(console.description.axes)
-        await console.drive([0.0] * len(forward))
+        await drive_on(console, [0.0] * len(forward))
         # Each allocation is renewed after four seconds; the second time long after its credentials' end.
         await eventually(lambda: turn.log.read_text().count("refreshed") >= 2, 20.0)
         assert time.time() > asked[0] + 3
-        await console.drive(forward)
+        await drive_on(console, forward)
         await console.restart_ice()
         assert len(asked) == 2
-        await console.drive(forward)
+        await drive_on(console, forward)
         await console.rest()
 
 

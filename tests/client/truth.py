@@ -11,7 +11,7 @@ from tests.support.stack import Stack
 
 __all__ = ["collecting", "drawn_event", "executed_after", "logged_stamps", "until_logged"]
 
-LOG_SECONDS = 5.0  # for the bridge's writer thread to catch up
+LOG_SECONDS = 20.0  # for what follows from what a test did
 
 
 def drawn_event(picture: Picture) -> int | None:
@@ -21,10 +21,10 @@ def drawn_event(picture: Picture) -> int | None:
 
 
 async def until_logged(stack: Stack, kind: str, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """The first record of this kind that meets the condition; waits for the log's writer."""
+    """The first record of this kind that meets the condition, which may come a moment later."""
     async with asyncio.timeout(LOG_SECONDS):
         while True:
-            for record in stack.events(kind):
+            for record in await stack.events(kind):
                 if condition(record):
                     return record
             await asyncio.sleep(0.05)
@@ -33,11 +33,11 @@ async def until_logged(stack: Stack, kind: str, condition: Callable[[dict[str, A
 async def logged_stamps(stack: Stack, stream: str, newest: int) -> set[int]:
     """The stamps that the bridge gave this stream; the log is complete up to `newest`."""
     await until_logged(stack, "feedback", lambda record: record["event"] >= newest)
-    return {record["event"] for record in stack.events("media") if record["stream"] == stream}
+    return {record["event"] for record in await stack.events("media") if record["stream"] == stream}
 
 
-def executed_after(stack: Stack, time: float) -> list[dict[str, Any]]:
-    return [record for record in stack.events("executed") if record["time"] > time]
+async def executed_after(stack: Stack, time: float) -> list[dict[str, Any]]:
+    return [record for record in await stack.events("executed") if record["time"] > time]
 
 
 @asynccontextmanager

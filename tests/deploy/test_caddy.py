@@ -15,7 +15,7 @@ from bench.browsers.chromium import running_chromium
 from bench.browsers.console_page import ConsolePage
 from tests.support.stack import Stack, running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
 READY_SECONDS = 20.0

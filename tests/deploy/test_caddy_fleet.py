@@ -6,7 +6,6 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import httpx
-import pytest
 
 from tests.support.fleet_entry import running_entry
 from tests.support.redis_server import free_port
@@ -50,7 +49,6 @@ async def _entry(directory: Path, one: asyncio.Server, two: asyncio.Server) -> A
         yield http
 
 
-@pytest.mark.timeout(60)
 async def test_robots_lead_to_their_consoles_and_the_overview_to_the_first_that_lives(tmp_path: Path) -> None:
     async with _console("one") as one, _console("two") as two, _entry(tmp_path, one, two) as http:
         for path, console in (

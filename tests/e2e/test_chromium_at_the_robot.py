@@ -20,7 +20,7 @@ from robot_bridge.robots.planar.robot import PlanarRobot
 from robot_bridge.settings import BridgeSettings
 from tests.support.stack import Stack, running_console
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.browser
 
 RESET = """(number) => fetch("/api/reset", {
   method: "POST",
@@ -89,8 +89,8 @@ async def _until_old(stack: Stack, number: int) -> None:
     """Until the bridge has fed back something a second after this stop."""
     async with asyncio.timeout(20):
         while True:
-            since = next(each["time"] for each in stack.events("stop") if each["number"] == number)
-            if max(each["time"] for each in stack.events("feedback")) > since + 1:
+            since = next(each["time"] for each in await stack.events("stop") if each["number"] == number)
+            if max(each["time"] for each in await stack.events("feedback")) > since + 1:
                 return
             await asyncio.sleep(0.1)
 

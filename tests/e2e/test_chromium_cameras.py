@@ -10,7 +10,7 @@ from bench.browsers.console_page import open_console
 from tests.server.media.sources.media_files import film, tone
 from tests.support.stack import running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 
 async def test_attached_media_are_shown_and_what_fails_is_said(tmp_path: Path) -> None:

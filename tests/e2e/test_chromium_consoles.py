@@ -16,7 +16,7 @@ from tests.support.fleet_entry import running_entry
 from tests.support.redis_server import RedisServer, free_port
 from tests.support.stack import Stack, running_fleet
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.browser
 
 SECRET = "one key for all consoles behind one entry"
 
@@ -86,7 +86,7 @@ async def test_another_consoles_robot_is_seen_live_read_about_and_stopped_withou
                 await page.keyboard.press("Escape")
             assert (await said.value).status == 200
             for console, robot in ((consoles.one, "left"), (consoles.two, "crane")):
-                assert list(console.events("stop", robot))
+                assert await console.events("stop", robot)
             await until(page, "s.stop && s.stop.stopped.includes('left')")
             await expect(dialogue.get_by_role("status")).to_contain_text("Lines of other consoles may be missing")
         finally:

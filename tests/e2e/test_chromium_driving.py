@@ -6,15 +6,14 @@ from playwright.async_api import Browser
 from bench.browsers.console_page import LEFT_Y, RB, START, ConsolePage, open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
 
 
 async def _driven(console: ConsolePage, events: int) -> None:
     """Arm and drive for that many events."""
-    await console.arm()
-    await console.drive_forward()
-    start = (await console.stats())["event"]
-    await console.until(f"s.event >= {start + events}", 60)
+    async with console.driving():
+        start = (await console.stats())["event"]
+        await console.until(f"s.event >= {start + events}", 60)
 
 
 def _no_violation(statistics: dict[str, object]) -> None:
@@ -49,13 +48,11 @@ async def test_driving_moves_the_robot_and_nothing_outside_the_tolerance_is_rend
         await console.until_live()
         await _driven(console, 60)
         # Sound that piled up while the sound device opened must not keep it behind the events for long.
-        await console.until("s.streams.microphone.rendered > 60", 15)
-        statistics = await console.stats()
-        _no_violation(statistics)
-        assert statistics["streams"]["overview"]["rendered"] > 30
+        await console.until("s.streams.microphone.rendered > 60 && s.streams.overview.rendered > 30")
+        _no_violation(await console.stats())
         await console.press(RB, False)
-        await console.until("s.armed && !s.driving && s.at_rest === true")
-    executed = [record["event"] for record in stack.events("executed")]
+        await console.until("!s.driving && s.at_rest === true")
+    executed = [record["event"] for record in await stack.events("executed")]
     assert len(executed) >= 60
     assert len(executed) == len(set(executed)), "an event was executed twice"
     assert executed == sorted(executed)
@@ -69,17 +66,16 @@ async def test_the_event_drawn_into_a_picture_is_the_stamp_it_was_rendered_by(
     async with open_console(chromium, link) as console:
         await console.until_live()
         assert (await console.stats())["streams"]["overview"]["carrier"] == carrier
-        await console.arm()
-        await console.drive_forward()
-        compared: set[int] = set()
-        while len(compared) < 20:
-            event = (await console.stats())["event"]
-            for stream in ("overview", "front"):
-                read = await console.strip(stream)
-                if read is not None and read[1] is not None:
-                    assert read[0] == read[1], stream
-                    compared.add(read[1])
-            await console.until(f"s.event > {event}")
+        async with console.driving():
+            compared: set[int] = set()
+            while len(compared) < 20:
+                event = (await console.stats())["event"]
+                for stream in ("overview", "front"):
+                    read = await console.strip(stream)
+                    if read is not None and read[1] is not None:
+                        assert read[0] == read[1], stream
+                        compared.add(read[1])
+                await console.until(f"s.event > {event}")
         _no_violation(await console.stats())
 
 
@@ -145,7 +141,6 @@ async def test_the_keyboard_drives_while_the_space_bar_is_held(stack: Stack, chr
 async def test_contact_is_felt_as_rumble(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
-        await console.arm()
-        await console.drive_forward()
-        await console.until("window.testPad.rumbles.length > 0", 30)
+        async with console.driving():
+            await console.until("window.testPad.rumbles.length > 0")
         await console.tilt(LEFT_Y, 0)

@@ -11,7 +11,7 @@ from playwright.async_api import Browser, Page, Route
 from bench.browsers.console_page import open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 WINDOW = 14_600  # bytes: ten segments, what TCP sends before it hears anything (RFC 6928)
 BUDGET = 60_000  # bytes of all that comes before the first picture

@@ -8,7 +8,7 @@ from playwright.async_api import Browser, expect
 from bench.browsers.console_page import open_console
 from tests.support.stack import running_fleet
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.browser
 
 
 async def test_a_robots_page_drives_shows_the_scene_invites_records_and_replays_and_moves_no_other(
@@ -21,12 +21,11 @@ async def test_a_robots_page_drives_shows_the_scene_invites_records_and_replays_
             page = console.page
             page.on("request", lambda request: asked.append(request.url))
             await console.until_live()
-            await console.arm()
             record = page.locator(".record")
             await record.click()
             await expect(record).to_contain_text("Rec 0:")
-            await console.drive_forward()
-            await console.until("s.event > 8", 60)
+            async with console.driving():
+                await console.until("s.event > 8", 60)
             await record.click()
             await expect(record).to_have_text("Record")
 
@@ -51,5 +50,5 @@ async def test_a_robots_page_drives_shows_the_scene_invites_records_and_replays_
             await console.until("s.connected && s.role === 'observer'")
         outside = {url for url in asked if not url.startswith((f"{base}/robots/left/", "blob:", "data:"))}
         assert outside == set()
-        assert len(list(fleet.events("executed", "left"))) >= 7
-        assert list(fleet.events("executed", "right")) == []
+        assert len(await fleet.events("executed", "left")) >= 7
+        assert await fleet.events("executed", "right") == []

@@ -6,7 +6,7 @@ from playwright.async_api import Browser
 from bench.browsers.console_page import open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 
 async def test_after_a_click_of_a_button_enter_arms_and_the_space_bar_drives(stack: Stack, chromium: Browser) -> None:

@@ -8,7 +8,7 @@ from playwright.async_api import Browser, expect
 from bench.browsers.console_page import LEFT_X, LEFT_Y, RB, open_console
 from tests.support.stack import running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 
 async def test_a_geofence_and_the_speed_cap_are_shown_and_the_consoles_cap_cannot_be_turned_off(
@@ -22,13 +22,10 @@ async def test_a_geofence_and_the_speed_cap_are_shown_and_the_consoles_cap_canno
         switch = console.page.get_by_role("switch", name="Slow down with delay")
         await expect(switch).to_have_attribute("aria-checked", "true")
         await expect(switch).to_be_disabled()
-        await console.arm()
-        await console.press(RB)
-        await console.tilt(LEFT_Y, -0.9)
-        await console.tilt(LEFT_X, 0.55)
-        await console.until("s.driving && s.limits.includes('charger')", 40)
-        strip = console.page.get_by_label("What limits the robot")
-        await strip.get_by_text("Keep out: Charging corner").wait_for()
+        async with console.driving({LEFT_Y: -0.9, LEFT_X: 0.55}):
+            await console.until("s.driving && s.limits.includes('charger')")
+            strip = console.page.get_by_label("What limits the robot")
+            await strip.get_by_text("Keep out: Charging corner").wait_for()
         await console.tilt(LEFT_X, 0)
         await console.tilt(LEFT_Y, 1)
         await console.until("s.limits.length === 0")

@@ -10,7 +10,7 @@ from playwright.async_api import Browser, expect
 from bench.browsers.console_page import LEFT_Y, RB, START, ConsolePage, open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 # Triggers are axes 2 and 5 that rest at -1 and read 0 until they are touched; axis 6 is a hat.
 ODD: dict[str, Any] = {
@@ -175,10 +175,8 @@ async def test_a_pad_that_reported_all_the_time_and_falls_silent_while_it_is_hel
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
         await console.page.evaluate(REPORTS)
-        await console.arm()
-        await console.drive_forward()
-        await console.until("window.looks > 300", 60)
-        assert (await console.stats())["driving"], "a pad that reports the same again is there"
+        async with console.driving():
+            await console.until("s.driving && window.looks > 300", 60)  # a pad that reports the same again is there
         await console.page.evaluate(
             "void (window.reports = false)"
         )  # out of range: stick and deadman stay as they were
@@ -218,15 +216,14 @@ async def test_turbo_drives_as_fast_as_the_limits_allow_and_the_settings_move_to
         await (await download.value).save_as(file)
         await page.get_by_role("button", name="Close").click()
         await console.until("s.pad !== null")  # a press that was there before the pad is read again is no new one
-        await console.arm()
-        await console.drive_forward()
-        event = (await console.stats())["event"]
-        await console.until(f"s.event > {event + 8}", 40)
-        await console.press(10)
-        await console.until(f"s.event > {event + 22}", 40)
+        async with console.driving():
+            event = (await console.stats())["event"]
+            await console.until(f"s.event > {event + 8}", 40)
+            await console.press(10)
+            await console.until(f"s.event > {event + 22}", 40)
         await console.press(RB, False)
         await console.until("s.at_rest === true")
-    fastest = [max(map(abs, record["values"])) for record in stack.events("executed") if any(record["values"])]
+    fastest = [max(map(abs, record["values"])) for record in await stack.events("executed") if any(record["values"])]
     assert fastest[0] == pytest.approx(0.4)
     assert max(fastest) == pytest.approx(0.8)
     async with open_console(chromium, stack.observer) as console:

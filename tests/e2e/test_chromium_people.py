@@ -6,7 +6,7 @@ from playwright.async_api import Browser, Locator, expect
 from bench.browsers.console_page import ConsolePage, open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.browser
 
 
 # What can have the focus while a dialogue is open: it, and what has to stay in reach.
@@ -66,7 +66,7 @@ async def test_writing_a_note_lets_go_of_the_robot_and_its_keys_do_not_drive(sta
         field = console.page.get_by_label("Note to everyone")
         await field.click()
         await console.until("!s.armed && s.at_rest === true")
-        executed = len(list(stack.events("executed")))
+        executed = len(await stack.events("executed"))
         await console.page.keyboard.press("Enter")  # arms elsewhere
         await console.page.keyboard.type(" wasd ")
         await console.press(9)  # START: refused while a text field has the keyboard
@@ -75,7 +75,7 @@ async def test_writing_a_note_lets_go_of_the_robot_and_its_keys_do_not_drive(sta
         assert not statistics["armed"]
         assert not statistics["stop"]["stopped"]
         await expect(field).to_have_value(" wasd")
-        moving = [each for each in list(stack.events("executed"))[executed:] if any(each["values"])]
+        moving = [each for each in (await stack.events("executed"))[executed:] if any(each["values"])]
         assert moving == []
         await console.page.keyboard.press("Escape")
         await console.until("s.stop.stopped")
@@ -140,10 +140,10 @@ async def test_an_operator_invites_observers_and_operators_only(stack: Stack, ch
             await ann.page.keyboard.press("Tab")
             assert await ann.page.evaluate(REACHABLE), "focus left the dialogue for something that it covers"
         await _dialogue(ann).get_by_role("button", name="Close").click()
-        assert await ann.page.evaluate("document.activeElement === document.body"), "the keyboard is the robot's again"
+        await ann.until("document.activeElement === document.body")  # the keyboard is the robot's again
         await ann.page.get_by_role("button", name="Invite…").press("Enter")
         await _dialogue(ann).get_by_role("button", name="Close").press("Enter")
-        assert await ann.page.evaluate("document.activeElement.textContent") == "Invite…"
+        await ann.until("document.activeElement.textContent === 'Invite…'")
         await _tab(dee, "People")
         await expect(dee.page.get_by_role("button", name="Invite…")).to_have_count(0)
 

@@ -10,7 +10,7 @@ from bench.browsers.console_page import open_console
 from tests.server.media.published.publishing import TestPublisher
 from tests.support.stack import running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 
 async def test_the_page_shows_a_published_camera_within_its_tolerance_and_says_when_nobody_publishes(

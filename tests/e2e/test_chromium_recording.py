@@ -10,7 +10,7 @@ from bench.browsers.console_page import open_console
 from server.recording.verify_file import verify_file
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 
 async def test_the_operator_records_and_the_observer_sees_it_and_cannot(
@@ -29,9 +29,8 @@ async def test_the_operator_records_and_the_observer_sees_it_and_cannot(
         await expect(button).to_contain_text("Rec 0:")
         await expect(shown).to_contain_text("Rec 0:")
         await expect(shown).to_be_disabled()
-        await operator.arm()
-        await operator.drive_forward()
-        await operator.until("s.event > 8", 60)
+        async with operator.driving():
+            await operator.until("s.event > 8", 60)
         await button.click()
         await expect(button).to_have_text("Record")
         await expect(shown).to_be_hidden()

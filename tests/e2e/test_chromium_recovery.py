@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import LEFT_Y, RB, ConsolePage, open_console
+from bench.browsers.console_page import RB, ConsolePage, open_console
 from client import Console
 from tests.support.stack import Stack, running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.browser
 
 
 async def _nothing_wrong(console: ConsolePage) -> None:
@@ -25,15 +25,13 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
 ) -> None:
     async with open_console(chromium, own_stack.operator) as console:
         await console.until_live()
-        await console.arm()
-        await console.drive_forward()
-        await console.until("s.event > 10")
+        async with console.driving():
+            await console.until("s.event > 10")
         epoch = (await console.stats())["epoch"]
         await console.page.evaluate("window.notReloaded = true")
         os.kill(own_stack.bridge_pid(), signal.SIGKILL)
         await console.until("!s.armed")
-        await console.press(RB, False)
-        await console.tilt(LEFT_Y, 0)
+        await console.let_go()
         await console.until(f"s.connected && s.epoch !== {epoch!r} && s.streams.overview?.rendered > 3", 60)
         assert (await console.stats())["event"] < 10, "references start anew with the epoch"
         await console.until("s.stop.stopped && s.stop.reason.includes('did not end in order')")
@@ -78,8 +76,7 @@ async def test_a_bridge_that_hangs_is_started_again_stopped_and_the_page_says_th
         epoch = (await console.stats())["epoch"]
         hang.touch()
         await console.until("!s.armed")
-        await console.press(RB, False)
-        await console.tilt(LEFT_Y, 0)
+        await console.let_go()
         await console.until(f"s.connected && s.epoch !== {epoch!r}", 60)
         await console.until("s.stop.stopped && s.stop.reason === 'The robot bridge hung: no control tick for 1 s'")
         await console.page.get_by_text("The robot bridge hung").first.wait_for()
@@ -100,8 +97,7 @@ async def test_a_frozen_bridge_counts_as_a_dead_link_and_resumes_in_the_same_epo
         with own_stack.frozen_bridge():
             await console.until("!s.armed")
             await console.page.get_by_text("Robot unreachable").first.wait_for()
-        await console.press(RB, False)
-        await console.tilt(LEFT_Y, 0)
+        await console.let_go()
         await console.until("s.connected && s.at_rest === true && s.seat && s.seat.mine", 60)
         await console.arm()
         await console.drive_forward()

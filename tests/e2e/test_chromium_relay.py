@@ -58,10 +58,9 @@ async def test_pictures_pass_the_gate_and_the_robot_is_driven_through_the_relay(
         kind, octets = await page.page.evaluate(SELECTED_PAIR)
         assert kind == "relay"
         assert octets > 0
-        await page.arm()
         before = (await page.stats())["event"]
-        await page.drive_forward()
-        await page.until(f"s.event > {before} + 20 && {NOTHING_WRONG}")
+        async with page.driving():
+            await page.until(f"s.event > {before} + 20 && {NOTHING_WRONG}")
         await page.press(RB, False)
         await page.until("s.at_rest")
         assert (await page.page.evaluate(SELECTED_PAIR))[0] == "relay"

@@ -5,38 +5,32 @@ import os
 import re
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
 from playwright.async_api import Browser, expect
 
-from bench.browsers.console_page import LEFT_Y, RB, ConsolePage, open_console
+from bench.browsers.console_page import ConsolePage, open_console
 from tests.support.movable_path import movable_path
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
-
-
-async def _let_go(console: ConsolePage) -> None:
-    await console.press(RB, False)
-    await console.tilt(LEFT_Y, 0)
+pytestmark = pytest.mark.browser
 
 
 async def _drives_again(console: ConsolePage, stack: Stack) -> None:
     """The seat is back by itself, and the operator arms and drives; the bridge's log has nothing twice."""
-    await _let_go(console)
+    await console.let_go()
     await console.until("s.connected && s.at_rest === true && s.seat && s.seat.mine")
-    await console.arm()
-    await console.drive_forward()
-    event = (await console.stats())["event"]
-    await console.until(f"s.event > {event + 5}")
+    async with console.driving():
+        event = (await console.stats())["event"]
+        await console.until(f"s.event > {event + 5}")
     statistics = await console.stats()
     assert all(stream["violations"] == 0 for stream in statistics["streams"].values())
     assert await console.page.evaluate("window.notReloaded")
-    executed = [record["event"] for record in stack.events("executed")]
+    executed = [record["event"] for record in await stack.events("executed")]
     assert len(executed) == len(set(executed)), "an event was executed twice"
-    await _let_go(console)
+    await console.let_go()
 
 
 async def test_a_silent_console_is_called_silent_and_what_it_measured_last_is_shown_as_old(
@@ -68,25 +62,33 @@ async def test_a_silent_console_is_called_silent_and_what_it_measured_last_is_sh
 @contextmanager
 def _suspended_pages() -> Iterator[None]:
     """All pages of the browsers that this test has started stand still, as in a suspended machine."""
-    pids = [pid for pid in _descendants(os.getpid()) if b"--type=renderer" in _command_line(pid)]
-    for pid in pids:
-        os.kill(pid, signal.SIGSTOP)
+    pids = [pid for pid in _descendants(os.getpid()) if "--type=renderer" in _read(Path(f"/proc/{pid}/cmdline"))]
+    _signal(pids, signal.SIGSTOP)
     try:
         yield
     finally:
-        for pid in pids:
-            os.kill(pid, signal.SIGCONT)
+        _signal(pids, signal.SIGCONT)
 
 
 def _descendants(pid: int) -> Iterator[int]:
     for task in Path(f"/proc/{pid}/task").glob("*/children"):
-        for child in map(int, task.read_text().split()):
+        for child in map(int, _read(task).split()):
             yield child
             yield from _descendants(child)
 
 
-def _command_line(pid: int) -> bytes:
-    return Path(f"/proc/{pid}/cmdline").read_bytes()
+def _read(file: Path) -> str:
+    """Empty of a process that has just ended, as those of earlier pages do."""
+    try:
+        return file.read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return ""
+
+
+def _signal(pids: list[int], number: signal.Signals) -> None:
+    for pid in pids:
+        with suppress(ProcessLookupError):
+            os.kill(pid, number)
 
 
 SUSPENDED = 2.0  # s: longer than the console may be silent for a page, shorter than a page for the console's seat
@@ -103,15 +105,15 @@ async def test_a_page_that_was_suspended_while_the_deadman_is_held_moves_nothing
             await console.drive_forward()
             with _suspended_pages():
                 await asyncio.sleep(SUSPENDED)
-                before = _moved(stack)
+                before = await _moved(stack)
             await console.until("!s.armed && s.connected && s.at_rest === true && s.seat && s.seat.mine")
-            assert _moved(stack) == before, "the robot moved on when the page woke up"
-            await _let_go(console)
+            assert await _moved(stack) == before, "the robot moved on when the page woke up"
+            await console.let_go()
 
 
-def _moved(stack: Stack) -> int:
+async def _moved(stack: Stack) -> int:
     """The last event that moved something."""
-    return max(int(record["event"]) for record in stack.events("executed") if any(record["values"]))
+    return max(int(record["event"]) for record in await stack.events("executed") if any(record["values"]))
 
 
 async def test_a_dead_path_is_left_by_an_ice_restart_and_the_same_connection_goes_on(

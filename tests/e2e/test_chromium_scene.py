@@ -9,7 +9,7 @@ from bench.browsers.console_page import ConsolePage, open_console
 from server.scene_page import HOOK
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 # Stands in for viser's client, whose drawing a busy machine is too slow for: a worker that posts batches as viser's
 # does, always of the newest feedback, which is ahead of the pictures. The page feeds it that, see FEED.
@@ -77,10 +77,9 @@ async def test_the_scene_shows_no_newer_event_than_the_picture_and_is_veiled_out
         await console.until_live()
         await _open_scene(console)
         await console.page.evaluate(WATCH)
-        await console.arm()
-        await console.drive_forward()
-        start = (await console.stats())["event"]
-        await console.until(f"s.event > {start + 40} && window.lockstep.scene().event > {start + 30}", 60)
+        async with console.driving():
+            start = (await console.stats())["event"]
+            await console.until(f"s.event > {start + 40} && window.lockstep.scene().event > {start + 30}", 60)
         watched = await _watched(console)
         tolerance = (await console.stats())["tolerance"]["video"]
         assert len({each["event"] for each in watched}) > 10
@@ -100,9 +99,8 @@ async def test_a_scene_that_stands_still_is_veiled_while_the_robot_goes_on(stack
         veil = console.page.locator('[data-view="3D scene"] .veil-words')
         await veil.wait_for(state="hidden")
         await console.page.evaluate("window.fed = false")
-        await console.arm()
-        await console.drive_forward()
-        await veil.get_by_text("events behind").wait_for()
+        async with console.driving():
+            await veil.get_by_text("events behind").wait_for()
 
 
 # What somebody's script would try in the frame: the page around it, what the browser keeps, the console's interface.

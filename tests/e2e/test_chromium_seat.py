@@ -14,7 +14,7 @@ from bench.browsers.console_page import RB, ConsolePage, open_console
 from tests.e2e.tamper import open_tampered
 from tests.support.stack import Stack, running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.browser
 
 
 def _button(console: ConsolePage, name: str) -> Locator:
@@ -49,9 +49,8 @@ async def _lost_the_seat(console: ConsolePage) -> None:
 async def _drives_after_arming(console: ConsolePage) -> None:
     assert not (await console.stats())["armed"], "a new operator has to arm"
     event = (await console.stats())["event"]
-    await console.arm()
-    await console.drive_forward()
-    await console.until(f"s.event > {event + 5}")
+    async with console.driving():
+        await console.until(f"s.event > {event + 5}")
 
 
 async def test_a_granted_request_hands_over_a_robot_at_rest_and_events_go_on(stack: Stack, chromium: Browser) -> None:
@@ -77,7 +76,7 @@ async def test_a_granted_request_hands_over_a_robot_at_rest_and_events_go_on(sta
         await _lost_the_seat(ann)
         await _drives_after_arming(ben)
         assert (await ben.stats())["event"] > before
-    executed = [record["event"] for record in stack.events("executed")]
+    executed = [record["event"] for record in await stack.events("executed")]
     assert executed == sorted(set(executed)), "events go on across a hand-over"
 
 
@@ -118,15 +117,15 @@ async def test_a_supervisor_takes_control_with_one_click_and_drives_after_arming
 async def test_an_idle_operator_is_warned_can_stay_and_loses_the_seat_otherwise(
     tmp_path: Path, chromium: Browser, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("LOCKSTEP_SEAT_IDLE_SECONDS", "6")
+    monkeypatch.setenv("LOCKSTEP_SEAT_IDLE_SECONDS", "10")
     async with running_stack(tmp_path) as stack, open_console(chromium, stack.operator) as console:
         await console.until("s.connected && s.seat.mine")
         await console.arm()
-        await _says(console, re.compile("Control is given back in [1-4] s"))
+        await _says(console, re.compile("Control is given back in [1-6] s"))
         await _button(console, "Keep control").click()
-        await _says(console, re.compile("Control is given back in [56] s"))
+        await _says(console, re.compile("Control is given back in ([789]|10) s"))
         assert (await console.stats())["seat"]["mine"]
-        await console.until("!s.armed && s.seat.holder === ''", 15)
+        await console.until("!s.armed && s.seat.holder === ''")
         await _says(console, "You were idle: the control seat is free")
         await _button(console, "Request control").click()
         await console.until("s.seat.mine")

@@ -6,7 +6,7 @@ from playwright.async_api import Browser, Locator
 from bench.browsers.console_page import ConsolePage, open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.browser
 
 
 def _row(console: ConsolePage, name: str) -> Locator:
@@ -39,7 +39,7 @@ async def test_a_silenced_page_is_told_and_its_stop_has_no_effect_until_the_supe
         await dee.page.locator(".stop").get_by_text("HAD NO EFFECT").wait_for()
         await sue.reset()
         await dee.until("!s.stop.stopped")
-        assert [each["number"] for each in stack.events("stop")] == [first]
+        assert [each["number"] for each in await stack.events("stop")] == [first]
 
         await _row(sue, "Dee").get_by_role("button", name="Let STOP work again").click()
         await _row(sue, "Dee").get_by_text("STOP silenced", exact=True).wait_for(state="hidden")

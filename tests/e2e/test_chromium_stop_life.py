@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
-from bench.browsers.console_page import LEFT_Y, RB, ConsolePage, open_console
+from bench.browsers.console_page import ConsolePage, open_console
 from tests.e2e.tamper import open_tampered
 from tests.support.stack import Stack, running_stack
 
@@ -56,14 +56,12 @@ def _hold_button(console: ConsolePage) -> Locator:
 
 
 async def _press_down(console: ConsolePage, button: Locator) -> None:
-    box = await button.bounding_box()
-    assert box is not None
-    await console.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    await button.hover()
     await console.page.mouse.down()
 
 
-def _stops(stack: Stack) -> list[dict[str, Any]]:
-    return list(stack.events("stop"))
+async def _stops(stack: Stack) -> list[dict[str, Any]]:
+    return await stack.events("stop")
 
 
 async def test_a_held_deadman_ends_disarmed_by_a_stop_that_was_reset_between_two_looks(
@@ -84,8 +82,7 @@ async def test_a_held_deadman_ends_disarmed_by_a_stop_that_was_reset_between_two
             await console.until(f"s.streams.overview.rendered > {rendered + 6}")
             assert await console.page.evaluate(COMMANDS) == commands
             assert (await console.stats())["event"] - event <= 1, "the command that was in flight at most"
-            await console.press(RB, False)
-            await console.tilt(LEFT_Y, 0)
+            await console.let_go()
 
 
 async def test_a_hand_that_is_on_reset_does_not_release_the_stop_that_another_page_presses_meanwhile(
@@ -105,11 +102,12 @@ async def test_a_hand_that_is_on_reset_does_not_release_the_stop_that_another_pa
         await observer.page.locator(".plate").get_by_text("who has control, or a supervisor can reset it").wait_for()
         await expect(_hold_button(observer)).to_have_count(0)
         await _hold_button(operator).wait_for()
-        await _press_down(operator, _hold_button(operator))
-        await observer.page.keyboard.press("Escape")
-        await observer.page.keyboard.press("Escape")
-        await operator.until(f"s.stop.number === {first + 2}")
-        await operator.page.get_by_text("Look first").wait_for()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(operator.page.get_by_text("Look first").wait_for())  # it says so for a second
+            await _press_down(operator, _hold_button(operator))
+            await observer.page.keyboard.press("Escape")
+            await observer.page.keyboard.press("Escape")
+            await operator.until(f"s.stop.number === {first + 2}")
         await operator.page.mouse.up()
         assert (await operator.stats())["stop"]["stopped"]
         await supervisor.until(f"s.stop.number === {first + 2}")
@@ -117,8 +115,8 @@ async def test_a_hand_that_is_on_reset_does_not_release_the_stop_that_another_pa
         await operator.until("!s.stop.stopped && s.stop_press === null")
         await observer.until("!s.stop.stopped && s.stop_press === null")
         assert not (await operator.stats())["armed"]
-    assert [each["number"] for each in _stops(stack)] == [first, first + 1, first + 2]
-    assert [each["number"] for each in stack.events("reset")] == [first + 2]
+    assert [each["number"] for each in await _stops(stack)] == [first, first + 1, first + 2]
+    assert [each["number"] for each in await stack.events("reset")] == [first + 2]
 
 
 async def test_a_stop_is_one_stop_on_all_ways_and_does_not_come_again_after_its_reset(
@@ -137,7 +135,7 @@ async def test_a_stop_is_one_stop_on_all_ways_and_does_not_come_again_after_its_
         await console.reset()
         await console.page.evaluate(SAY_AGAIN, sent[0])
         assert not (await console.stats())["stop"]["stopped"]
-        assert len(_stops(stack)) == 1
+        assert len(await _stops(stack)) == 1
 
 
 async def test_a_stop_while_the_bridge_is_away_is_kept_and_confirmed_when_it_is_back(
@@ -153,7 +151,7 @@ async def test_a_stop_while_the_bridge_is_away_is_kept_and_confirmed_when_it_is_
             os.kill(own_stack.bridge_pid(), signal.SIGKILL)
         await observer.until("s.stop.stopped && s.stop_press === 'confirmed'", 60)
         await observer.page.locator(".alarm").wait_for(state="hidden")
-    assert _stops(own_stack)
+    assert await _stops(own_stack)
 
 
 async def test_before_the_robot_shows_a_stop_the_page_says_that_it_was_pressed_and_not_that_the_robot_is_stopped(

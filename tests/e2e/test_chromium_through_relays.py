@@ -52,10 +52,10 @@ async def test_pictures_keep_their_events_through_two_relays_and_come_back_when_
         shown = await watching.strip("overview")  # noqa: B005  # not of a string
         statistics = await watching.stats()
         await stage.janus[1].kill()
-        await watching.until("s.relay === '0' && s.streams.overview?.rendered > 3", 30)
+        await watching.until("s.relay === '0' && s.streams.overview?.rendered > 3", 60)
         after = await watching.stats()
         await watching.page.get_by_role("button", name="Stop").first.click()
-        await watching.until("s.stop.stopped", 10)
+        await watching.until("s.stop.stopped")
     assert shown is not None
     assert shown[0] == shown[1]
     for each in (statistics, after):
@@ -72,6 +72,6 @@ async def test_where_no_websocket_passes_the_page_goes_on_by_data_channels(stage
         await page.page.goto(stage.links["observer"])
         await page.until("s.connected && s.relay !== null && !s.line && s.streams.overview?.rendered > 3", 40)
         await page.page.get_by_role("button", name="Stop").first.click()
-        await page.until("s.stop.stopped", 10)
+        await page.until("s.stop.stopped")
         assert (await page.stats())["bad_messages"] == 0
         await context.close()

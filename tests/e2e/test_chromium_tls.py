@@ -28,7 +28,7 @@ async def test_a_self_signed_console_can_be_driven_with_a_pad_and_shows_the_3d_s
     extra = ("--host", address, "--tls", "self-signed")
     async with running_stack(tmp_path, extra=extra) as stack:
         assert stack.operator.startswith(f"https://{address}:")
-        assert any("SHA-256 fingerprint" in line for line in stack.output)
+        await stack.says("SHA-256 fingerprint")
         context = await chromium.new_context(ignore_https_errors=True)
         try:
             await context.add_init_script(path=PAD)

@@ -6,14 +6,13 @@ from playwright.async_api import Browser
 from bench.browsers.console_page import RB, START, STOP_BUTTON, ConsolePage, open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 
 async def _feel_a_contact(console: ConsolePage) -> None:
     """Drive against a wall until the pad rumbles."""
-    await console.arm()
-    await console.drive_forward()
-    await console.until("window.testPad.felt.at(-1) === 'dual-rumble'", 30)
+    async with console.driving():
+        await console.until("window.testPad.felt.at(-1) === 'dual-rumble'")
 
 
 async def _let_go(console: ConsolePage) -> None:
@@ -25,7 +24,7 @@ async def _let_go(console: ConsolePage) -> None:
 
 async def _is_still(console: ConsolePage) -> None:
     """The pad was told to stop, and nothing since."""
-    await console.until("window.testPad.felt.at(-1) === null", 5)
+    await console.until("window.testPad.felt.at(-1) === null")
     played = await console.page.evaluate("testPad.rumbles.length")
     await console.page.evaluate("new Promise((done) => setTimeout(done, 400))")
     assert await console.page.evaluate("testPad.rumbles.length") == played
@@ -68,11 +67,7 @@ async def test_a_contact_is_felt_no_later_than_it_is_seen_and_rumble_ends_with_e
         await console.press(STOP_BUTTON, False)
         await _let_go(console)
         await console.until("s.stop.stopped")
-        reset = page.get_by_role("button", name="Hold to reset").first
-        await reset.hover()
-        await page.mouse.down()
-        await console.until("!s.stop.stopped")
-        await page.mouse.up()
+        await console.reset()
         # the seat is given away
         await _feel_a_contact(console)
         await page.get_by_role("button", name="Give control back").click()
@@ -99,9 +94,8 @@ async def test_triggers_rumble_where_the_pad_has_motors_in_them_and_rumble_can_b
         await console.until_live()
         await page.evaluate("testPad.unplug(); testPad.plug({ effects: ['dual-rumble', 'trigger-rumble'] })")
         await console.until("s.pad && s.pad.ready")
-        await console.arm()
-        await console.drive_forward()
-        await console.until("window.testPad.felt.at(-1) === 'trigger-rumble'", 30)
+        async with console.driving():
+            await console.until("window.testPad.felt.at(-1) === 'trigger-rumble'")
         effect = await page.evaluate("testPad.rumbles.at(-1)")
         assert effect["type"] == "trigger-rumble"
         assert 0 < effect["leftTrigger"] == effect["rightTrigger"] <= 1

@@ -8,7 +8,7 @@ from playwright.async_api import Browser, Page, Route, expect
 from bench.browsers.console_page import open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 OFFERS = re.compile(r"/whep(\?|$)")
 NOWHERE = "a=candidate:1 1 udp 2130706431 127.0.0.1 9 typ host\r\n"

@@ -11,7 +11,7 @@ from tests.e2e.machine import open_on_machine
 from tests.server.media.sources.media_files import film
 from tests.support.stack import Stack, running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 LAPTOP, FULL_HD, NARROW, UPRIGHT = (1366, 768), (1920, 1080), (1024, 640), (1024, 1366)
 PHONE, SMALL_PHONE, TURNED, ZOOMED = (390, 844), (360, 640), (844, 390), (683, 384)

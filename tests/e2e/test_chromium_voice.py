@@ -1,5 +1,6 @@
 """An operator's voice in real Chromium, from a fake microphone that plays a tone to what the robot's room hears."""
 
+import asyncio
 import wave
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -11,13 +12,14 @@ from playwright.async_api import Browser, expect
 
 from bench.browsers.chromium import running_chromium
 from bench.browsers.console_page import ConsolePage, open_console
-from bench.browsers.sound_card import SAMPLE_RATE, SoundCard, running_sound_card, tone_level
+from bench.browsers.sound_card import SoundCard, running_sound_card, tone_level
 from tests.support.stack import Stack, running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 VOICE = 700.0  # Hz; the robot's own tone is another
 HEARD, SILENT = 0.02, 0.001
+PATIENCE = 30.0  # s
 
 
 def write_tone(path: Path) -> Path:
@@ -59,9 +61,12 @@ async def level(card: SoundCard, seconds: float = 1.0) -> float:
     return tone_level(await card.record(seconds), VOICE)
 
 
-async def afterwards(card: SoundCard) -> float:
-    """The level when what was on its way, a fifth of a second at most, has been played."""
-    return tone_level((await card.record(1.0))[SAMPLE_RATE // 2 :], VOICE)
+async def falls_silent(card: SoundCard) -> None:
+    """When what was on its way, for longer on a busy machine, has been played, and from then on."""
+    async with asyncio.timeout(PATIENCE):
+        while await level(card, 0.3) >= SILENT:
+            pass
+    assert await level(card) < SILENT
 
 
 async def talking(console: ConsolePage, held: bool) -> None:
@@ -92,10 +97,12 @@ async def test_the_holder_is_heard_while_the_button_is_held_and_everyone_sees_it
         await talking(console, True)
         await console.page.locator(".talk-label", has_text="You are heard").wait_for()
         await watcher.page.get_by_text("operator is speaking").wait_for()
-        assert max([await level(card) for _ in range(3)]) > HEARD
+        async with asyncio.timeout(PATIENCE):
+            while await level(card) <= HEARD:
+                pass
         await talking(console, False)
         await watcher.page.get_by_text("operator is speaking").wait_for(state="hidden")
-        assert await afterwards(card) < SILENT
+        await falls_silent(card)
 
 
 async def test_the_key_talks_too_and_silence_falls_when_the_seat_is_given_back_or_the_page_is_hidden(
@@ -112,7 +119,7 @@ async def test_the_key_talks_too_and_silence_falls_when_the_seat_is_given_back_o
         await console.page.locator(".talk-label", has_text="You are heard").wait_for()
         await console.page.get_by_role("button", name="Give control back").click()
         await console.until("s.seat && !s.seat.mine")
-        assert await afterwards(card) < SILENT
+        await falls_silent(card)
         await console.page.keyboard.up("v")
         await console.page.get_by_role("button", name="Request control").click()
         await console.until("s.seat && s.seat.mine")
@@ -122,7 +129,7 @@ async def test_the_key_talks_too_and_silence_falls_when_the_seat_is_given_back_o
         await other.bring_to_front()
         await console.page.evaluate("window.dispatchEvent(new Event('blur'))")  # headless windows keep the focus
         await console.page.locator(".talk:not([data-talk=on])").wait_for()
-        assert await afterwards(card) < SILENT
+        await falls_silent(card)
 
 
 async def test_a_microphone_that_is_refused_is_said_and_nothing_is_heard(tmp_path: Path) -> None:

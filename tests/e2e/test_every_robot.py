@@ -21,6 +21,7 @@ STICKS = {"left_x": 0, "left_y": 1, "right_x": 2, "right_y": 3}
 # What the pad calls negative and positive: buttons of the W3C standard mapping.
 BUTTONS = {"dpad_x": (14, 15), "dpad_y": (12, 13), "triggers": (6, 7)}
 MOVED = 0.1  # of the axis' limit
+TRIES = 3  # where a busy machine holds the robot up
 
 
 def registered(name: str) -> Starting:
@@ -78,8 +79,8 @@ async def test_the_same_page_drives_stops_and_shows_any_robot(
                     await _drive(console, robot, binding)
             await _saw_every_camera(console, robot)
             await _stop_and_reset(console)
-        _no_stamp_is_newer_than_the_truth(stack, robot)
-        _nothing_executed_twice(stack)
+        await _no_stamp_is_newer_than_the_truth(stack, robot)
+        await _nothing_executed_twice(stack)
 
 
 async def _choose(console: ConsolePage, robot: Any, layer: Any) -> None:
@@ -99,21 +100,32 @@ async def _drive(console: ConsolePage, robot: Any, binding: Any) -> None:
     axis = next(axis for axis in robot["axes"] if axis["name"] == binding["axis"])
     direction = -1 if binding["invert_pad"] else 1
     rendered = await _rendered(console)
-    await console.press(RB)
-    if binding["pad"] in STICKS:
-        await console.tilt(STICKS[binding["pad"]], direction)
-    else:
-        await console.press(BUTTONS[binding["pad"]][direction > 0])
     least = MOVED * binding["scale"] * (axis["maximum"] - axis["rest"])
-    await console.until(f"s.axes['{axis['name']}'] - {axis['rest']} > {least}", 30)
+    moved = f"s.axes['{axis['name']}'] - {axis['rest']} > {least}"
+    for _ in range(TRIES):
+        await console.press(RB)
+        if binding["pad"] in STICKS:
+            await console.tilt(STICKS[binding["pad"]], direction)
+        else:
+            await console.press(BUTTONS[binding["pad"]][direction > 0])
+        await console.until(f"!s.armed || ({moved})")
+        if not await console.was_held_up():
+            break
+        await _let_go(console, binding, direction)
+        await console.arm()
+    await console.until(moved)
     for name, count in rendered.items():
         await console.until(f"s.streams['{name}'].rendered > {count}")
+    await _let_go(console, binding, direction)
+    await console.until("!s.driving && s.at_rest === true", 30)
+
+
+async def _let_go(console: ConsolePage, binding: Any, direction: int) -> None:
     if binding["pad"] in STICKS:
         await console.tilt(STICKS[binding["pad"]], 0)
     else:
         await console.press(BUTTONS[binding["pad"]][direction > 0], False)
     await console.press(RB, False)
-    await console.until("!s.driving && s.at_rest === true", 30)
 
 
 async def _rendered(console: ConsolePage) -> dict[str, int]:
@@ -129,7 +141,7 @@ async def _saw_every_camera(console: ConsolePage, robot: Any) -> None:
         assert stream["stamp"] is not None, camera["name"]
         assert stream["violations"] == 0, camera["name"]
         assert stream["max_gap"] <= statistics["tolerance"]["video"], camera["name"]
-    assert statistics["faults"] == []
+    await console.until("s.faults.length === 0")
     assert statistics["bad_messages"] == 0
 
 
@@ -141,18 +153,18 @@ async def _stop_and_reset(console: ConsolePage) -> None:
     await console.until("!s.stop.stopped && s.at_rest === true")
 
 
-def _no_stamp_is_newer_than_the_truth(stack: Stack, robot: Any) -> None:
+async def _no_stamp_is_newer_than_the_truth(stack: Stack, robot: Any) -> None:
     """By the bridge's own record: what a picture is stamped with held when it was captured."""
     began: dict[int, float] = {}
-    for record in stack.events("feedback"):
+    for record in await stack.events("feedback"):
         began.setdefault(record["event"], record["time"])
-    stamped = [record for record in stack.events("media") if record["captured"] < record["time"]]
+    stamped = [record for record in await stack.events("media") if record["captured"] < record["time"]]
     assert {record["stream"] for record in stamped} >= {camera["name"] for camera in robot["cameras"]}
     newer = [record for record in stamped if began[record["event"]] > record["captured"]]
     assert newer == []
 
 
-def _nothing_executed_twice(stack: Stack) -> None:
-    executed = [record["event"] for record in stack.events("executed")]
+async def _nothing_executed_twice(stack: Stack) -> None:
+    executed = [record["event"] for record in await stack.events("executed")]
     assert executed
     assert executed == sorted(set(executed))

@@ -10,7 +10,7 @@ from playwright.async_api import Browser
 from bench.browsers.console_page import open_console
 from tests.support.stack import Stack, running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.browser
 
 # How unlike the pixels of a canvas are: a blank picture has a spread of 0.
 SPREAD = """(name) => {
@@ -34,9 +34,8 @@ async def test_the_default_robot_is_seen_heard_and_driven(manipulator: Stack, ch
         for camera in ("overview", "wrist"):
             assert await console.page.evaluate(SPREAD, camera) > 80, camera
         await console.until("s.streams.microphone.rendered > 10")
-        await console.arm()
-        await console.drive_forward()
-        await console.until("s.event > 40", 60)
+        async with console.driving():
+            await console.until("s.event > 40", 60)
         streams = (await console.stats())["streams"]
         assert {name: stream["violations"] for name, stream in streams.items()} == dict.fromkeys(streams, 0)
 

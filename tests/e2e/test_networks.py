@@ -15,7 +15,7 @@ SHOWN = """(() => {
     return Boolean(s?.connected && s.streams.overview?.rendered > 3);
 })()"""
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
 
 
 async def test_with_bursts_of_loss_the_page_drives_and_shows_nothing_outside_the_tolerance(

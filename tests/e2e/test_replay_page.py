@@ -7,7 +7,7 @@ from typing import Any
 
 import httpx
 import pytest
-from playwright.async_api import Browser, Page
+from playwright.async_api import Browser, Page, expect
 
 from bench.browsers.chromium import open_page
 from bench.browsers.console_page import READ_STRIP, ConsolePage, open_console
@@ -15,7 +15,7 @@ from bench.emulator import Network
 from server.recording.reader import Record, RecordingReader
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
 
 EVENTS = 40  # to drive for
 SEEKS = 10
@@ -47,10 +47,8 @@ async def _record_a_drive(stack: Stack, chromium: Browser) -> tuple[str, int, in
         await console.until_live()
         await console.until("s.streams.microphone.rendered > 5", 60)
         await _ask(stack, "POST", "/api/recordings")
-        await console.arm()
         first = (await console.stats())["event"]
-        await console.drive_forward()
-        await console.until(f"s.event > {first + EVENTS}", 60)
+        await console.drive_on_until(f"s.event > {first + EVENTS}")
         assert {each["codec"] for each in (await console.stats())["streams"].values()} == {"H264", "opus"}
         last = (await console.stats())["event"]
         await _ask(stack, "POST", "/api/recordings/stop")
@@ -75,14 +73,15 @@ async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_
     own_stack: Stack, chromium: Browser, tmp_path: Path
 ) -> None:
     recording, first, last = await _record_a_drive(own_stack, chromium)
-    executed = {each["event"]: each for each in own_stack.events("executed")}
-    measured = {(each["event"], each["issue"]): each for each in own_stack.events("feedback")}
-    captured = {(each["stream"], each["event"]) for each in own_stack.events("media")}
+    executed = {each["event"]: each for each in await own_stack.events("executed")}
+    measured = {(each["event"], each["issue"]): each for each in await own_stack.events("feedback")}
+    captured = {(each["stream"], each["event"]) for each in await own_stack.events("media")}
     with RecordingReader(tmp_path / "state" / "recordings" / f"{recording}.mcap") as reader:
         records = list(reader.records())
     async with open_page(chromium, _replay_link(own_stack, own_stack.observer, recording, first)) as page:
         replay = ConsolePage(page)
         await replay.until("s.ready")
+        readable = 0
         for event in random.Random(1).sample(range(first, last), SEEKS):
             shown = await _seek(page, replay, event)
             assert shown["command"]["values"] == executed[event]["values"]
@@ -95,8 +94,10 @@ async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_
             assert feedback["axes"] == [each["axes"] for each in own if each["event"] == event][-1]
             for camera in ("overview", "front"):
                 strip = await page.evaluate(READ_STRIP, camera)
-                assert strip["event"] == strip["stamp"] == _newest(records, f"/camera/{camera}", event)[-1].event
-                assert (camera, strip["event"]) in captured
+                assert strip["stamp"] == _newest(records, f"/camera/{camera}", event)[-1].event
+                assert strip["event"] in (strip["stamp"], None)  # unreadable where the path left few bits
+                readable += strip["event"] is not None
+                assert (camera, strip["stamp"]) in captured
                 newest = _newest(records, f"/camera/{camera}", event)[-1]
                 assert await page.evaluate("(name) => window.lockstep.picture(name)", camera) == newest.payload.hex()
             packets = _newest(records, "/microphone/microphone", event)
@@ -108,6 +109,7 @@ async def test_every_event_is_shown_with_exactly_its_pictures_sound_command_and_
             await replay.until(f"s.scene.event === {event}")
             x, y, _ = (await replay.stats())["scene"]["bodies"]["base"]
             assert [x, y] == pytest.approx([feedback["joints"][0], feedback["joints"][1]], abs=1e-9)
+        assert readable > SEEKS / 2
 
 
 async def test_a_recording_is_watched_while_it_is_made_then_listed_and_deleted_by_role(
@@ -118,7 +120,7 @@ async def test_a_recording_is_watched_while_it_is_made_then_listed_and_deleted_b
     async with open_page(chromium, lists + _token(own_stack.observer)) as page:
         row = page.get_by_role("listitem")
         await row.get_by_text("Recording now").wait_for()
-        assert await row.get_by_role("button").count() == 1  # only to open it
+        await expect(row.get_by_role("button")).to_have_count(1)  # only to open it
         await row.get_by_role("button").click()
         replay = ConsolePage(page)
         await replay.until("s.ready && s.running && s.pictures.front !== undefined")

@@ -12,11 +12,12 @@ from playwright.async_api import Browser, Page, expect
 
 from bench.browsers.chromium import open_page
 from bench.browsers.console_page import READ_STRIP, ConsolePage
+from bench.driving import drive_on
 from client import Console
 from server.recording.reader import RecordingReader
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
 
 EVENTS = 100  # to drive for: about five chunks
 DRAWN = {"/camera/overview", "/camera/front", "/lockstep/feedback"}  # each in a figure of its own
@@ -45,12 +46,12 @@ async def _record_a_drive_in_vp8_and_pcmu(stack: Stack) -> str:
         AsyncExitStack() as others,
     ):
         await console.take_seat()
-        await console.drive([0.3, 0.0, 0.2])
+        await drive_on(console, [0.3, 0.0, 0.2])
         await _ask(stack, "POST", "/api/recordings")
         for number in range(EVENTS):
             if number == EVENTS // 2:
                 await others.enter_async_context(Console(stack.observer, video=False, sound_codec="opus", name="Bo"))
-            await console.drive([0.3 if number // 25 % 2 == 0 else -0.3, 0.0, 0.2])
+            await drive_on(console, [0.3 if number // 25 % 2 == 0 else -0.3, 0.0, 0.2])
         await _ask(stack, "POST", "/api/recordings/stop")
     (recording,) = (await _ask(stack, "GET", "/api/recordings"))["recordings"]
     found: str = recording["id"]

@@ -13,7 +13,6 @@ from tests.support.stack import Stack, running_stack
 
 pytestmark = [
     pytest.mark.browser,
-    pytest.mark.timeout(180),
     pytest.mark.skipif(not have_ros(), reason="there are no wheels of ROS 2 for this machine"),
 ]
 
@@ -56,5 +55,5 @@ async def test_the_page_drives_the_node_and_shows_what_it_says(base: Stack, node
         await node.tell("speak /odom")
         await console.until("s.axes['base.vx'] === 0 && s.faults.length === 0")
         await node.ended_in_one_zero(motions=2)
-    executed = [record["event"] for record in base.events("executed")]
+    executed = [record["event"] for record in await base.events("executed")]
     assert executed == sorted(set(executed))

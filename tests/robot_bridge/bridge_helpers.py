@@ -33,6 +33,7 @@ __all__ = [
     "DRIVE",
     "NEUTRAL",
     "Operator",
+    "PATIENCE",
     "RawLink",
     "RecordingRobot",
     "log_lines",

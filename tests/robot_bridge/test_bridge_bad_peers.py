@@ -26,6 +26,7 @@ from robot_bridge.protocol.messages import (
 from robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import (
     NEUTRAL,
+    PATIENCE,
     RecordingRobot,
     operator,
     raw_link,
@@ -42,7 +43,7 @@ async def test_a_second_operator_is_told_that_the_place_is_taken_until_the_first
                 await RobotLink(*bridge.address, "operator").connect()
             await driver.drive()
         async with operator(bridge) as successor:
-            assert (await successor.drive()).event == 5
+            assert (await successor.drive()).event >= 5
 
 
 async def test_a_silent_operator_is_dropped_and_makes_room_for_another() -> None:
@@ -155,7 +156,7 @@ async def test_closing_does_not_wait_long_for_a_peer_that_does_not_read() -> Non
         try:
             greedy.sendall(frame(encode_message(Hello(role="media"))))
             await robot.until(lambda: bridge.drops["overview"] > 0, "the peer is full")
-            async with asyncio.timeout(3):
+            async with asyncio.timeout(PATIENCE):
                 await bridge.close()
         finally:
             greedy.close()

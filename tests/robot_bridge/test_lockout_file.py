@@ -35,14 +35,14 @@ def test_a_look_that_hangs_locks_the_robot_after_a_while(tmp_path: Path) -> None
 
     def look(path: Path) -> str:
         looked.release()
-        go_on.acquire(timeout=10)
+        go_on.acquire(timeout=30)
         return ""
 
     switch = LockoutFile(tmp_path / "lockout", look=look, clock=lambda: now[0])
     go_on.release()
     switch.start()
-    looked.acquire(timeout=10)
-    looked.acquire(timeout=10)  # the second look has begun, so the first is known
+    looked.acquire(timeout=30)
+    looked.acquire(timeout=30)  # the second look has begun, so the first is known
     assert switch.reason == ""
     now[0] += PATIENCE + 0.1
     assert "in time" in switch.reason

@@ -16,7 +16,7 @@ from rtc.rtp.stage import KeyframeRequested, Reception
 from rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
 from tests.rtc.vp8 import packetise
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
+pytestmark = pytest.mark.browser
 
 VP8 = Codec(96, "VP8", 90_000, feedback=("nack", "nack pli", "goog-remb"))
 RTX = Codec(97, "rtx", 90_000, parameters={"apt": "96"})

@@ -74,6 +74,12 @@ def lose(sctp: Any, first: int) -> list[bytes]:
     return lost
 
 
+def never_repeats(sctp: Any) -> None:
+    """`sctp` sends nothing again: what its peer does not deliver or acknowledge by itself stays so."""
+    sctp._t3_cancel()
+    sctp._t3_expired = lambda: None
+
+
 def packets_of(sctp: Any) -> list[bytes]:
     """The packets that `sctp` sends from now on."""
     left: list[bytes] = []

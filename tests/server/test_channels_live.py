@@ -215,9 +215,9 @@ async def test_malformed_messages_do_not_keep_the_seat() -> None:
 
 
 async def test_reports_keep_the_seat() -> None:
-    async with running_rig(seat_timeout=0.5) as rig, rig.peer("operator") as driver:
+    async with running_rig(seat_timeout=1.0) as rig, rig.peer("operator") as driver:
         await _take_seat(driver)
-        for _ in range(12):
+        for _ in range(20):
             driver.send("control", Report(event=1))
             await asyncio.sleep(0.1)
         assert (await rig.session())["seat"]["holder"] == await _id(driver)

@@ -19,7 +19,7 @@ from server.data_transport_private import (
     tune_data_transport,
 )
 from server.media.aiortc_private import create_peer_connection
-from tests.server.data_ends import Ends, acknowledgements_of, connected, lose
+from tests.server.data_ends import Ends, acknowledgements_of, connected, lose, never_repeats
 from tests.server.rig import PATIENCE, running_rig
 
 MOVED = "aiortc moved a private part: see server/data_transport_private.py"
@@ -109,12 +109,13 @@ async def test_every_record_that_waits_is_delivered_at_once(ends: Ends) -> None:
 
     await ends.exchange()
     dtls._write_ssl = hold
+    never_repeats(ends.client.transport)
     for text in ("first", "second"):
         ends.client.send(text)
     await both.wait()
     dtls._write_ssl = write
     await write()
-    async with asyncio.timeout(SOON):  # sooner than the client would repeat the second
+    async with asyncio.timeout(PATIENCE):
         assert [await ends.at_server.get(), await ends.at_server.get()] == ["first", "second"]
 
 
@@ -126,7 +127,7 @@ async def test_every_second_packet_is_acknowledged_and_a_single_one_after_a_whil
     for number in range(10):
         ends.client.send(str(number))
         assert await ends.at_server.get() == str(number)
-    assert 4 <= len(sent) <= 6
+    assert 4 <= len(sent) <= 8, "a busy machine may let the time for some of them pass"
     acknowledged = asyncio.Event()
     receive = client._receive_sack_chunk
 
@@ -136,7 +137,8 @@ async def test_every_second_packet_is_acknowledged_and_a_single_one_after_a_whil
             acknowledged.set()
 
     client._receive_sack_chunk = heard
-    async with asyncio.timeout(SOON):
+    never_repeats(client)
+    async with asyncio.timeout(PATIENCE):
         ends.client.send("single")
         await acknowledged.wait()
 
@@ -162,8 +164,10 @@ async def test_the_end_of_dtls_is_still_noticed(ends: Ends) -> None:
 
 async def test_a_lost_message_is_repeated_soon(ends: Ends) -> None:
     await ends.exchange()
-    lost = lose(ends.server.transport, 1)
-    async with asyncio.timeout(SOON):
+    sctp: Any = ends.server.transport
+    lost = lose(sctp, 1)
+    assert sctp._rto < SOON
+    async with asyncio.timeout(PATIENCE):
         ends.server.send("once")
         assert await ends.at_client.get() == "once"
     assert len(lost) == 1
@@ -203,8 +207,10 @@ async def test_a_timeout_does_not_shut_the_window(ends: Ends) -> None:
 async def test_many_lost_messages_are_all_repeated_by_one_timeout(ends: Ends) -> None:
     await ends.exchange()
     texts = [str(number) * 1000 for number in range(4)]
-    lost = lose(ends.server.transport, len(texts))
-    async with asyncio.timeout(SOON):
+    sctp: Any = ends.server.transport
+    lost = lose(sctp, len(texts))
+    assert sctp._rto < SOON
+    async with asyncio.timeout(PATIENCE):
         for text in texts:
             ends.server.send(text)
         assert [await ends.at_client.get() for _ in texts] == texts
@@ -272,4 +278,4 @@ async def test_while_connecting_the_wait_grows() -> None:
         sctp._t1_handle.cancel()
         sctp._t1_expired()
     await pc.close()
-    assert waits == pytest.approx([0.5, 1.0, 2.0, 3.0, 3.0], abs=0.1)
+    assert waits == pytest.approx([0.5, 1.0, 2.0, 3.0, 3.0], abs=0.3)

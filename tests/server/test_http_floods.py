@@ -17,8 +17,6 @@ from server.tls import Certificate, self_signed
 from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console
 from tests.support.redis_server import free_port
 
-pytestmark = pytest.mark.timeout(120)
-
 CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
 PLACES = 16  # connections that the console takes
 HELD = 48  # that the flood opens; an operating system would take thousands

@@ -217,7 +217,6 @@ async def _everything_is_given_back(rig: Rig, others: list[_Viewer], sockets: in
         await other.goes_on()
 
 
-@pytest.mark.timeout(180)
 async def test_a_fault_in_any_stage_of_one_peer_of_ten_ends_that_one_alone() -> None:
     async with _nine_others() as (rig, others):
         for other in others:
@@ -243,7 +242,6 @@ async def test_a_fault_in_any_stage_of_one_peer_of_ten_ends_that_one_alone() -> 
             assert all(each["peer"] == peer.id for each in told)
 
 
-@pytest.mark.timeout(60)
 async def test_a_fault_while_an_offer_is_answered_refuses_it_by_name_and_keeps_nothing() -> None:
     async with running_rig() as rig, _watching(rig, "operator") as other:
         await other.goes_on()
@@ -265,7 +263,6 @@ async def test_a_fault_while_an_offer_is_answered_refuses_it_by_name_and_keeps_n
         await _everything_is_given_back(rig, [other], sockets)
 
 
-@pytest.mark.timeout(60)
 async def test_a_fault_when_the_transport_connects_ends_that_peer_alone() -> None:
     async with running_rig() as rig, _watching(rig, "operator") as other:
         sockets = _sockets()
@@ -288,7 +285,6 @@ async def test_a_fault_when_the_transport_connects_ends_that_peer_alone() -> Non
         await _everything_is_given_back(rig, [other], sockets)
 
 
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize(("number", "answered"), [(4096, True), (4351, True), (255, True), (16, True), (256, False)])
 async def test_no_id_of_a_header_extension_takes_media_from_anybody(number: int, answered: bool) -> None:
     async with running_rig() as rig, _watching(rig, "observer") as other:

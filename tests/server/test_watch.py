@@ -236,7 +236,7 @@ async def test_a_socket_that_never_asks_for_anything_is_no_line() -> None:
 async def test_a_remote_that_does_not_read_is_closed_and_costs_the_others_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("server.watcher.READ_SECONDS", 0.2)
+    monkeypatch.setattr("server.watcher.READ_SECONDS", 0.5)
     async with running_rig(**RELAYED) as rig, open_line(rig) as reader:
         headers = rig.token("observer")
         small = socket.socket()

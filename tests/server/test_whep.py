@@ -209,7 +209,7 @@ async def test_a_peer_that_never_connects_is_ended() -> None:
 
 
 async def test_a_peer_with_channels_that_says_nothing_is_ended() -> None:
-    async with running_rig(peer_silence=0.3) as rig, rig.peer("observer") as peer:
+    async with running_rig(peer_silence=1.0) as rig, rig.peer("observer") as peer:
         async with asyncio.timeout(PATIENCE):
             await peer.closed.wait()
         await _until_no_peers(rig)

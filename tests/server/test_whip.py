@@ -289,14 +289,14 @@ async def test_a_publisher_that_stalls_is_said_to_and_its_link_alone_may_begin_a
 
 
 async def test_a_publisher_that_goes_silent_for_long_or_never_connects_is_ended() -> None:
-    async with running_rig(whip="phone", peer_silence=1.0, peer_connect_timeout=0.5) as rig:
+    async with running_rig(whip="phone", peer_connect_timeout=0.5) as rig:
         assert (await post(rig, rig.token("operator"))).status_code == 201
         await eventually(lambda: rig.count("lockstep_whip_ended_total", why="never connected") == 1)
-        async with TestPublisher() as publisher:
-            await publisher.post(rig.http, rig.token("operator"))
-            await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="phone") > 2)
-            publisher.pictures.goes_on.clear()
-            await eventually(lambda: rig.count("lockstep_whip_ended_total", why="silent") == 1)
+    async with running_rig(whip="phone", peer_silence=1.0) as rig, TestPublisher() as publisher:
+        await publisher.post(rig.http, rig.token("operator"))
+        await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="phone") > 2)
+        publisher.pictures.goes_on.clear()
+        await eventually(lambda: rig.count("lockstep_whip_ended_total", why="silent") == 1)
 
 
 async def test_what_is_no_picture_is_counted_and_disturbs_neither_who_drives_nor_another_publisher() -> None:

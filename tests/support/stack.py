@@ -8,11 +8,12 @@ import signal
 import sys
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from server.fleet.simulated import own_event_log
+from tests.support.event_logs import PATIENCE, written
 
 __all__ = ["Stack", "running_console", "running_fleet", "running_stack"]
 
@@ -70,14 +71,26 @@ class Stack:
         with _frozen(self.process.pid):
             yield
 
-    def records(self, robot: str = "") -> Iterator[dict[str, Any]]:
-        """The bridge's records since the test began."""
-        for line in own_event_log(self.event_log, robot).read_text().splitlines()[self.skipped :]:
-            yield json.loads(line)
+    async def records(self, robot: str = "") -> list[dict[str, Any]]:
+        """All that the bridge has recorded from the test's begin to this call; see `written`."""
+        return (await self._written(robot))[self.skipped :]
 
-    def events(self, kind: str, robot: str = "") -> Iterator[dict[str, Any]]:
+    async def events(self, kind: str, robot: str = "") -> list[dict[str, Any]]:
         """Those of one kind."""
-        return (record for record in self.records(robot) if record["kind"] == kind)
+        return [record for record in await self.records(robot) if record["kind"] == kind]
+
+    async def from_here(self) -> "Stack":
+        """The same, without what the bridge has recorded until now."""
+        return replace(self, skipped=len(await self._written("")))
+
+    async def _written(self, robot: str) -> list[dict[str, Any]]:
+        return await written(own_event_log(self.event_log, robot), lambda: self.process.returncode is not None)
+
+    async def says(self, *words: str) -> None:
+        """Until it has written a line with all these words on its standard error."""
+        async with asyncio.timeout(PATIENCE):
+            while not any(all(word in line for word in words) for line in self.output):  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
 
 
 @contextmanager

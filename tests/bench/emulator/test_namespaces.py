@@ -21,13 +21,14 @@ LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
 
 DRIVE = """
 import asyncio, json, sys
+from bench.driving import drive_on
 from client import Console
 
 async def main():
     async with Console(sys.argv[1], tolerance=4, audio=False, connect_seconds=20) as console:
         await console.take_seat()
         for _ in range(5):
-            feedback = await console.drive([0.0, 0.0, 0.3])
+            feedback = await drive_on(console, [0.0, 0.0, 0.3])
         async for picture in console.pictures():
             break
         violations = sum(each.violations for each in console.stats().streams)
@@ -163,6 +164,7 @@ CLOUD = "203.0.113.7"
 
 WATCH = """
 import asyncio, sys
+from bench.driving import drive_on
 from client import Console
 
 async def main():

@@ -7,8 +7,9 @@ from urllib.parse import urlsplit
 import pytest
 import pytest_asyncio
 
+from bench.driving import drive_on
 from bench.emulator import Constant, Impairment, Network, even_profile, profile_names
-from client import Console, NotArmed
+from client import Console
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -27,10 +28,7 @@ async def stack(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stack
 async def drive(console: Console, events: int = EVENTS) -> None:
     async with asyncio.timeout(40):
         for _ in range(events):
-            try:
-                await console.drive([0.0, 0.0, 0.3])
-            except NotArmed:  # a bridge that this machine has held up asks for it again
-                await console.arm()
+            await drive_on(console, [0.0, 0.0, 0.3])
 
 
 async def picture(console: Console) -> None:

@@ -1,14 +1,11 @@
 """Eight simulated robots, each bridge a process of its own, on one console."""
 
-import pytest
-
 from bench.fleet_soak.run import FleetPlan, fleet_soak
 from bench.fleet_soak.verdict import MUST_BE_ZERO
 
 BY_THE_BRIDGES = ("executed_twice", "executed_late", "events_skipped")
 
 
-@pytest.mark.timeout(120)
 async def test_of_eight_robots_some_are_killed_and_the_others_go_on_undisturbed() -> None:
     plan = FleetPlan(robots=8, seconds=9.0, kill_every=3.0, seed=1, rate=10.0, picture_rate=2.0)
     told: list[str] = []

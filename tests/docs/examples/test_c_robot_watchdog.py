@@ -10,8 +10,6 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from robot_bridge.protocol.errors import LinkError
 from tests.docs.examples.robots import moving
 from tests.robot_bridge.bridge_helpers import operator
@@ -104,7 +102,6 @@ async def test_a_robot_whose_loop_was_held_up_rests_without_a_ramp_and_wants_a_n
         assert await robot.process.wait() == 0
 
 
-@pytest.mark.timeout(120)
 async def test_a_robot_that_hangs_for_good_ends_with_a_message(tmp_path: Path) -> None:
     async with hanging_robot(tmp_path) as robot:
         await drive_until_it_hangs(robot)

@@ -16,7 +16,6 @@ NEEDED = ("openh264enc", "vp8enc", "h264parse", "rtph264pay", "rtpvp8pay", "vide
 
 pytestmark = [
     pytest.mark.skipif(bool(why := missing(NEEDED)), reason=f"GStreamer is not complete here: {why} missing"),
-    pytest.mark.timeout(60),
 ]
 
 

@@ -29,7 +29,7 @@ STRANGER = "0123456789abcdef"
 @pytest.fixture(autouse=True)
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(redis_board, "PERIOD", 0.3)
-    monkeypatch.setattr(redis_board, "STOP_PATIENCE", 1.0)
+    monkeypatch.setattr(redis_board, "STOP_PATIENCE", 3.0)
 
 
 @pytest.fixture

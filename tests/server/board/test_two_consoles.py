@@ -101,7 +101,7 @@ async def _place(directory: Path, name: str, robot: str, redis: RedisServer) -> 
     }
     async with (
         running_fleet(directory, {robot: "planar"}, port=port, settings=settings) as stack,
-        httpx.AsyncClient(base_url=stack.console, timeout=10) as http,
+        httpx.AsyncClient(base_url=stack.console, timeout=PATIENCE) as http,
     ):
         yield Place(stack, http, directory / "state")
 

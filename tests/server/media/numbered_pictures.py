@@ -50,7 +50,7 @@ async def events_behind(stack: Stack, shown: list[Shown], newest: int, captured:
     `captured`: when, by number, on this machine's clock.
     """
     await until_logged(stack, "feedback", lambda record: record["event"] >= newest)
-    times, events = _truth(stack)
+    times, events = await _truth(stack)
     assert len({stamp for _, stamp in shown}) > 5
     behind = []
     for number, stamp in shown:
@@ -61,9 +61,9 @@ async def events_behind(stack: Stack, shown: list[Shown], newest: int, captured:
     return behind
 
 
-def _truth(stack: Stack) -> tuple[list[float], list[int]]:
+async def _truth(stack: Stack) -> tuple[list[float], list[int]]:
     """When each event began to hold, by the bridge's own log; its clock is this machine's."""
     first: dict[int, float] = {}
-    for record in stack.events("feedback"):
+    for record in await stack.events("feedback"):
         first.setdefault(record["event"], record["time"])
     return list(first.values()), list(first)

@@ -17,8 +17,6 @@ from tests.server.rig import Rig, TestPeer, running_rig
 from tests.server.watch_lines import ticket as watch_ticket
 from tests.support.livekit_stand_in import KEY, SECRET, LiveKitStandIn, livekit_stand_in
 
-pytestmark = pytest.mark.timeout(120)
-
 KEYS = {"relay_key": KEY, "relay_secret": SECRET}
 
 

@@ -14,8 +14,6 @@ from server.relay.livekit_tokens import LiveKitKeys
 from server.relay.livekit_wire import Ended, Feedback, Join, Joined, Picture, decode_order, encode_message
 from tests.support.livekit_stand_in import KEY, SECRET, livekit_stand_in
 
-pytestmark = pytest.mark.timeout(90)
-
 JOIN = Join("ws://127.0.0.1:9", "a.b.c", [])
 
 

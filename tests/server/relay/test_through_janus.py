@@ -9,8 +9,6 @@ import pytest
 from bench.emulator.errors import NamespacesUnavailable
 from bench.relay.stage import RelayStage, relay_stage
 
-pytestmark = pytest.mark.timeout(120)
-
 
 async def _watch(stage: RelayStage, pictures: int = 20) -> dict[str, object]:
     command = (sys.executable, "-m", "bench.relay.watcher", stage.links["observer"], str(pictures))

@@ -1,7 +1,6 @@
 """A ROS 2 robot for tests: a real node in a process of its own, over DDS on loopback."""
 
 import asyncio
-import json
 import platform
 import random
 import socket
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.processes import Running, running_process
+from tests.support.event_logs import whole_lines, written
 
 __all__ = [
     "EXAMPLES",
@@ -89,10 +89,7 @@ class RosRobot:
     log: Path
 
     def notes(self, *kinds: str) -> Iterator[dict[str, Any]]:
-        for line in self.log.read_text().splitlines():
-            note = json.loads(line)
-            if note["kind"] in kinds:
-                yield note
+        return (note for note in whole_lines(self.log) if note["kind"] in kinds)
 
     async def tell(self, line: str) -> None:
         """`hush /odom`, `speak /odom` …, see robot_node.py. Returns after the robot's next tick."""
@@ -136,12 +133,9 @@ class RosBridge:
     address: tuple[str, int]
     event_log: Path
 
-    def records(self, kind: str) -> Iterator[dict[str, Any]]:
-        """What it has written down of one kind."""
-        for line in self.event_log.read_text().splitlines():
-            record = json.loads(line)
-            if record["kind"] == kind:
-                yield record
+    async def records(self, kind: str) -> list[dict[str, Any]]:
+        """What it has recorded of one kind until this call; it has to run."""
+        return [record for record in await written(self.event_log) if record["kind"] == kind]
 
 
 @asynccontextmanager

@@ -18,7 +18,6 @@ from tests.support.ros2 import EXAMPLES, PATIENCE, STAY, RosRobot, have_ros, ros
 
 pytestmark = [
     pytest.mark.skipif(not have_ros(), reason="there are no wheels of ROS 2 for this machine"),
-    pytest.mark.timeout(120),
 ]
 
 GO = [0.4, 0.3]

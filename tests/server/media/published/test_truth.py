@@ -42,7 +42,6 @@ async def publishing(stack: Stack, codec: str, network: str) -> AsyncIterator[Te
         deliveries.close()
 
 
-@pytest.mark.timeout(90)
 @pytest.mark.parametrize(("codec", "network"), [("H264", "perfect"), ("VP8", "satellite")])
 async def test_a_published_picture_never_carries_a_newer_stamp_than_the_truth(
     tmp_path: Path, codec: str, network: str

@@ -78,7 +78,6 @@ async def sounds(directory: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
         yield attached
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize("attach", [network_camera, films, sounds], ids=["rtsp", "films", "file-sound-and-pulse"])
 async def test_no_medium_of_an_attached_source_is_stamped_newer_than_the_truth(
     attach: Callable[..., AbstractAsyncContextManager[Attached]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -21,7 +21,6 @@ def free_port() -> int:
         return port
 
 
-@pytest.mark.timeout(90)
 @pytest.mark.parametrize("codec", ["H264", "VP8"])
 async def test_a_camera_behind_an_unsteady_network_never_carries_a_newer_stamp_than_the_truth(
     tmp_path: Path, codec: str
