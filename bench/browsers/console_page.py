@@ -10,11 +10,12 @@ from playwright.async_api import Browser, Page
 
 from bench.browsers.chromium import missed_in_page, open_page
 
-__all__ = ["LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
+__all__ = ["FORWARD", "LEFT_X", "LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
 
 START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
-LEFT_X, LEFT_Y = 0, 1
+LEFT_X, LEFT_Y, RIGHT_X = 0, 1, 2
 FORWARD = MappingProxyType({LEFT_Y: -1.0})
+ROUND = MappingProxyType({LEFT_Y: -1.0, RIGHT_X: -1.0})  # the planar robot in a circle of half a metre: it stays near
 ARM_TRIES, ARM_SECONDS = 3, 5.0
 # Why the page says that it has disarmed where a busy machine held up the robot, the console or itself.
 HELD_UP = (
@@ -138,7 +139,7 @@ class ConsolePage:
         await self.until("s.driving && s.at_rest === false", 20)
 
     @asynccontextmanager
-    async def driving(self, tilts: Mapping[int, float] = FORWARD) -> AsyncIterator[None]:
+    async def driving(self, tilts: Mapping[int, float] = ROUND) -> AsyncIterator[None]:
         """It is armed and driven inside the block, anew where a busy machine ended that; deadman and sticks stay held.
 
         Anything else that ends it, as a stop, lasts.
@@ -168,9 +169,10 @@ class ConsolePage:
         await self.arm()
 
     async def let_go(self) -> None:
-        """Of the deadman and the left stick."""
+        """Of the deadman and the sticks."""
         await self.press(RB, False)
-        await self.tilt(LEFT_Y, 0)
+        for axis in ROUND:
+            await self.tilt(axis, 0)
 
     async def was_held_up(self) -> bool:
         """Whether it is disarmed because this machine held something up."""

@@ -3,7 +3,7 @@
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import LEFT_Y, RB, START, ConsolePage, open_console
+from bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
@@ -141,6 +141,6 @@ async def test_the_keyboard_drives_while_the_space_bar_is_held(stack: Stack, chr
 async def test_contact_is_felt_as_rumble(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
-        async with console.driving():
+        async with console.driving(FORWARD):
             await console.until("window.testPad.rumbles.length > 0")
         await console.tilt(LEFT_Y, 0)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser, expect
 
-from bench.browsers.console_page import LEFT_Y, RB, START, ConsolePage, open_console
+from bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -216,7 +216,7 @@ async def test_turbo_drives_as_fast_as_the_limits_allow_and_the_settings_move_to
         await (await download.value).save_as(file)
         await page.get_by_role("button", name="Close").click()
         await console.until("s.pad !== null")  # a press that was there before the pad is read again is no new one
-        async with console.driving():
+        async with console.driving(FORWARD):
             event = (await console.stats())["event"]
             await console.until(f"s.event > {event + 8}", 40)
             await console.press(10)

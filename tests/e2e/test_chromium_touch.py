@@ -3,7 +3,7 @@
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import RB, START, STOP_BUTTON, ConsolePage, open_console
+from bench.browsers.console_page import FORWARD, RB, START, STOP_BUTTON, ConsolePage, open_console
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.browser
 
 async def _feel_a_contact(console: ConsolePage) -> None:
     """Drive against a wall until the pad rumbles."""
-    async with console.driving():
+    async with console.driving(FORWARD):
         await console.until("window.testPad.felt.at(-1) === 'dual-rumble'")
 
 
@@ -94,7 +94,7 @@ async def test_triggers_rumble_where_the_pad_has_motors_in_them_and_rumble_can_b
         await console.until_live()
         await page.evaluate("testPad.unplug(); testPad.plug({ effects: ['dual-rumble', 'trigger-rumble'] })")
         await console.until("s.pad && s.pad.ready")
-        async with console.driving():
+        async with console.driving(FORWARD):
             await console.until("window.testPad.felt.at(-1) === 'trigger-rumble'")
         effect = await page.evaluate("testPad.rumbles.at(-1)")
         assert effect["type"] == "trigger-rumble"
