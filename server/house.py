@@ -19,6 +19,7 @@ from server.places import check_place
 from server.silenced_links import SilencedLinks
 from server.state import ConsoleState
 from server.state_dir import StateDirUnusable
+from server.to_the_end import in_thread
 
 __all__ = ["House", "HouseMetrics"]
 
@@ -93,7 +94,7 @@ class House:
                 looked = now
                 if expired or loop.time() >= keep_at:
                     keep_at = loop.time() + KEEP_SECONDS
-                    await asyncio.to_thread(store.keep_time)
+                    await in_thread(store.keep_time)
             except StateDirUnusable as error:
                 log.error("what time it is cannot be written down", detail=str(error))
             except Exception as error:
@@ -107,7 +108,7 @@ class House:
             if not store.unwritten:
                 continue
             try:
-                self.enforce(await asyncio.to_thread(store.keep_ended), CONSOLE)
+                self.enforce(await in_thread(store.keep_ended), CONSOLE)
             except StateDirUnusable as error:
                 log.error("links that were revoked cannot be written down", detail=str(error))
             except Exception as error:

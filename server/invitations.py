@@ -26,6 +26,7 @@ __all__ = ["MAX_SECONDS", "Invitation", "Invitations", "may_invite"]
 MAX_LIVE = 500
 MAX_KEPT = 5000  # with those that ended lately
 FOR_SUPERVISORS = 0.1  # of both: an operator who makes links without end shuts nobody else out
+FAMILY = 0.25  # of both: what an operator's link has invited, and what that has, at most
 MIN_SECONDS = 60.0
 MAX_SECONDS = 366 * 24 * 3600.0
 SHOWN_AFTER_END = 24 * 3600.0  # s that an ended one stays in the list
@@ -126,6 +127,38 @@ class Invitations:
             raise TooManyInvitations(f"there are {live} already; revoke some first")
         if by is not None and len(self._known) >= kept:
             raise TooManyInvitations(f"{kept} are remembered, most of which ended; make one on the command line")
+        if by is not None and by.role != "supervisor":
+            self._check_family(by, now)
+
+    def _check_family(self, by: Identity, now: float) -> None:
+        """The link that the console prints may be everybody's: what is invited with it alone is not bounded here."""
+        own = self._known.get(by.token_id)
+        if own is not None and own.at_start:
+            return
+        founders = self._founders()
+        founder = founders.get(by.token_id, by.token_id)
+        family = [each for key, each in self._known.items() if key != founder and founders[key] == founder]
+        live, kept = int(MAX_LIVE * FAMILY), int(MAX_KEPT * FAMILY)
+        if sum(each.is_good(now) for each in family) >= live:
+            raise TooManyInvitations(f"{live} were made with your link and those that it invited; revoke some first")
+        if len(family) >= kept:
+            raise TooManyInvitations(f"{kept} made with your link are remembered; ask a supervisor for one")
+
+    def _founders(self) -> dict[str, str]:
+        """Of each link the first in its line of inviters that nobody invited, or that the printed link did."""
+        found: dict[str, str] = {}
+        for invitation in self._known.values():
+            line: list[str] = []
+            at = invitation
+            while at.id not in found:
+                line.append(at.id)
+                inviter = self._known.get(at.by_link)
+                if inviter is None or inviter.at_start or inviter.id in line:
+                    found[at.id] = at.by_link if inviter is None and at.by_link else at.id
+                    break
+                at = inviter
+            found.update(dict.fromkeys(line, found[at.id]))
+        return found
 
     def for_start(self, role: Role, seconds: float, now: float) -> Invitation:
         """The link that the console prints: the same one at every start until half of its time is over."""

@@ -7,6 +7,8 @@ from enum import IntEnum
 __all__ = ["MAX_NAME", "clean_name", "escaped", "printable", "unique_names"]
 
 MAX_NAME = 40  # characters
+# Who stopped, where that was no person (`robot_bridge.stop_latch`, `robot_bridge.bridge`).
+_OURS = frozenset({"at the robot", "robot bridge", "console", "robot"})
 MAX_MARKS = 4  # on one character: more are drawn over the lines above and below
 
 # Letters and digits that are drawn like one of a to z in most fonts, by that letter. Small letters and capitals are
@@ -94,8 +96,9 @@ def escaped(text: object) -> str:
 
 
 def clean_name(wanted: str, fallback: str) -> str:
-    """`wanted` as others may see it; `fallback` when nothing of it is left."""
-    return printable(wanted)[:MAX_NAME].strip() or fallback
+    """`wanted` as others may see it; `fallback` when nothing of it is left, or it is what the product calls itself."""
+    name = printable(wanted)[:MAX_NAME].strip()
+    return name if name and _keys(name).isdisjoint(_OURS) else fallback
 
 
 def unique_names(people: Sequence[tuple[str, str]]) -> list[str]:

@@ -2,12 +2,14 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import structlog
 
 from server.kept_stops import KeptStops, kept_stops_place
 from server.stop_presses import Press, StopPresses
+from server.to_the_end import in_thread
 
 __all__ = ["KEPT", "KEPT_IN_MEMORY", "StopKeeper"]
 
@@ -102,7 +104,7 @@ class StopKeeper:
         trouble = ""
         for press in missing:
             try:
-                await asyncio.to_thread(self._files.keep, press)
+                await in_thread(partial(self._files.keep, press))
             except OSError as error:
                 trouble = error.strerror or str(error)
                 self._tell(trouble)
@@ -111,7 +113,7 @@ class StopKeeper:
                 self._tell(trouble)
         for id_ in over:
             try:
-                await asyncio.to_thread(self._files.drop, id_)
+                await in_thread(partial(self._files.drop, id_))
             except OSError as error:
                 trouble = error.strerror or str(error)
             else:

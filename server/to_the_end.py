@@ -1,10 +1,14 @@
 """What must not be cancelled in the middle, because it would leave something open."""
 
 import asyncio
-from collections.abc import Coroutine
-from typing import Any
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
 
-__all__ = ["to_the_end"]
+__all__ = ["in_thread", "to_the_end"]
+
+DISK_SECONDS = 3.0  # then a disk does not answer, and the end waits for it no longer
+
+Result = TypeVar("Result")
 
 
 async def to_the_end(coroutine: Coroutine[Any, Any, object]) -> None:
@@ -18,5 +22,18 @@ async def to_the_end(coroutine: Coroutine[Any, Any, object]) -> None:
     except asyncio.CancelledError:
         await asyncio.wait([task])
         if not task.cancelled():
+            task.exception()  # nobody asks for it any more
+        raise
+
+
+async def in_thread(work: Callable[[], Result]) -> Result:
+    """Do what waits for the disk in a thread. Whoever is cancelled meanwhile is cancelled when it has ended, so that
+    nothing is written after the end of who wanted it; at most `DISK_SECONDS` later."""
+    task = asyncio.ensure_future(asyncio.to_thread(work))
+    try:
+        return await asyncio.shield(task)
+    except asyncio.CancelledError:
+        await asyncio.wait([task], timeout=DISK_SECONDS)
+        if task.done() and not task.cancelled():
             task.exception()  # nobody asks for it any more
         raise

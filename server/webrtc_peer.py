@@ -54,9 +54,11 @@ class WebRtcPeer(Peer):
             channel.once("open", lambda channel=channel: self._channel_offered(channel))
 
     async def _close_transport(self) -> None:
-        with self.contained("close"):
-            await self.ice.close()
-        await close_or_force(self.pc)
+        try:
+            with self.contained("close"):
+                await self.ice.close()
+        finally:  # also where that took longer than an end may
+            await close_or_force(self.pc)
 
     # aiortc's events
 

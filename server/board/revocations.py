@@ -12,6 +12,7 @@ from server.board.messages import Revoked, RevokedLink, pack_news, pack_revoked,
 from server.board.seal import Seal
 from server.invitations import Invitation
 from server.state_dir import StateDirUnusable
+from server.to_the_end import in_thread
 
 __all__ = ["KnownLinks", "RevocationStore", "Revocations"]
 
@@ -119,7 +120,7 @@ class Revocations:
         if not self._links.revoked_elsewhere({link: expires for link, expires in found.items() if link not in known}):
             return None
         try:
-            return await asyncio.to_thread(self._links.keep_revoked_elsewhere)
+            return await in_thread(self._links.keep_revoked_elsewhere)
         except StateDirUnusable as error:
             log.error("links that were revoked elsewhere are forgotten with this run", detail=str(error))
             return []

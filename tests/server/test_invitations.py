@@ -39,6 +39,11 @@ def test_the_command_line_invites_anyone() -> None:
     assert (made.name, made.by, made.expires) == ("supervisor", "", NOW + HOUR)
 
 
+@pytest.mark.parametrize("name", ["At the robot", "robot  bridge", "\uff32obot bridge", "r\u043ebot bridge", "Console"])
+def test_nobody_is_called_what_the_product_calls_itself(name: str) -> None:
+    assert Invitations([]).invite(None, "observer", name, HOUR, NOW).name == "observer"
+
+
 def test_names_are_cleaned() -> None:
     assert Invitations([]).invite(None, "observer", "  A\u202eda\x00 \n", HOUR, NOW).name == "Ada"
 
@@ -64,10 +69,11 @@ def test_they_are_bounded_and_revoked_or_expired_ones_do_not_count() -> None:
     known.invite(None, "observer", "", HOUR, NOW + 2 * HOUR)
 
 
-def test_an_operator_who_makes_links_without_end_leaves_room_for_supervisors() -> None:
-    operator, supervisor = _person("operator"), _person("supervisor", "other")
+def test_operators_who_make_links_without_end_leave_room_for_supervisors() -> None:
+    supervisor = _person("supervisor", "other")
     known = Invitations([])
-    for _ in range(MAX_LIVE - MAX_LIVE // 10):
+    operator = known.for_start("operator", 100 * HOUR, NOW).identity  # printed by the console: it may be everybody's
+    for _ in range(MAX_LIVE - MAX_LIVE // 10 - 1):
         known.invite(operator, "observer", "", HOUR, NOW)
     with pytest.raises(TooManyInvitations):
         known.invite(operator, "observer", "", HOUR, NOW)
@@ -78,6 +84,32 @@ def test_an_operator_who_makes_links_without_end_leaves_room_for_supervisors() -
             with pytest.raises(TooManyInvitations):
                 Invitations(ended[kept - 1 :]).invite(who, "observer", "", HOUR, NOW)
         Invitations(ended[kept:]).invite(who, "observer", "", HOUR, NOW)
+
+
+@pytest.mark.parametrize("printed", [False, True], ids=["from the command line", "by the printed link"])
+def test_a_link_and_all_that_it_invited_make_a_quarter_of_the_links_at_most(printed: bool) -> None:
+    known = Invitations([])
+    inviter = known.for_start("operator", 100 * HOUR, NOW).identity if printed else None
+    one = known.invite(inviter, "operator", "one", 50 * HOUR, NOW).identity
+    other = known.invite(inviter, "operator", "other", 50 * HOUR, NOW).identity
+    at = one
+    for _ in range(MAX_LIVE // 4):  # each invites the next
+        at = known.invite(at, "operator", "", HOUR, NOW).identity
+    for each in (at, one):
+        with pytest.raises(TooManyInvitations, match="your link"):
+            known.invite(each, "observer", "", HOUR, NOW)
+    known.invite(other, "observer", "", HOUR, NOW)
+    known.revoke(None, at.token_id, NOW)
+    known.invite(one, "observer", "", HOUR, NOW)
+
+
+def test_who_invites_and_revokes_without_end_fills_a_quarter_of_what_is_remembered() -> None:
+    known = Invitations([])
+    one = known.invite(None, "operator", "one", 50 * HOUR, NOW).identity
+    for _ in range(MAX_KEPT // 4):
+        known.revoke(one, known.invite(one, "observer", "", HOUR, NOW).id, NOW)
+    with pytest.raises(TooManyInvitations, match="ask a supervisor"):
+        known.invite(one, "observer", "", HOUR, NOW)
 
 
 def test_an_operator_sees_and_revokes_what_it_invited_and_a_supervisor_everything() -> None:
