@@ -17,7 +17,7 @@ from bench.browsers.chromium import chromium_program, running_chromium
 from bench.emulator.namespaces import OPERATOR_ADDRESS, ROBOT_ADDRESS, Namespaces, Side
 from bench.relay.janus import JANUS_READY, janus_command
 
-__all__ = ["ROOM", "Process", "RelayStage", "relay_stage"]
+__all__ = ["FIRST_PORT", "ROOM", "Process", "RelayStage", "relay_stage"]
 
 ROOM = 4711
 START_SECONDS = 60.0

@@ -1,6 +1,7 @@
 """A real Chromium behind console → Janus → Janus, each in its own network; a Janus is killed while it watches."""
 
 from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ import pytest_asyncio
 
 from bench.browsers.console_page import ConsolePage, open_console
 from bench.emulator.errors import NamespacesUnavailable
-from bench.relay.stage import RelayStage, relay_stage
+from bench.relay.stage import FIRST_PORT, RelayStage, relay_stage
 
 # As behind a proxy that lets no WebSocket of the console pass; those of relays do.
 NO_LINES = """
@@ -39,9 +40,12 @@ async def test_pictures_keep_their_events_through_two_relays_and_come_back_when_
     async with (
         stage.chromium("operator") as browser,
         open_console(browser, link, pad=False) as near,
-        open_console(browser, link, pad=False) as far,
+        AsyncExitStack() as pages,
     ):
         await near.until("s.relay !== null && s.streams.overview?.rendered > 3", 40)
+        # Whoever asks before that is sent to the one relay that carries the session by then.
+        await stage.console.line(rf"relay carries the session.*:{FIRST_PORT + 1}\b")
+        far = await pages.enter_async_context(open_console(browser, link, pad=False))
         await far.until("s.relay !== null && s.streams.overview?.rendered > 3", 40)
         before = [await page.stats() for page in (near, far)]
         assert [each["line"] for each in before] == [True, True]
