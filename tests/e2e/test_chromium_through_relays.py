@@ -44,6 +44,7 @@ async def test_pictures_keep_their_events_through_two_relays_and_come_back_when_
     ):
         await near.until("s.relay !== null && s.streams.overview?.rendered > 3", 40)
         # Whoever asks before that is sent to the one relay that carries the session by then.
+        assert stage.console is not None
         await stage.console.line(rf"relay carries the session.*:{FIRST_PORT + 1}\b")
         far = await pages.enter_async_context(open_console(browser, link, pad=False))
         await far.until("s.relay !== null && s.streams.overview?.rendered > 3", 40)
