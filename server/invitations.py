@@ -131,7 +131,10 @@ class Invitations:
             self._check_family(by, now)
 
     def _check_family(self, by: Identity, now: float) -> None:
-        """The link that the console prints may be everybody's: what is invited with it alone is not bounded here."""
+        """Raises TooManyInvitations: the link of `by`, with all that it invited, has its share of them.
+
+        The link that the console prints may be everybody's, and has no share of its own.
+        """
         own = self._known.get(by.token_id)
         if own is not None and own.at_start:
             return
@@ -148,10 +151,10 @@ class Invitations:
         """Of each link the first in its line of inviters that nobody invited, or that the printed link did."""
         found: dict[str, str] = {}
         for invitation in self._known.values():
-            line: list[str] = []
+            line: dict[str, None] = {}
             at = invitation
             while at.id not in found:
-                line.append(at.id)
+                line[at.id] = None
                 inviter = self._known.get(at.by_link)
                 if inviter is None or inviter.at_start or inviter.id in line:
                     found[at.id] = at.by_link if inviter is None and at.by_link else at.id

@@ -27,8 +27,11 @@ async def to_the_end(coroutine: Coroutine[Any, Any, object]) -> None:
 
 
 async def in_thread(work: Callable[[], Result]) -> Result:
-    """Do what waits for the disk in a thread. Whoever is cancelled meanwhile is cancelled when it has ended, so that
-    nothing is written after the end of who wanted it; at most `DISK_SECONDS` later."""
+    """Do `work`, which waits for the disk, in a thread; returns or raises what it does.
+
+    A caller that is cancelled meanwhile ends when the thread has, so that nothing is written after its end; it waits
+    for a disk that does not answer for `DISK_SECONDS` at most.
+    """
     task = asyncio.ensure_future(asyncio.to_thread(work))
     try:
         return await asyncio.shield(task)
