@@ -22,6 +22,7 @@ __all__ = ["StopAsker", "StopKeeper"]
 
 RETRY = 1.0  # s between two tries to write
 MAX_WAITING = 256  # presses that wait for the disk; a further one is answered as not kept, and its repeat waits anew
+LOOK = 5.0  # s between two looks whether what was written is still there
 CLOSE_TIMEOUT = 3.0  # s for the disk when the bridge ends; after that the next start finds that it did not end in order
 
 _logger = logging.getLogger(__name__)
@@ -93,7 +94,7 @@ class StopKeeper:
     def answer(self, asker: StopAsker, press: str, number: int) -> None:
         """Say that the press was taken: at once when it is on the disk already, or never will be."""
         answer, version = StopTaken(press=press, number=number), self._latch.version
-        if version == self._on_disk:
+        if version == self._on_disk and not self._trouble:
             asker.send(answer)
         elif self._store is None or self._trouble or len(self._waiting) >= MAX_WAITING:
             asker.send(StopTaken(press=press, number=number, kept=False))
@@ -129,22 +130,27 @@ class StopKeeper:
 
     async def _run(self, store: StopStore) -> None:
         while True:
-            await self._wake.wait()
-            self._wake.clear()
-            while self._on_disk != self._latch.version:
+            await self._wait(LOOK)
+            gone = not await self._in_thread(store.is_there)
+            while gone or self._on_disk != self._latch.version:
                 version = self._latch.version
                 try:
                     await self._write(store, ended=False)
                 except OSError as error:
                     self._note(str(error))
                     self._tell(version, str(error))
-                    with suppress(TimeoutError):
-                        async with asyncio.timeout(RETRY):
-                            await self._wake.wait()
-                    self._wake.clear()
+                    await self._wait(RETRY)
                     continue
+                gone = False
                 self._note("")
                 self._tell(version, "")
+
+    async def _wait(self, seconds: float) -> None:
+        """Returns when something may have changed, or after so long."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self._wake.wait()
+        self._wake.clear()
 
     async def _write(self, store: StopStore, *, ended: bool) -> None:
         version, record = self._latch.version, self._latch.record

@@ -199,7 +199,9 @@ class StopLatch:
 
     def written(self, version: int, error: str = "") -> WriteOutcome:
         """The record of `version` is on the disk, or could not be written, for a reason in words."""
-        if not error:
+        if error:
+            self._written = min(self._written, version - 1)  # also what was on the disk and is gone from there
+        else:
             self._written = max(self._written, version)
         if self._resetting is None or version < self._resetting[1]:
             return None

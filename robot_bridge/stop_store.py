@@ -6,6 +6,7 @@ is near yet, and is locked while a bridge runs. A bridge that hung leaves a thir
 docs/robot-link.md, "On the robot's disk", says what follows from them.
 """
 
+import errno
 import fcntl
 import os
 import time
@@ -143,9 +144,13 @@ class StopStore:
     def write(self, kept: Kept) -> None:
         """Replace the latch in one step; when this returns it has reached the disk.
 
+        A directory that somebody has removed meanwhile is made again.
+
         Raises:
             OSError: it has not, or nobody knows.
         """
+        if not self._has_directory():
+            self._take_again()
         path = self._directory / STOP_FILE
         with suppress(FileNotFoundError):
             path.with_suffix(".new").unlink()
@@ -158,6 +163,34 @@ class StopStore:
         os.replace(path.with_suffix(".new"), path)
         (self._directory / NOTE_FILE).unlink(missing_ok=True)  # the latch says it now
         self._sync_directory()
+
+    def is_there(self) -> bool:
+        """Whether what was written is still where the next bridge looks for it."""
+        return self._has_directory() and (self._directory / STOP_FILE).exists()
+
+    def _has_directory(self) -> bool:
+        """Whether it is still the one that this bridge has locked."""
+        try:
+            return os.path.samestat(os.stat(self._directory / NUMBERS_FILE), os.fstat(self._lock))
+        except OSError:
+            return False
+
+    def _take_again(self) -> None:
+        """Raises OSError: the directory cannot be made, or another bridge uses what stands there now."""
+        reserved = os.pread(self._lock, RESERVED_BYTES, 0)
+        self._directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        fresh = os.open(self._directory / NUMBERS_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(fresh, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            write_all(fresh, reserved)
+            os.ftruncate(fresh, len(reserved))
+        except OSError as error:
+            os.close(fresh)
+            if isinstance(error, BlockingIOError):
+                raise OSError(errno.EBUSY, f"another bridge has taken {self._directory}") from error
+            raise
+        self.close()
+        self._lock = fresh
 
     def note_end(self, reason: str) -> None:
         """Say to the next bridge why this one does not end in order. From any thread; `write` takes it back.

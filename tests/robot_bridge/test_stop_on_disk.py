@@ -156,6 +156,27 @@ async def test_a_stop_that_cannot_be_written_holds_says_so_and_is_written_later(
         assert (await driver.next(StopTaken)).kept
 
 
+async def test_a_stop_whose_directory_is_removed_is_written_again_or_everybody_is_told_that_it_is_not_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robot_bridge.stop_keeper.LOOK", 0.05)
+    directory = tmp_path / "stops" / "robot"
+    async with bridge_in(directory) as bridge, operator(bridge) as driver:
+        driver.link.send(Stop(press=PRESS))
+        assert (await driver.next(StopTaken)).kept
+        await driver.heard(lambda feedback: feedback.stop.kept)
+        (tmp_path / "stops").rename(tmp_path / "elsewhere")
+        (tmp_path / "stops").write_text("no directory")
+        await driver.heard(lambda feedback: feedback.stop.stopped and not feedback.stop.kept)
+        driver.link.send(Stop(press=PRESS))
+        assert not (await driver.next(StopTaken)).kept
+        (tmp_path / "stops").unlink()
+        await driver.heard(lambda feedback: feedback.stop.kept)
+        await driver.reset()
+    async with bridge_in(directory) as bridge, operator(bridge, armed=False) as driver:
+        assert (driver.feedback.stop.stopped, driver.feedback.stop.press) == (False, PRESS)
+
+
 async def test_a_reset_takes_effect_only_when_it_is_on_the_disk(tmp_path: Path, disk: Disk) -> None:
     async with bridge_in(tmp_path) as bridge, operator(bridge) as driver:
         number = await stop_for_a_second(driver)

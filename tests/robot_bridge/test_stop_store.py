@@ -1,6 +1,7 @@
 """What a bridge begins with, whatever it finds on its disk; and that what it writes is found again."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,43 @@ def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(StateDirUnusable, match="file"):
         StopStore(tmp_path / "file" / "robot").open()
+
+
+@pytest.mark.parametrize("file", ["", "numbers.json", "stop.json"])
+def test_a_directory_or_file_that_somebody_removes_meanwhile_is_made_again_with_its_lock(
+    tmp_path: Path, file: str
+) -> None:
+    directory = tmp_path / "stops" / "planar"
+    store = StopStore(directory)
+    store.open()
+    store.reserve(STOPPED.number)
+    store.write(Kept(latch=StopRecord(), ended=False))
+    assert store.is_there()
+    if file:
+        (directory / file).unlink()
+    else:
+        shutil.rmtree(tmp_path / "stops")
+    assert not store.is_there()
+    store.write(Kept(latch=STOPPED, ended=False))
+    assert store.is_there()
+    with pytest.raises(StateDirInUse):
+        found(directory)
+    store.close()
+    start = start_of(found(directory), WALL)
+    assert start.record == STOPPED
+    assert start.numbers_after > STOPPED.number + 1000, "the reserve is there again too"
+
+
+def test_a_directory_that_another_bridge_has_taken_meanwhile_is_left_to_it(tmp_path: Path) -> None:
+    store, other = StopStore(tmp_path / "planar"), StopStore(tmp_path / "planar")
+    store.open()
+    (tmp_path / "planar").rename(tmp_path / "elsewhere")
+    other.open()
+    with pytest.raises(OSError, match="another bridge has taken"):
+        store.write(Kept(latch=STOPPED, ended=True))
+    assert not (tmp_path / "planar" / "stop.json").exists()
+    store.close()
+    other.close()
 
 
 def test_what_is_written_is_whole_or_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
