@@ -7,16 +7,21 @@ import ssl
 from collections.abc import Callable
 from functools import partial
 
-from robot_bridge.applicants import Applicants
+from robot_bridge.applicants import Applicants, address_group
 
 __all__ = ["LinkAcceptor", "listening_socket"]
 
 HANDSHAKE_TIMEOUT = 2.0  # s
-SILENCE = 2.0  # s that a TLS client may take for its first byte
+SILENCE = 4.0  # s that a TLS client may take for its first record
 PAUSE = 0.1  # s, when the system has no descriptor left
 BACKLOG = 128
 RATE = 1000.0  # connections accepted per second; the others wait in the kernel, and cost the robot nothing
 BURST = 100
+HANDSHAKE_RATE = 100.0  # TLS handshakes a second, each a millisecond of the loop, and as many of known addresses
+HANDSHAKE_BURST = 20
+MAX_KNOWN = 64  # addresses whose links were admitted, the newest
+TLS_HEADER = 5  # bytes of a TLS record, of which the last two are its length (RFC 8446 5.1)
+MAX_HELLO = 16 * 1024  # bytes of a record
 
 
 def listening_socket(host: str, port: int) -> socket.socket:
@@ -32,10 +37,30 @@ def listening_socket(host: str, port: int) -> socket.socket:
     return socket.create_server((host, port), family=family, backlog=BACKLOG)
 
 
+class _Pace:
+    """`rate` a second, `burst` at once; the others wait in the order in which they came."""
+
+    def __init__(self, rate: float, burst: float) -> None:
+        self._rate, self._burst = rate, burst
+        self._tokens = burst
+        self._filled = 0.0  # s, when tokens were added last
+        self._turn = asyncio.Lock()
+
+    async def take(self) -> None:
+        async with self._turn:
+            now = asyncio.get_running_loop().time()
+            self._tokens = min(self._burst, self._tokens + (now - self._filled) * self._rate)
+            self._filled = now
+            if self._tokens < 1.0:
+                await asyncio.sleep((1.0 - self._tokens) / self._rate)
+            self._tokens -= 1.0
+
+
 class LinkAcceptor:
     """Takes over a listening socket. `close` ends it and what is still shaking hands.
 
-    TLS begins when the first byte has come: a connection that says nothing costs a descriptor and no more.
+    TLS begins when the client's first record is there, whole: a connection that says less costs a descriptor and no
+    more. Addresses from which a link was admitted before do not wait for the handshakes of others.
     """
 
     def __init__(
@@ -47,7 +72,7 @@ class LinkAcceptor:
         *,
         max_handshakes: int,
     ) -> None:
-        """`failed`: a TLS handshake did. `max_handshakes`: that wait for a first byte, and as many that go on."""
+        """`failed`: a TLS handshake did. `max_handshakes`: that wait for a first record, and as many that go on."""
         self._listener = listener
         self._context = context
         self._factory = factory
@@ -55,12 +80,22 @@ class LinkAcceptor:
         self._silent: Applicants[asyncio.Task[None]] = Applicants(max_handshakes)
         self._shaking: Applicants[asyncio.Task[None]] = Applicants(max_handshakes)
         self._accepting: asyncio.Task[None] | None = None
-        self._tokens = float(BURST)
-        self._filled = 0.0  # s, when tokens were added last
+        self._accepts = _Pace(RATE, BURST)
+        self._strangers = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
+        self._acquainted = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
+        self._known: dict[str, None] = {}  # address groups, oldest first
 
     def start(self) -> None:
         self._listener.setblocking(False)
         self._accepting = asyncio.get_running_loop().create_task(self._accept(), name="link acceptor")
+
+    def admitted(self, address: str) -> None:
+        """A link from there was."""
+        group = address_group(address)
+        self._known.pop(group, None)
+        self._known[group] = None
+        if len(self._known) > MAX_KNOWN:
+            del self._known[next(iter(self._known))]
 
     async def close(self) -> None:
         """May be called again."""
@@ -76,7 +111,7 @@ class LinkAcceptor:
         loop = asyncio.get_running_loop()
         async with asyncio.TaskGroup() as tasks:
             while True:
-                await self._take_token(loop.time())
+                await self._accepts.take()
                 try:
                     connection, address = await loop.sock_accept(self._listener)
                 except OSError:
@@ -88,13 +123,6 @@ class LinkAcceptor:
                 task.add_done_callback(self._shaking.remove)
                 if self._context is not None:
                     self._bound(self._silent, task, address[0])
-
-    async def _take_token(self, now: float) -> None:
-        self._tokens = min(float(BURST), self._tokens + (now - self._filled) * RATE)
-        self._filled = now
-        if self._tokens < 1.0:
-            await asyncio.sleep((1.0 - self._tokens) / RATE)
-        self._tokens -= 1.0
 
     def _bound(self, applicants: Applicants[asyncio.Task[None]], task: asyncio.Task[None], address: str) -> None:
         gone = applicants.add(task, address)
@@ -108,11 +136,12 @@ class LinkAcceptor:
             if self._context is None:
                 await loop.connect_accepted_socket(self._factory, connection)
                 return
-            await _first_byte(connection)
+            await _first_record(connection)
             task = asyncio.current_task()
             assert task is not None  # this is one
             self._silent.remove(task)
             self._bound(self._shaking, task, address)
+            await (self._acquainted if address_group(address) in self._known else self._strangers).take()
             await loop.connect_accepted_socket(
                 self._factory, connection, ssl=self._context, ssl_handshake_timeout=HANDSHAKE_TIMEOUT
             )
@@ -133,8 +162,19 @@ def _close_if_cancelled(connection: socket.socket, task: asyncio.Task[None]) -> 
             connection.close()
 
 
-async def _first_byte(connection: socket.socket) -> None:
-    """Raises TimeoutError when none comes in time."""
+async def _first_record(connection: socket.socket) -> None:
+    """Returns when a whole TLS record can be read. Raises OSError when there is none in time."""
+    async with asyncio.timeout(SILENCE):
+        await _readable(connection, TLS_HEADER)
+        header = connection.recv(TLS_HEADER, socket.MSG_PEEK)
+        length = int.from_bytes(header[3:])
+        if len(header) < TLS_HEADER or length > MAX_HELLO:
+            raise ConnectionAbortedError("no TLS")
+        await _readable(connection, TLS_HEADER + length)
+
+
+async def _readable(connection: socket.socket, count: int) -> None:
+    """Returns when so many bytes are there, or the connection has ended."""
     loop = asyncio.get_running_loop()
     came = loop.create_future()
 
@@ -143,9 +183,10 @@ async def _first_byte(connection: socket.socket) -> None:
         if not came.done():
             came.set_result(None)
 
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)
     loop.add_reader(connection, readable)
     try:
-        async with asyncio.timeout(SILENCE):
-            await came
+        await came
     finally:
         loop.remove_reader(connection)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, 1)

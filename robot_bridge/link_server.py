@@ -230,6 +230,8 @@ class LinkServer:
             return Goodbye(error="taken", detail=f"kept for {self._kept_for}, whose link broke, for {left:.0f} s more")
         self._forget_applicant(peer)
         self._known.add(peer)
+        if self._acceptor is not None:
+            self._acceptor.admitted(peer.address)
         match hello.role:
             case "operator":
                 self._operator = peer

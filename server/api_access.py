@@ -25,6 +25,7 @@ Caller = Annotated[Right, Depends(authorized)]
 
 Result = TypeVar("Result")
 DEFAULT_SECONDS = 8 * 3600.0
+NOTED = "the link has ended, for the next start too; the list of links is written when the disk takes it"
 UNWRITTEN = "the link has ended here; that is written down when the disk takes it, and not known to a start before that"
 MAX_RECORDS = 500  # of the audit in one answer
 MAX_ENDED = 500  # links that have ended, in one answer, besides all that are good
@@ -90,11 +91,14 @@ async def invite(request: Request, caller: Caller) -> Response:
         raise Silenced("a supervisor has silenced the STOP of your link; until that ends it invites nobody")
     robots = _wanted_robots(here, wanted)
     by = caller.actor
-    made = await _update(
-        here,
-        caller.identity,
-        lambda known, by, now: known.invite(by, wanted.role, wanted.name, wanted.seconds, now, robots),
-    )
+    try:
+        made = await _update(
+            here,
+            caller.identity,
+            lambda known, by, now: known.invite(by, wanted.role, wanted.name, wanted.seconds, now, robots),
+        )
+    except StateDirUnusable as error:
+        raise StateUnavailable(f"nothing was changed: {error.reason}") from error
     here.house.enforce([made], by)
     base = here.settings.public_url or str(request.base_url).rstrip("/")
     if made.robots == (here.robot,):
@@ -113,12 +117,21 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
         here.house.enforce([], by)
     try:
         revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
-    except StateUnavailable as error:
+    except StateDirUnusable as error:
         here.state.invitations.write_later(invitation_id)
         here.console.audit.record("revocation", by, "not on the disk yet", invitation_id)
-        raise StateUnavailable(f"{UNWRITTEN}; {error.detail}") from error
+        raise StateUnavailable(f"{await _noted(here)}: {error.reason}") from error
     here.house.enforce(revoked, by)
     return _json(InvitationList(invitations=_infos(here, revoked), may_invite=[]))
+
+
+async def _noted(here: Services) -> str:
+    """What is known of a revocation that the list of links did not take, in words."""
+    try:
+        await asyncio.to_thread(here.state.invitations.note_ended)
+    except StateDirUnusable:
+        return UNWRITTEN
+    return NOTED
 
 
 @router.get("/api/audit")
@@ -137,17 +150,18 @@ async def audit(
 
 
 async def _update(here: Services, by: Identity, change: Callable[[Invitations, Identity, float], Result]) -> Result:
-    """What `by` changes. Waits for the disk in a thread, and looks at the link of `by` when its turn has come."""
+    """What `by` changes. Waits for the disk in a thread, and looks at the link of `by` when its turn has come.
+
+    Raises:
+        StateDirUnusable: the disk does not take it.
+    """
     store = here.state.invitations
 
     def work(known: Invitations) -> Result:
         store.check(by, known)
         return change(known, by, store.now())
 
-    try:
-        return await asyncio.to_thread(store.update, work)
-    except StateDirUnusable as error:
-        raise StateUnavailable(f"nothing was changed: {error.reason}") from error
+    return await asyncio.to_thread(store.update, work)
 
 
 def _wanted_robots(here: Services, wanted: InvitationRequest) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 import msgspec
@@ -23,6 +23,8 @@ log = structlog.get_logger(__name__)
 FILE = "invitations.json"
 ELSEWHERE = "revoked-elsewhere.json"
 SEEN = "newest-time.json"
+ASIDE = "revoked-lately"
+ASIDE_BYTES = 4096  # ids of links, one a line
 BEHIND_SECONDS = 60.0  # that a clock may be behind the newest time without a word
 HANGS_AFTER = 10.0  # s that a change may take; then nobody knows what other processes have revoked meanwhile
 MAX_ELSEWHERE = 5000  # links that other consoles revoked; those that would end first are forgotten first
@@ -74,7 +76,9 @@ class InvitationStore:
         self._elsewhere = self._read_elsewhere()
         self._revoked = self._known.revoked()
         self._ended: set[str] = set()  # revoked by this process, whether or not the disk has taken it
-        self._unwritten: set[str] = set()  # of these, what the disk has to be asked again for
+        self._unwritten = self._read_aside()  # of these, what the disk has to be asked again for
+        for each in self._unwritten:
+            self._end_here(each, None)
         if seen > time.time() + BEHIND_SECONDS:
             log.warning("this machine's clock is behind; links end by the newest time that was seen", seen=seen)
 
@@ -93,6 +97,7 @@ class InvitationStore:
         """Blocks: write down what time it is, for the next run."""
         with self._alone():
             self._write_seen()
+            self._directory.set_aside(ASIDE, ASIDE_BYTES)
 
     @property
     def known(self) -> Invitations:
@@ -111,6 +116,9 @@ class InvitationStore:
 
         Whether it is known here; a link that another process has just made is found by `update` alone.
         """
+        return self._end_here(invitation_id, by)
+
+    def _end_here(self, invitation_id: str, by: Identity | None) -> bool:
         try:
             ended = Invitations(self._known.all).revoke(by, invitation_id, self.now())
         except NotFound:
@@ -122,6 +130,20 @@ class InvitationStore:
         """The disk did not take that this link was revoked: `keep_ended` is to try again."""
         self._unwritten.add(invitation_id)
 
+    def note_ended(self) -> None:
+        """Blocks: write what the disk did not take to the place that was set aside for it, for the next start."""
+        with self._alone():
+            self._write_aside(self._read_aside() | self._unwritten)
+
+    def _write_aside(self, links: Collection[str]) -> None:
+        lines = "".join(f"{each}\n" for each in sorted(links)).encode()
+        if len(lines) > ASIDE_BYTES:
+            raise StateDirUnusable(self._directory.path / ASIDE, "too many links were revoked while the disk was full")
+        self._directory.overwrite(ASIDE, lines.ljust(ASIDE_BYTES, b"\n"))
+
+    def _read_aside(self) -> set[str]:
+        return set((self._directory.read(ASIDE) or b"").replace(b"\0", b"").decode(errors="replace").split())
+
     @property
     def unwritten(self) -> bool:
         """Whether a link was revoked that the disk does not know of yet."""
@@ -132,6 +154,8 @@ class InvitationStore:
         wanted = frozenset(self._unwritten)
         ended = self.update(lambda invitations: _end(invitations, wanted, self.now()))
         self._unwritten -= wanted
+        with self._alone(), suppress(StateDirUnusable):  # a link that is noted there for longer has ended all the same
+            self._write_aside(self._read_aside() - wanted)
         return ended
 
     def has_ended(self, link: str, expires: float) -> bool:

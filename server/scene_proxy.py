@@ -51,6 +51,7 @@ async def client(request: Request, ticket: str) -> Response:
     _check_query(request, ticket)
     scene = here.scene_or_error()
     await scene.open()
+    here.access.verify_ticket(ticket)  # its link may have ended meanwhile
     headers = {"Cache-Control": "no-store", "Vary": "Accept-Encoding"}
     if "gzip" not in request.headers.get("accept-encoding", ""):
         return Response(scene.page.plain, media_type="text/html", headers=headers)
@@ -92,6 +93,7 @@ async def stream(websocket: WebSocket, ticket: str) -> None:
             check_origin(websocket.headers, here.settings.allowed_origins)
         scene = here.scene_or_error()
         await scene.open()
+        here.access.verify_ticket(ticket)  # its link may have ended meanwhile
         with scene.viewer(valid):
             await _join(websocket, scene, valid)
     except ConsoleError as error:

@@ -94,6 +94,20 @@ class StateDir:
         with _named(path):
             os.replace(self._temporary(data), path)
 
+    def set_aside(self, name: str, size: int) -> None:
+        """A file of so many bytes, for what `overwrite` has to put on a disk that is full by then."""
+        if self.version(name) is None:
+            self.write(name, bytes(size))
+
+    def overwrite(self, name: str, data: bytes) -> None:
+        """In place, which takes no room; a crash meanwhile may leave a part. What was set aside is to be as long."""
+        path = self.path / name
+        with _named(path):
+            handle = os.open(path, os.O_WRONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+            with open(handle, "wb", buffering=0) as file:
+                file.write(data)
+                os.fsync(handle)
+
     def version(self, name: str) -> tuple[int, int] | None:
         """Another one whenever the file was replaced; None when there is no such file."""
         path = self.path / name

@@ -134,3 +134,17 @@ async def test_a_console_gets_its_link_every_time(tls: bool, host: str, says: by
                 await asyncio.sleep(0.01)
         for _ in range(10):
             assert await _opens(path, trust)
+
+
+async def test_a_console_that_was_admitted_comes_back_while_strangers_take_all_handshakes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robot_bridge.link_acceptor.HANDSHAKE_RATE", 0.001)
+    monkeypatch.setattr("robot_bridge.link_acceptor.HANDSHAKE_BURST", 1)
+    authority = Authority(tmp_path)
+    trust = LinkTls(authority=authority.certificate).client_context()
+    settings = BridgeSettings(port=0, secret=SECRET, tls=LinkTls(certificate=authority.issue("bridge")))
+    async with Bridge(RecordingRobot(), settings) as bridge:
+        for _ in range(2):
+            async with RobotLink(*bridge.address, "operator", secret=SECRET, tls=trust) as link:
+                assert link.connected

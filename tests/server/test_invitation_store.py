@@ -12,7 +12,7 @@ from server.access import Identity
 from server.errors import LinkExpired, LinkRevoked
 from server.invitation_store import ELSEWHERE, FILE, InvitationStore
 from server.invitations import Invitation, Invitations
-from server.state_dir import StateDamaged, StateDir
+from server.state_dir import StateDamaged, StateDir, StateDirUnusable
 
 HOUR = 3600.0
 
@@ -295,3 +295,41 @@ def test_a_change_that_does_not_end_is_trouble_after_a_while_since_nobody_knows_
         made.result()
     store.refresh()
     assert not _trouble(store)
+
+
+def test_a_link_that_was_revoked_while_the_disk_was_full_stays_revoked_after_a_crash(
+    directory: StateDir, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = InvitationStore(directory)
+    boss = store.update(lambda known: known.invite(None, "supervisor", "Boss", HOUR, time.time())).identity
+    made = store.update(lambda known: known.invite(None, "operator", "Mallory", HOUR, time.time()))
+    below = store.update(lambda known: known.invite(made.identity, "observer", "Eve", HOUR / 2, time.time()))
+    store.keep_time()
+
+    def full(*_: object) -> None:
+        raise StateDirUnusable(directory.path, "No space left on device")
+
+    with monkeypatch.context() as disk:
+        disk.setattr(StateDir, "write", full)
+        store.end_at_once(boss, made.id)
+        with pytest.raises(StateDirUnusable):
+            store.update(lambda known: known.revoke(boss, made.id, time.time()))
+        store.write_later(made.id)
+        store.note_ended()
+        fresh = InvitationStore(directory)
+        assert (fresh.is_revoked(made.id), fresh.is_revoked(below.id)) == (True, True)
+        assert not fresh.is_revoked(boss.token_id)
+    assert {each.id for each in fresh.keep_ended()} == {made.id, below.id}
+    assert InvitationStore(directory).known.revoked() == {made.id, below.id}
+    assert not InvitationStore(directory).unwritten, "what was set aside is free again"
+
+
+def test_more_than_was_set_aside_for_revocations_is_not_said_to_be_noted(directory: StateDir) -> None:
+    store = InvitationStore(directory)
+    with pytest.raises(StateDirUnusable):
+        store.note_ended()  # nothing was set aside yet
+    store.keep_time()
+    for number in range(300):
+        store.write_later(f"{number:016x}")
+    with pytest.raises(StateDirUnusable, match="too many"):
+        store.note_ended()

@@ -1,5 +1,6 @@
 """Whatever serving one peer raises ends that peer, by name, counted and logged once; nobody else notices."""
 
+import asyncio
 import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -215,6 +216,23 @@ async def _everything_is_given_back(rig: Rig, others: list[_Viewer], sockets: in
     await eventually(lambda: _sockets() <= sockets)
     for other in others:
         await other.goes_on()
+
+
+async def test_a_peer_whose_ice_takes_too_long_to_close_leaves_no_connection_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("server.peer.CLOSE_TIMEOUT", 0.2)
+
+    async def hang() -> None:
+        await asyncio.Event().wait()
+
+    async with running_rig() as rig, _watching(rig, "observer"):
+        (peer,) = (each for each in rig.services.console.peers if isinstance(each, WebRtcPeer))
+        monkeypatch.setattr(peer.ice, "close", hang)
+        transport = peer.pc.getTransceivers()[0].receiver.transport
+        peer.end("the test ends it")
+        await eventually(lambda: not list(rig.services.console.peers))
+        assert (peer.pc.connectionState, transport.transport.state) == ("closed", "closed")
 
 
 async def test_a_fault_in_any_stage_of_one_peer_of_ten_ends_that_one_alone() -> None:

@@ -135,6 +135,34 @@ async def test_a_viewer_whose_link_is_revoked_is_shown_nothing_more() -> None:
             await connect(address, subprotocols=[VERSION], proxy=None)
 
 
+async def test_whoever_is_revoked_while_the_scene_starts_gets_no_page_ticket_or_stream(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with running_rig(scene=True) as rig:
+        invited = await rig.http.post("/api/invitations", headers=rig.token("operator"), json={})
+        token = {"Authorization": f"Bearer {invited.json()['link'].partition('#token=')[2]}"}
+        path = (await rig.http.post("/api/scene", headers=token)).json()["path"]
+        waiting, starts = asyncio.Semaphore(0), asyncio.Event()
+
+        async def slow() -> None:
+            waiting.release()
+            await starts.wait()
+
+        monkeypatch.setattr(rig.services.scene_or_error(), "open", slow)
+        connecting = connect(path.split("websocket=")[1].split("&")[0], subprotocols=[VERSION], proxy=None)
+        stream = asyncio.create_task(connecting.__aenter__())
+        asked = [asyncio.create_task(each) for each in (rig.http.get(path), rig.http.post("/api/scene", headers=token))]
+        async with asyncio.timeout(PATIENCE):
+            for _ in range(3):
+                await waiting.acquire()
+            await rig.http.delete(f"/api/invitations/{invited.json()['id']}", headers=rig.token("supervisor"))
+            starts.set()
+            assert [(await each).json()["error"] for each in asked] == ["link_revoked", "link_revoked"]
+            with pytest.raises(websockets.InvalidStatus):
+                await stream
+        assert rig.count("lockstep_scene_viewers") == 0
+
+
 async def _scene_with(rig: Rig, token: dict[str, str]) -> str:
     path: str = (await rig.http.post("/api/scene", headers=token)).json()["path"]
     return path.split("websocket=")[1].split("&")[0]
