@@ -50,7 +50,7 @@ class People:
     def left(self, peer: Peer) -> None:
         if not peer.thumbnail:
             self._audit.record("left", peer.actor, peer.ended)
-            if all(each.thumbnail or each is peer for each in self._peers):
+            if all(each.thumbnail or each.ended for each in self._peers):  # one that closes is there no more
                 self._board.left_empty(time.monotonic())
 
     def welcome(self, peer: Peer) -> None:
