@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 ARGS ?=
 # A file's tests share what they start. Most wait more than they compute, so that there are more workers than cores.
 # Browsers take what there is: their tests run after the others.
-WORKERS ?= 4
+WORKERS ?= 6
 BROWSERS ?= 2
 PARALLEL := --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.

@@ -12,8 +12,9 @@ from playwright.async_api import Browser, BrowserContext, Page, async_playwright
 __all__ = ["PAD", "chromium_program", "missed_in_page", "open_page", "running_chromium"]
 
 PAD = Path(__file__).with_name("test_pad.js")
-# The switch replaces Playwright's own, whose list these are, but for the last two: with them every window loads two
-# pages for suggestions below an address bar that nobody sees, which costs more than the page that is tested.
+# The switch replaces Playwright's own, whose list these are, but for the last three. With WebUIOmnibox… every window
+# loads two pages for suggestions below an address bar that nobody sees, which costs more than the page that is tested;
+# with SpareRenderer… it starts a process for a page that nobody opens.
 DISABLED_FEATURES = (
     "AvoidUnnecessaryBeforeUnloadCheckSync",
     "DestroyProfileOnBrowserClose",
@@ -30,6 +31,7 @@ DISABLED_FEATURES = (
     "PreconnectToSearch",
     "WebUIOmniboxPopup",
     "WebUIOmniboxAimPopup",
+    "SpareRendererForSitePerProcess",
 )
 FLAGS = [
     "--no-sandbox",

@@ -10,8 +10,10 @@ from playwright.async_api import Browser, Page
 
 from bench.browsers.chromium import missed_in_page, open_page
 
-__all__ = ["FORWARD", "LEFT_X", "LEFT_Y", "RB", "START", "ConsolePage", "open_console"]
+__all__ = ["FORWARD", "LEFT_X", "LEFT_Y", "RB", "SMALL_WINDOW", "START", "ConsolePage", "open_console"]
 
+# The least that shows all of the page at once: where the processor draws, each pixel of the window costs.
+SMALL_WINDOW = (1024, 640)
 START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
 LEFT_X, LEFT_Y, RIGHT_X = 0, 1, 2
 FORWARD = MappingProxyType({LEFT_Y: -1.0})
@@ -219,7 +221,13 @@ class ConsolePage:
 
 @asynccontextmanager
 async def open_console(
-    browser: Browser, link: str, *, width: int = 1280, height: int = 800, pad: bool = True, touch: bool = False
+    browser: Browser,
+    link: str,
+    *,
+    width: int = SMALL_WINDOW[0],
+    height: int = SMALL_WINDOW[1],
+    pad: bool = True,
+    touch: bool = False,
 ) -> AsyncIterator[ConsolePage]:
     async with open_page(browser, link, width=width, height=height, pad=pad, touch=touch) as page:
         yield ConsolePage(page)

@@ -142,7 +142,7 @@ async def killings(folder: Path, count: int, seconds: float) -> list[Killing]:
         driver = await stage.add_driver()
         async with (
             stage.chromium("operator") as browser,
-            open_console(browser, stage.links["observer"], pad=False) as page,
+            open_console(browser, stage.links["observer"], width=1280, height=800, pad=False) as page,
         ):
             for _ in range(count):
                 await _watching(page)

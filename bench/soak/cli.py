@@ -24,7 +24,7 @@ MUST_BE_ZERO = (
 
 
 def soak_command(
-    minutes: Annotated[float, typer.Option(min=1, max=600, help="How long; 30 is the full soak.")] = 30,
+    minutes: Annotated[float, typer.Option(min=0.5, max=600, help="How long; 30 is the full soak.")] = 30,
     seed: Annotated[int, typer.Option(help="Of the plan of what goes wrong.")] = 1,
     observers: Annotated[int, typer.Option(min=1, max=100, help="Headless ones, that come and go.")] = 20,
     json_file: Annotated[

@@ -22,7 +22,7 @@ from tests.support.stack import Stack, running_stack
 
 HERE = Path(__file__).parent
 # Pictures cost the most of all, here and in the browser. Tests that judge them have all of them: `full_rate`.
-HALF_RATE = {"LOCKSTEP_MEDIA__VIDEO_FRAMES_PER_SECOND": "15"}
+RATE, HALF = "LOCKSTEP_MEDIA__VIDEO_FRAMES_PER_SECOND", "15"
 
 expect.set_options(timeout=30_000)  # ms; a page shows what it hears when a busy machine lets it draw
 
@@ -34,10 +34,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(on_one_loop, append=False)
 
 
+@pytest.fixture(autouse=True)
+def half_rate(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every console that the test starts takes half of the pictures, unless the test judges them."""
+    if not _wants_all(request):
+        monkeypatch.setenv(RATE, HALF)
+
+
 @pytest_asyncio.fixture(loop_scope="session")
-async def own_stack(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator[Stack]:
+async def own_stack(half_rate: None, tmp_path: Path) -> AsyncIterator[Stack]:
     """A console of the test's own, which it may break."""
-    async with running_stack(tmp_path, settings={} if _wants_all(request) else HALF_RATE) as running:
+    async with running_stack(tmp_path) as running:
         yield running
 
 
@@ -58,7 +65,8 @@ class StackKeeper:
         """Nobody is there, the robot is at rest, near where it starts and not stopped."""
         if self._stack is None or self._full_rate != full_rate or not await as_new(self._stack):
             await self.close()
-            started = running_stack(self._directories.mktemp("shared"), settings={} if full_rate else HALF_RATE)
+            settings = {} if full_rate else {RATE: HALF}
+            started = running_stack(self._directories.mktemp("shared"), settings=settings)
             self._stack = await self._running.enter_async_context(started)
             self._full_rate = full_rate
         return await self._stack.from_here()

@@ -8,7 +8,7 @@ from typing import Any
 from playwright.async_api import Browser
 
 from bench.browsers.chromium import PAD
-from bench.browsers.console_page import ConsolePage
+from bench.browsers.console_page import SMALL_WINDOW, ConsolePage
 
 __all__ = ["GRAPHICS", "open_on_machine"]
 
@@ -40,8 +40,8 @@ async def open_on_machine(
     renderer: str | None = GRAPHICS,
     downlink: float = 10.0,
     save_data: bool = False,
-    width: int = 1366,
-    height: int = 768,
+    width: int = SMALL_WINDOW[0],
+    height: int = SMALL_WINDOW[1],
     touch: bool = False,
     scripts: Sequence[str] = (),
     **context_options: Any,

@@ -8,7 +8,7 @@ from typing import Any
 from playwright.async_api import Browser
 
 from bench.browsers.chromium import PAD
-from bench.browsers.console_page import ConsolePage
+from bench.browsers.console_page import SMALL_WINDOW, ConsolePage
 
 __all__ = ["TAMPER", "alter", "open_tampered", "say"]
 
@@ -24,7 +24,13 @@ ALTER = """(change) => {
 
 @asynccontextmanager
 async def open_tampered(
-    browser: Browser, link: str, *, width: int = 1366, height: int = 768, touch: bool = False, **context_options: Any
+    browser: Browser,
+    link: str,
+    *,
+    width: int = SMALL_WINDOW[0],
+    height: int = SMALL_WINDOW[1],
+    touch: bool = False,
+    **context_options: Any,
 ) -> AsyncIterator[ConsolePage]:
     """A page whose messages `alter` and `say` change; uncaught errors of the page fail the test on leaving."""
     context = await browser.new_context(viewport={"width": width, "height": height}, has_touch=touch, **context_options)

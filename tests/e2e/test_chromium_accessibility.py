@@ -148,12 +148,12 @@ async def _through(console: ConsolePage, states: tuple[State, ...], *without: st
 
 
 async def test_axe_finds_nothing_on_a_page_that_drives_in_any_state(stack: Stack, chromium: Browser) -> None:
-    async with open_tampered(chromium, stack.operator) as console:
+    async with open_tampered(chromium, stack.operator, width=1366, height=768) as console:
         assert await _through(console, DRIVING) == []
 
 
 async def test_axe_finds_nothing_in_a_supervisors_tabs_and_dialogues(own_stack: Stack, chromium: Browser) -> None:
-    async with open_tampered(chromium, own_stack.supervisor) as console:
+    async with open_tampered(chromium, own_stack.supervisor, width=1366, height=768) as console:
         assert await _through(console, SUPERVISOR) == []
 
 
@@ -170,7 +170,7 @@ async def test_at_200_percent_and_on_a_phone_all_states_fit_and_axe_finds_nothin
 
 
 async def test_in_forced_colours_axe_finds_nothing_and_stop_keeps_its_edge(stack: Stack, chromium: Browser) -> None:
-    async with open_tampered(chromium, stack.operator, forced_colors="active") as console:
+    async with open_tampered(chromium, stack.operator, width=1366, height=768, forced_colors="active") as console:
         # The person's colours take the place of ours when they are drawn; axe-core computes with those that it reads.
         assert await _through(console, DRIVING, "color-contrast") == []
         edge = "(element) => getComputedStyle(element).borderTopStyle"

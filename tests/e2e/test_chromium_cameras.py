@@ -4,8 +4,8 @@ from pathlib import Path
 
 import httpx
 import pytest
+from playwright.async_api import Browser
 
-from bench.browsers.chromium import running_chromium
 from bench.browsers.console_page import open_console
 from tests.server.media.sources.media_files import film, tone
 from tests.support.stack import running_stack
@@ -13,7 +13,7 @@ from tests.support.stack import running_stack
 pytestmark = pytest.mark.browser
 
 
-async def test_attached_media_are_shown_and_what_fails_is_said(tmp_path: Path) -> None:
+async def test_attached_media_are_shown_and_what_fails_is_said(tmp_path: Path, chromium: Browser) -> None:
     extra = (
         *(
             "--camera",
@@ -30,8 +30,7 @@ async def test_attached_media_are_shown_and_what_fails_is_said(tmp_path: Path) -
     )
     async with (
         running_stack(tmp_path, extra=(*extra, "--quiet")) as stack,
-        running_chromium() as browser,
-        open_console(browser, stack.operator) as console,
+        open_console(chromium, stack.operator) as console,
     ):
         await console.until("s.streams.door.rendered > 20 && s.streams.yard.rendered > 20")
         await console.until("s.streams.hall.received > 20 && s.streams.microphone.received > 20")

@@ -4,22 +4,21 @@ from pathlib import Path
 
 import httpx
 import pytest
+from playwright.async_api import Browser
 
-from bench.browsers.chromium import running_chromium
 from bench.browsers.console_page import open_console
 from tests.server.media.published.publishing import TestPublisher
 from tests.support.stack import running_stack
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
 
 
 async def test_the_page_shows_a_published_camera_within_its_tolerance_and_says_when_nobody_publishes(
-    tmp_path: Path,
+    tmp_path: Path, chromium: Browser
 ) -> None:
     async with (
         running_stack(tmp_path, extra=("--whip", "phone#label=Ann's phone,latency=0.1", "--quiet")) as stack,
-        running_chromium() as browser,
-        open_console(browser, stack.observer) as console,
+        open_console(chromium, stack.observer) as console,
         httpx.AsyncClient(base_url=stack.console, trust_env=False, timeout=30) as http,
     ):
         view = console.page.locator("[data-view=phone]")

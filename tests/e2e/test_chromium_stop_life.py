@@ -64,12 +64,13 @@ async def _stops(stack: Stack) -> list[dict[str, Any]]:
     return await stack.events("stop")
 
 
+@pytest.mark.parametrize("rounds", [1, pytest.param(5, marks=pytest.mark.long)])
 async def test_a_held_deadman_ends_disarmed_by_a_stop_that_was_reset_between_two_looks(
-    stack: Stack, chromium: Browser
+    stack: Stack, chromium: Browser, rounds: int
 ) -> None:
     async with open_tampered(chromium, stack.operator) as console:
         await console.until_live()
-        for gap in (None, 0, 1, 2) * 2:
+        for gap in (None, 0, 1, 2) * rounds:
             await console.arm()
             await console.drive_forward()
             armed = await console.page.evaluate(PASSING_STOP, gap)

@@ -10,7 +10,7 @@ from bench.browsers.sound_card import SoundCard
 from tests.support.livekit_stand_in import KEY, SECRET, LiveKitStandIn, livekit_stand_in
 from tests.support.stack import running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate, pytest.mark.timeout(240)]
 
 TONE = 440.0  # Hz, what the planar robot plays
 SECRETS = {"LOCKSTEP_RELAY_KEY": KEY, "LOCKSTEP_RELAY_SECRET": SECRET}

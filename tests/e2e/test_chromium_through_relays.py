@@ -19,7 +19,7 @@ window.WebSocket = class extends Real {
 };
 """
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate, pytest.mark.timeout(240)]
 
 
 @pytest_asyncio.fixture(loop_scope="session")

@@ -13,7 +13,7 @@ from tests.support.c_robot import running_c_robot
 from tests.support.ros2 import EXAMPLES, have_ros, ros_python, running_ros_robot
 from tests.support.stack import Stack, running_console, running_stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate, pytest.mark.timeout(240)]
 
 Starting = Callable[[Path], AbstractAsyncContextManager[Stack]]
 

@@ -69,4 +69,5 @@ async def test_after_an_outage_the_same_page_goes_on_at_the_present_event(stack:
         assert (after["epoch"], await firefox.evaluate("window.notReloaded")) == (before["epoch"], True)
         assert after["event"] >= before["event"]
         assert all(stream["violations"] == 0 for stream in after["streams"].values())
+        assert network.statistics().paths["media"]["to_operator"].passed > 20, "its pictures came through the network"
     assert await firefox.errors() == []

@@ -1,19 +1,11 @@
-"""Unmodified browsers behind an emulated network."""
-
-import asyncio
+"""Unmodified Chromium behind an emulated network; Firefox in test_firefox.py."""
 
 import pytest
 from playwright.async_api import Browser
 
 from bench.browsers.console_page import open_console
-from bench.browsers.firefox import Firefox
 from bench.emulator import Network
 from tests.support.stack import Stack
-
-SHOWN = """(() => {
-    const s = window.lockstep?.stats();
-    return Boolean(s?.connected && s.streams.overview?.rendered > 3);
-})()"""
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
 
@@ -35,12 +27,3 @@ async def test_with_bursts_of_loss_the_page_drives_and_shows_nothing_outside_the
     assert statistics["round_trip_ms"] >= 100
     assert counts["media"]["to_operator"].lost > 10
     assert counts["control"]["to_robot"].lost > 0
-
-
-async def test_firefox_finds_its_way_through_the_network_too(stack: Stack, firefox: Firefox) -> None:
-    async with Network("micro-lan", console_url=stack.console) as network:
-        await firefox.open(network.link(stack.operator))
-        await firefox.wait(SHOWN, 60)
-        async with asyncio.timeout(30):
-            while network.statistics().paths["media"]["to_operator"].passed <= 20:  # noqa: ASYNC110
-                await asyncio.sleep(0.1)

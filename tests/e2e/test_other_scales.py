@@ -8,7 +8,7 @@ from playwright.async_api import Browser, expect
 from bench.browsers.console_page import open_console
 from tests.support.stack import running_stack
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
 
 
 async def test_the_page_is_in_micrometres_when_the_robot_is(tmp_path: Path, chromium: Browser) -> None:

@@ -1,4 +1,4 @@
-"""A minute of the soak with two observers, as its user runs it; five with all in `make test-long`."""
+"""Half a minute of the soak with one observer, as its user runs it; longer ones with more in `make test-long`."""
 
 import asyncio
 import json
@@ -10,11 +10,18 @@ import pytest
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
 
-@pytest.mark.parametrize(("minutes", "observers"), [("1", "2"), pytest.param("5", "20", marks=pytest.mark.long)])
-async def test_minutes_of_trouble_break_no_promise(minutes: str, observers: str) -> None:
+@pytest.mark.parametrize(
+    ("minutes", "seed", "observers"),
+    [
+        ("0.5", "8", "1"),  # a plan with time to drive before the first trouble and after the last
+        pytest.param("1", "1", "2", marks=pytest.mark.long),
+        pytest.param("5", "1", "20", marks=pytest.mark.long),
+    ],
+)
+async def test_minutes_of_trouble_break_no_promise(minutes: str, seed: str, observers: str) -> None:
     command = (
         *(str(Path(sys.executable).with_name("lockstep")), "soak"),
-        *("--minutes", minutes, "--seed", "1", "--observers", observers, "--json", "-"),
+        *("--minutes", minutes, "--seed", seed, "--observers", observers, "--json", "-"),
     )
     process = await asyncio.create_subprocess_exec(
         *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
@@ -25,7 +32,8 @@ async def test_minutes_of_trouble_break_no_promise(minutes: str, observers: str)
     broken = ("executed_twice", "executed_late", "moved_without_seat", "moved_while_stopped", "reloads_needed")
     assert {name: verdict[name] for name in broken} == dict.fromkeys(broken, 0)
     assert verdict["violations"] == 0
-    assert isinstance(verdict["memory_growth"], float)
+    if float(minutes) >= 1:  # a shorter life of the server is too short to judge its memory
+        assert isinstance(verdict["memory_growth"], float)
     assert verdict["executed"] > 20, "the operator drove"
     assert verdict["epochs"] == 2, "the bridge was killed and came back"
     assert verdict["refused"]["no_seat"] > 0, "the intruders tried"
