@@ -74,6 +74,8 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             raise _usage(str(error)) from error
         except ConsoleError as error:
             raise _usage(error.detail) from error
+        except StateDirUnusable as error:
+            raise _usage(str(error)) from error
         base = url.rstrip("/") or settings.public_url or read_address(with_state.directory) or _settings_url(settings)
         link = console_link(base, with_state.access.sign(made.identity, made.created))
         if as_json:
@@ -108,6 +110,9 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             ended = state.invitations.update(lambda known: known.revoke(None, invitation_id, now))
         except ConsoleError as error:
             raise _usage(error.detail) from error
+        except StateDirUnusable as error:
+            _note_ended(state, invitation_id, error)
+            return
         for each in ended:
             sys.stdout.write(f"revoked {each.id}  {each.role}  {each.name}\n")
         if not ended:
@@ -208,6 +213,16 @@ def _state(settings: Settings) -> ConsoleState:
         return open_state(settings)
     except StateDirUnusable as error:
         raise _usage(str(error)) from error
+
+
+def _note_ended(state: ConsoleState, link: str, error: StateDirUnusable) -> None:
+    """The list cannot be written: a disk that is full still has what was set aside for this."""
+    state.invitations.write_later(link)
+    try:
+        state.invitations.note_ended()
+    except StateDirUnusable:
+        raise _usage(str(error)) from error
+    _say(f"noted: a console that runs ends it now, and the list is written when the disk takes it ({error.reason})")
 
 
 def _usage(text: str) -> typer.Exit:

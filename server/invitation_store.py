@@ -76,9 +76,9 @@ class InvitationStore:
         self._elsewhere = self._read_elsewhere()
         self._revoked = self._known.revoked()
         self._ended: set[str] = set()  # revoked by this process, whether or not the disk has taken it
-        self._unwritten = self._read_aside()  # of these, what the disk has to be asked again for
-        for each in self._unwritten:
-            self._end_here(each, None)
+        self._unwritten: set[str] = set()  # of these, what the disk has to be asked again for
+        self._aside: tuple[int, int] | None = None  # version of what was set aside
+        self._look_aside()
         if seen > time.time() + BEHIND_SECONDS:
             log.warning("this machine's clock is behind; links end by the newest time that was seen", seen=seen)
 
@@ -134,6 +134,15 @@ class InvitationStore:
         """Blocks: write what the disk did not take to the place that was set aside for it, for the next start."""
         with self._alone():
             self._write_aside(self._read_aside() | self._unwritten)
+
+    def _look_aside(self) -> None:
+        """What an earlier run, or a command beside this one, could write nowhere else."""
+        version = self._directory.version(ASIDE)
+        if version != self._aside:
+            self._aside = version
+            for link in self._read_aside():
+                self._end_here(link, None)
+                self._unwritten.add(link)
 
     def _write_aside(self, links: Collection[str]) -> None:
         lines = "".join(f"{each}\n" for each in sorted(links)).encode()
@@ -231,6 +240,7 @@ class InvitationStore:
                 self._busy_since = math.inf
 
     def _refresh(self) -> list[Invitation]:
+        self._look_aside()
         version = self._directory.version(FILE)
         if version == self._version and not self.trouble:
             return []

@@ -17,9 +17,11 @@ from server.audit_file import AuditFile
 from server.audit_log import anchors_path
 from server.audit_store import AuditStore
 from server.cli import app
+from server.errors import LinkRevoked
 from server.evidence.anchors import AnchorFile
 from server.settings import Settings
 from server.state import open_state
+from server.state_dir import StateDir, StateDirUnusable
 from tests.support.stack import running_stack
 
 LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
@@ -34,6 +36,30 @@ def _lockstep(directory: Path, *arguments: str) -> Result:
 
 def _identity(directory: Path, link: str) -> Identity:
     return open_state(Settings(state_dir=directory)).access.verify(link.strip().partition("#token=")[2])
+
+
+def test_on_a_full_disk_a_link_is_revoked_all_the_same_and_nobody_is_invited(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = _lockstep(tmp_path, "invite", "--url", "http://x").stdout.strip()
+    link = open_state(Settings(state_dir=tmp_path)).access.verify(made.partition("#token=")[2]).token_id
+
+    def full(*_: object) -> None:
+        raise StateDirUnusable(tmp_path, "No space left on device")
+
+    with monkeypatch.context() as disk:
+        disk.setattr(StateDir, "write", full)
+        nothing_aside = _lockstep(tmp_path, "revoke", link)
+        assert (nothing_aside.exit_code, "No space left" in nothing_aside.stderr) == (2, True)
+    open_state(Settings(state_dir=tmp_path)).invitations.keep_time()  # as a console does that runs
+    with monkeypatch.context() as disk:
+        disk.setattr(StateDir, "write", full)
+        noted = _lockstep(tmp_path, "revoke", link)
+        assert (noted.exit_code, "No space left" in noted.stderr) == (0, True)
+        refused = _lockstep(tmp_path, "invite", "--url", "http://x")
+        assert (refused.exit_code, "No space left" in refused.stderr) == (2, True)
+        with pytest.raises(LinkRevoked):
+            _identity(tmp_path, made)
 
 
 async def test_a_link_opens_the_running_console_until_it_is_revoked(tmp_path: Path) -> None:

@@ -305,6 +305,7 @@ def test_a_link_that_was_revoked_while_the_disk_was_full_stays_revoked_after_a_c
     made = store.update(lambda known: known.invite(None, "operator", "Mallory", HOUR, time.time()))
     below = store.update(lambda known: known.invite(made.identity, "observer", "Eve", HOUR / 2, time.time()))
     store.keep_time()
+    beside = InvitationStore(directory)
 
     def full(*_: object) -> None:
         raise StateDirUnusable(directory.path, "No space left on device")
@@ -316,6 +317,8 @@ def test_a_link_that_was_revoked_while_the_disk_was_full_stays_revoked_after_a_c
             store.update(lambda known: known.revoke(boss, made.id, time.time()))
         store.write_later(made.id)
         store.note_ended()
+        beside.refresh()
+        assert beside.is_revoked(below.id), "a console that runs hears of what a command beside it has noted"
         fresh = InvitationStore(directory)
         assert (fresh.is_revoked(made.id), fresh.is_revoked(below.id)) == (True, True)
         assert not fresh.is_revoked(boss.token_id)
