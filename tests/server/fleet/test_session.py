@@ -7,6 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import viser
+from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
+from websockets.typing import Subprotocol
 
 from robot_bridge.protocol.console import Notice, SilenceStops
 from robot_bridge.protocol.serial import event_after
@@ -117,6 +121,25 @@ async def test_a_stop_at_a_robot_whose_session_has_failed_is_kept_and_done_first
         assert who == "observer"
         assert what.startswith(f"http, sent again, stop {console.clock.stop.number}")
         await reset_by_http(rig.http, "/robots/left/api/reset", rig.token("supervisor"), lambda: console.clock.stop)
+
+
+async def test_the_scene_of_a_robot_whose_session_fails_ends_and_opens_for_nobody_until_it_is_back(
+    faults: Faults,
+) -> None:
+    async with running_fleet_rig("left", scene=True) as rig:
+        headers = rig.token("observer")
+        path = (await rig.http.post("/robots/left/api/scene", headers=headers)).json()["path"]
+        address, version = path.split("websocket=")[1].split("&")[0], Subprotocol(f"viser-v{viser.__version__}")
+        async with connect(address, subprotocols=[version], proxy=None, max_size=None) as stream:
+            await faults.end(rig, "left")
+            async with asyncio.timeout(PATIENCE):
+                await stream.wait_closed()
+        with pytest.raises(InvalidStatus):
+            await connect(address, subprotocols=[version], proxy=None)
+        assert (await rig.http.get(path)).json()["error"] == "robot_failed"
+        await faults.back(rig, "left")
+        async with asyncio.timeout(PATIENCE), connect(address, subprotocols=[version], proxy=None, max_size=None):
+            pass
 
 
 async def test_who_may_not_stop_a_robot_may_not_while_its_session_has_failed(faults: Faults) -> None:
