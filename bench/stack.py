@@ -1,8 +1,10 @@
 """A robot bridge and a console, each a process of its own, so that the time of each can be told."""
 
 import asyncio
+import datetime
+import secrets
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +15,7 @@ import httpx
 from prometheus_client.parser import text_string_to_metric_families
 
 from bench.processes import ProcessFailed, Running, running_process
+from server.tls import self_signed
 
 __all__ = ["DEFAULT_ROBOT", "Bridge", "Metrics", "Stack", "available_robots", "running_bridge", "running_stack"]
 
@@ -29,6 +32,7 @@ class Bridge:
     process: Running
     address: str  # "tcp://127.0.0.1:5600"
     event_log: Path  # not there unless it was asked for
+    settings: Mapping[str, str]  # by which a console reaches it, LOCKSTEP_…
 
     @property
     def port(self) -> int:
@@ -70,8 +74,9 @@ class Metrics:
 
 
 @asynccontextmanager
-async def running_bridge(robot: str, *, is_logged: bool = True) -> AsyncIterator[Bridge]:
-    """`is_logged`: whether the bridge writes its event log, which costs it some processor time.
+async def running_bridge(robot: str, *, is_logged: bool = True, is_secured: bool = False) -> AsyncIterator[Bridge]:
+    """`is_logged`: whether the bridge writes its event log, which costs it some processor time. `is_secured`: its link
+    speaks TLS and asks for a secret.
 
     Raises:
         ProcessFailed: the robot lacks something here.
@@ -81,18 +86,28 @@ async def running_bridge(robot: str, *, is_logged: bool = True) -> AsyncIterator
         command = (sys.executable, "-m", "robot_bridge", robot, "--port", "0", "--event-strip", "--json")
         state = ("--state-dir", str(Path(directory) / "bridge"))
         logging = ("--event-log", str(log)) if is_logged else ()
-        async with running_process(*command, *state, *logging) as (process, ready):
-            yield Bridge(robot, process, ready["robot"], log)
+        security, settings = _security(Path(directory)) if is_secured else ((), {})
+        async with running_process(*command, *state, *logging, *security, environment=settings) as (process, ready):
+            yield Bridge(robot, process, ready["robot"], log, settings)
+
+
+def _security(folder: Path) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Options of a bridge, and what both it and its console have in their environment."""
+    made = self_signed(folder, {"127.0.0.1"}, datetime.datetime.now(datetime.UTC))
+    settings = {"LOCKSTEP_LINK_SECRET": secrets.token_hex(16), "LOCKSTEP_LINK_TLS_CA": str(made.chain)}
+    return ("--link-tls-cert", str(made.chain), "--link-tls-key", str(made.key)), settings
 
 
 @asynccontextmanager
-async def running_stack(robot: str, *, is_logged: bool = True, **more: str) -> AsyncIterator[Stack]:
-    """`more`: settings of the console besides, LOCKSTEP_…"""
-    async with running_bridge(robot, is_logged=is_logged) as bridge:
+async def running_stack(
+    robot: str, *, is_logged: bool = True, is_secured: bool = False, **more: str
+) -> AsyncIterator[Stack]:
+    """As `running_bridge`, and a console. `more`: settings of the console besides, LOCKSTEP_…"""
+    async with running_bridge(robot, is_logged=is_logged, is_secured=is_secured) as bridge:
         lockstep = str(Path(sys.executable).with_name("lockstep"))
         command = (lockstep, "serve", "--robot", bridge.address, "--port", "0", "--json", "--quiet")
         settings = {"LOCKSTEP_STATE_DIR": str(bridge.event_log.parent / "state"), "LOCKSTEP_MAX_PEERS": str(MAX_PEERS)}
-        async with running_process(*command, environment=settings | more) as (console, links):
+        async with running_process(*command, environment=settings | dict(bridge.settings) | more) as (console, links):
             yield Stack(bridge, console, links["console"], links["operator"], links["observer"])
 
 

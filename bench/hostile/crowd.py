@@ -1,6 +1,6 @@
-"""The crowd, in a process of its own: `python -m bench.hostile.crowd LINK OPERATOR COUNT SEED [KIND]`.
+"""The crowd, in a process of its own: `python -m bench.hostile.crowd LINK OPERATOR BRIDGE COUNT SEED [KIND]`.
 
-LINK is an observer's, OPERATOR the link of somebody who publishes a camera.
+LINK is an observer's, OPERATOR the link of somebody who publishes a camera and speaks, BRIDGE is tls://host:port.
 It runs with the processor time that nobody else wants (SCHED_IDLE): attackers have machines of their own.
 
 It says in a JSON line that it has begun, answers each line on standard input with what it has seen, and ends at the end
@@ -13,11 +13,12 @@ import os
 import sys
 from collections import Counter
 from random import Random
+from urllib.parse import urlsplit
 
 import httpx
 import uvloop
 
-from bench.hostile import over_http, over_webrtc, over_whip
+from bench.hostile import over_http, over_robot_link, over_webrtc, over_whip
 from bench.hostile.target import Misbehaviour, Target
 from client.link import parse_link
 
@@ -50,7 +51,10 @@ KINDS: tuple[Misbehaviour, ...] = (
     over_http.recordings_reader,
     over_webrtc.many_sections,
     over_webrtc.stun_flood,
+    over_webrtc.media_flood,
     over_whip.publisher_flood,
+    over_robot_link.bridge_handshakes,
+    over_robot_link.bridge_silence,
 )
 
 
@@ -58,12 +62,14 @@ class Crowd:
     """Members take the kinds in turn; each attacks again and again until the task is cancelled."""
 
     def __init__(
-        self, link: str, operator: str, count: int, seed: int, kinds: tuple[Misbehaviour, ...] = KINDS
+        self, link: str, operator: str, bridge: str, count: int, seed: int, kinds: tuple[Misbehaviour, ...] = KINDS
     ) -> None:
         self.attempts: Counter[str] = Counter()
         self.failures: Counter[str] = Counter()  # attempts that ended in an error of their own
         self.seen: Counter[str] = Counter()
         self._link, self._operator = parse_link(link), parse_link(operator).token
+        parts = urlsplit(bridge)
+        self._bridge = (parts.hostname or "", parts.port or 0)
         self._members = [(kinds[number % len(kinds)], Random(seed * 1000 + number)) for number in range(count)]
 
     async def run(self) -> None:
@@ -72,7 +78,7 @@ class Crowd:
         async with httpx.AsyncClient(
             base_url=self._link.base, trust_env=False, limits=limits, timeout=10, verify=False
         ) as http:
-            target = Target(self._link.base, self._link.token, self._operator, http, self.seen)
+            target = Target(self._link.base, self._link.token, self._operator, self._bridge, http, self.seen)
             async with asyncio.TaskGroup() as tasks:
                 for kind, random in self._members:
                     tasks.create_task(self._member(kind, target, random))
@@ -91,8 +97,8 @@ class Crowd:
         return {"attempts": dict(self.attempts), "seen": dict(self.seen), "failures": dict(self.failures)}
 
 
-async def _run(link: str, operator: str, count: int, seed: int, only: str = "") -> None:
-    crowd = Crowd(link, operator, count, seed, tuple(kind for kind in KINDS if only in ("", kind.__name__)))
+async def _run(link: str, operator: str, bridge: str, count: int, seed: int, only: str = "") -> None:
+    crowd = Crowd(link, operator, bridge, count, seed, tuple(kind for kind in KINDS if only in ("", kind.__name__)))
     running = asyncio.create_task(crowd.run())
     lines = asyncio.StreamReader()
     await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
@@ -112,7 +118,8 @@ def _say(what: object) -> None:
 
 def main() -> None:
     os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-    uvloop.run(_run(sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), *sys.argv[5:6]))
+    link, operator, bridge, count, seed, *kind = sys.argv[1:]
+    uvloop.run(_run(link, operator, bridge, int(count), int(seed), *kind[:1]))
 
 
 if __name__ == "__main__":

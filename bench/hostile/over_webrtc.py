@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 from aioice import stun
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
+from aiortc.rtp import RtcpReceiverInfo, RtcpRrPacket, RtpPacket
 from aiortc.sdp import SessionDescription
 
 from bench.hostile.target import Target
@@ -23,6 +24,7 @@ __all__ = [
     "garbage_messages",
     "half_open",
     "many_sections",
+    "media_flood",
     "message_flood",
     "reset_spam",
     "restart_flood",
@@ -49,8 +51,8 @@ class Peer:
         self.nonce = 0
         self.location = ""
 
-    async def join(self, target: Target, *, video: bool = False) -> bool:
-        """False when the console refuses it."""
+    async def join(self, target: Target, *, video: bool = False, speaks: bool = False) -> bool:
+        """False when the console refuses it. `speaks`: as an operator, with a microphone."""
         for label in ("control", "session", "stop"):
             lossy = label == "control"
             channel = self.pc.createDataChannel(label, ordered=not lossy, maxRetransmits=0 if lossy else None)
@@ -59,7 +61,10 @@ class Peer:
             self.channels[label] = channel
         if video:
             self.pc.addTransceiver("video", direction="recvonly")
-        answer = await target.ask("POST", "/whep", await offer_of(self.pc), **{"Content-Type": SDP})
+        if speaks:
+            self.pc.addTransceiver("audio", direction="sendonly")
+        ask = target.ask_as_operator if speaks else target.ask
+        answer = await ask("POST", "/whep", await offer_of(self.pc), **{"Content-Type": SDP})
         if answer.status_code != 201:
             return False
         self.location = answer.headers["location"]
@@ -88,11 +93,11 @@ async def offer_of(pc: RTCPeerConnection) -> str:
 
 
 @asynccontextmanager
-async def joined(target: Target, *, video: bool = False) -> AsyncIterator[Peer | None]:
+async def joined(target: Target, *, video: bool = False, speaks: bool = False) -> AsyncIterator[Peer | None]:
     """None: the console refused it, which is counted."""
     peer = Peer()
     try:
-        yield peer if await peer.join(target, video=video) else None
+        yield peer if await peer.join(target, video=video, speaks=speaks) else None
     finally:
         await peer.pc.close()
 
@@ -119,6 +124,28 @@ async def message_flood(target: Target, random: Random) -> None:
             if peer.closed.is_set():
                 break
         await _until_thrown_out(peer, target)
+
+
+async def media_flood(target: Target, random: Random) -> None:
+    """Voice many times faster than anybody speaks, reports on nothing, and datagrams that only look like SRTP."""
+    async with joined(target, speaks=True) as peer:
+        if peer is None or peer.pc.sctp is None:
+            return
+        dtls: Any = peer.pc.sctp.transport
+        sender: Any = peer.pc.getSenders()[0]
+        reports = [RtcpReceiverInfo(random.getrandbits(32), 0, 0, 0, 0, 0, 0) for _ in range(31)]
+        for number in range(2500):
+            voice = RtpPacket(payload_type=96, ssrc=sender._ssrc, sequence_number=number, timestamp=960 * number)
+            voice.payload = random.randbytes(80)
+            with suppress(ConnectionError):  # it was thrown out
+                await dtls._send_rtp(voice.serialize())
+                await dtls._send_rtp(bytes(RtcpRrPacket(random.getrandbits(32), reports)))
+                await dtls.transport._send(b"\x80\x60" + random.randbytes(100))
+            if number % BURST == 0:
+                await asyncio.sleep(0.02)
+            if peer.closed.is_set():
+                break
+        target.seen["media_flooded"] += 1
 
 
 async def garbage_messages(target: Target, random: Random) -> None:

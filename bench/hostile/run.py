@@ -40,8 +40,8 @@ async def hostile(
 ) -> dict[str, Any]:
     """The figures; `say` tells how it goes. `kind`: one of the crowd's alone; "": all of them together."""
     before = await busy_percent(1.0)
-    settings = {"LOCKSTEP_WHIP": "phone"} | ({"LOCKSTEP_TLS": "self-signed"} if front == "tls" else {})
-    async with running_stack("planar", is_logged=True, **settings) as stack, _entry(stack, front) as link:
+    settings: dict[str, Any] = {"LOCKSTEP_WHIP": "phone"} | ({"LOCKSTEP_TLS": "self-signed"} if front == "tls" else {})
+    async with running_stack("planar", is_secured=True, **settings) as stack, _entry(stack, front) as link:
         trusted = str(stack.bridge.event_log.parent / "state" / "tls-cert.pem") if front == "tls" else None
         async with Console(stack.operator, video=1, audio=False, name="operator", tls_ca=trusted) as console:
             await console.take_seat()
@@ -49,7 +49,14 @@ async def hostile(
             say(f"driving in peace for {seconds / 2:g} s")
             quiet = await _drive(console, seconds / 2)
             memory = memory_of(stack.console)
-            command = (sys.executable, "-m", "bench.hostile.crowd", link, stack.operator, str(peers), str(seed), kind)
+            command = (
+                sys.executable,
+                "-m",
+                "bench.hostile.crowd",
+                link,
+                stack.operator,
+                *(stack.bridge.address, str(peers), str(seed), kind),
+            )
             async with running_process(*command) as (crowd, _):
                 say(f"{peers} misbehaving peers ({kind or 'all kinds'}, {front}) for {seconds:g} s")
                 used = stack.console.cpu_seconds()

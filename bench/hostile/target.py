@@ -18,7 +18,8 @@ class Target(NamedTuple):
 
     url: str
     token: str  # an observer's
-    operator: str  # an operator's, who publishes a camera
+    operator: str  # an operator's, who publishes a camera and speaks
+    bridge: tuple[str, int]  # where the robot's listens, by TLS
     http: httpx.AsyncClient
     seen: Counter[str]  # what the console said, by name or status
 
@@ -44,9 +45,15 @@ class Target(NamedTuple):
         """Ask with the observer's token, and count the answer."""
         return await self._ask(method, path, content, {**self.headers, **headers})
 
+    async def ask_as_operator(
+        self, method: str, path: str, content: str | bytes = b"", **headers: str
+    ) -> httpx.Response:
+        """Ask with the operator's token, and count the answer."""
+        return await self._ask(method, path, content, {"Authorization": f"Bearer {self.operator}", **headers})
+
     async def publish(self, offer: str, **headers: str) -> httpx.Response:
         """Offer a camera with the operator's token, and count the answer."""
-        return await self._ask("POST", "/whip", offer, {"Authorization": f"Bearer {self.operator}", **headers})
+        return await self.ask_as_operator("POST", "/whip", offer, **headers)
 
     async def _ask(self, method: str, path: str, content: str | bytes, headers: dict[str, str]) -> httpx.Response:
         answer = await self.http.request(method, path, content=content, headers=headers)

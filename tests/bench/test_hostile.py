@@ -31,7 +31,7 @@ async def test_an_operator_drives_on_among_peers_that_misbehave(monkeypatch: pyt
     }.items():
         monkeypatch.setenv(f"LOCKSTEP_{name}", str(value))
     async with (
-        running_stack("planar") as stack,
+        running_stack("planar", is_secured=True) as stack,
         Console(stack.operator, video=1, audio=False, silence_seconds=60) as console,
         Console(stack.observer, video=False, audio=False, silence_seconds=60) as bystander,
     ):
@@ -39,7 +39,8 @@ async def test_an_operator_drives_on_among_peers_that_misbehave(monkeypatch: pyt
         rest = [0.0] * len(console.description.axes)
         first = last = await drive_on(console, rest)
         memory = memory_of(stack.console)
-        command = (sys.executable, "-m", "bench.hostile.crowd", stack.observer, stack.operator, str(len(KINDS)), "1")
+        arguments = (stack.observer, stack.operator, stack.bridge.address, str(len(KINDS)), "1")
+        command = (sys.executable, "-m", "bench.hostile.crowd", *arguments)
         async with asyncio.timeout(SECONDS):
             async with running_process(*command) as (crowd, _):
                 while not await _all_of_it_was_refused(stack):
