@@ -17,10 +17,12 @@ from playwright.async_api import Browser, expect
 from bench.browsers.chromium import running_chromium
 from bench.browsers.firefox import Firefox, running_firefox
 from bench.browsers.sound_card import SoundCard, running_sound_card
-from tests.e2e.stack_keeper import HALF_RATE, StackKeeper
+from tests.e2e.as_new import as_new
 from tests.support.stack import Stack, running_stack
 
 HERE = Path(__file__).parent
+# Pictures cost the most of all, here and in the browser. Tests that judge them have all of them: `full_rate`.
+RATE, HALF = "LOCKSTEP_MEDIA__VIDEO_FRAMES_PER_SECOND", "15"
 
 expect.set_options(timeout=30_000)  # ms; a page shows what it hears when a busy machine lets it draw
 
@@ -36,8 +38,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def half_rate(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every console that the test starts takes half of the pictures, unless the test judges them."""
     if not _wants_all(request):
-        for name, value in HALF_RATE.items():
-            monkeypatch.setenv(name, value)
+        monkeypatch.setenv(RATE, HALF)
 
 
 @pytest_asyncio.fixture(loop_scope="session")
@@ -49,6 +50,30 @@ async def own_stack(half_rate: None, tmp_path: Path) -> AsyncIterator[Stack]:
 
 def _wants_all(request: pytest.FixtureRequest) -> bool:
     return request.node.get_closest_marker("full_rate") is not None
+
+
+class StackKeeper:
+    """One console for all tests that ask for it, as long as each leaves it as good as new."""
+
+    def __init__(self, directories: pytest.TempPathFactory) -> None:
+        self._directories = directories
+        self._running = AsyncExitStack()
+        self._stack: Stack | None = None
+        self._full_rate = True
+
+    async def stack(self, *, full_rate: bool) -> Stack:
+        """Nobody is there, the robot is at rest, near where it starts and not stopped."""
+        if self._stack is None or self._full_rate != full_rate or not await as_new(self._stack):
+            await self.close()
+            settings = {} if full_rate else {RATE: HALF}
+            started = running_stack(self._directories.mktemp("shared"), settings=settings)
+            self._stack = await self._running.enter_async_context(started)
+            self._full_rate = full_rate
+        return await self._stack.from_here()
+
+    async def close(self) -> None:
+        self._stack = None
+        await self._running.aclose()
 
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")

@@ -8,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pytest_asyncio
 from playwright.async_api import Browser, expect
 
 from bench.browsers.chromium import running_chromium
 from bench.browsers.console_page import ConsolePage, open_console
 from bench.browsers.sound_card import SoundCard, running_sound_card, tone_level
-from tests.e2e.stack_keeper import StackKeeper
-from tests.support.stack import Stack
+from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser
 
@@ -36,28 +34,18 @@ def write_tone(path: Path) -> Path:
     return path
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="session")
-async def card(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[SoundCard]:
-    """The robot's room: what its loudspeaker plays can be listened to."""
-    async with running_sound_card(tmp_path_factory.mktemp("room")) as running:
-        yield running
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="session")
-async def keeper(tmp_path_factory: pytest.TempPathFactory, card: SoundCard) -> AsyncIterator[StackKeeper]:
-    settings = {"PULSE_SERVER": card.environment["PULSE_SERVER"]}
-    keeper = StackKeeper(tmp_path_factory, extra=("--speaker", "pulse:ears", "--quiet"), settings=settings)
-    yield keeper
-    await keeper.close()
-
-
-@pytest_asyncio.fixture(loop_scope="session")
-async def room(keeper: StackKeeper) -> Stack:
-    return await keeper.stack(full_rate=False)
+@asynccontextmanager
+async def room(directory: Path) -> AsyncIterator[tuple[Stack, SoundCard]]:
+    """A console whose loudspeaker is a sound card that can be listened to."""
+    async with running_sound_card(directory) as card:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("PULSE_SERVER", card.environment["PULSE_SERVER"])
+            async with running_stack(directory, extra=("--speaker", "pulse:ears", "--quiet")) as stack:
+                yield stack, card
 
 
 @asynccontextmanager
-async def speaking_chromium(directory: Path, *, allowed: bool) -> AsyncIterator[Browser]:
+async def speaking_chromium(directory: Path, *, allowed: bool = True) -> AsyncIterator[Browser]:
     """It plays its own sound to nowhere, so that only the voice is heard."""
     flags = [
         "--use-fake-device-for-media-stream",
@@ -66,12 +54,6 @@ async def speaking_chromium(directory: Path, *, allowed: bool) -> AsyncIterator[
     if allowed:
         flags.append("--use-fake-ui-for-media-stream")
     async with running_chromium({"PULSE_SERVER": "unix:/nowhere"}, flags) as browser:
-        yield browser
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="session")
-async def speaking(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Browser]:
-    async with speaking_chromium(tmp_path_factory.mktemp("voice"), allowed=True) as browser:
         yield browser
 
 
@@ -101,12 +83,12 @@ async def talking(console: ConsolePage, held: bool) -> None:
         await console.page.locator(".talk:not([data-talk=on])").wait_for()
 
 
-async def test_the_holder_is_heard_while_the_button_is_held_and_everyone_sees_it(
-    room: Stack, card: SoundCard, speaking: Browser
-) -> None:
+async def test_the_holder_is_heard_while_the_button_is_held_and_everyone_sees_it(tmp_path: Path) -> None:
     async with (
-        open_console(speaking, room.operator) as console,
-        open_console(speaking, room.observer, pad=False) as watcher,
+        room(tmp_path) as (stack, card),
+        speaking_chromium(tmp_path) as browser,
+        open_console(browser, stack.operator) as console,
+        open_console(browser, stack.observer, pad=False) as watcher,
     ):
         await console.until_live()
         await console.until("s.seat && s.seat.mine")
@@ -124,9 +106,13 @@ async def test_the_holder_is_heard_while_the_button_is_held_and_everyone_sees_it
 
 
 async def test_the_key_talks_too_and_silence_falls_when_the_seat_is_given_back_or_the_page_is_hidden(
-    room: Stack, card: SoundCard, speaking: Browser
+    tmp_path: Path,
 ) -> None:
-    async with open_console(speaking, room.operator) as console:
+    async with (
+        room(tmp_path) as (stack, card),
+        speaking_chromium(tmp_path) as browser,
+        open_console(browser, stack.operator) as console,
+    ):
         await console.until_live()
         await console.until("s.seat && s.seat.mine")
         await console.page.keyboard.down("v")
@@ -146,12 +132,11 @@ async def test_the_key_talks_too_and_silence_falls_when_the_seat_is_given_back_o
         await falls_silent(card)
 
 
-async def test_a_microphone_that_is_refused_is_said_and_nothing_is_heard(
-    room: Stack, card: SoundCard, tmp_path: Path
-) -> None:
+async def test_a_microphone_that_is_refused_is_said_and_nothing_is_heard(tmp_path: Path) -> None:
     async with (
+        room(tmp_path) as (stack, card),
         speaking_chromium(tmp_path, allowed=False) as browser,
-        open_console(browser, room.operator) as console,
+        open_console(browser, stack.operator) as console,
     ):
         await console.page.context.clear_permissions()
         await console.until_live()

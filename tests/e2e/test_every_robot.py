@@ -21,7 +21,7 @@ STICKS = {"left_x": 0, "left_y": 1, "right_x": 2, "right_y": 3}
 # What the pad calls negative and positive: buttons of the W3C standard mapping.
 BUTTONS = {"dpad_x": (14, 15), "dpad_y": (12, 13), "triggers": (6, 7)}
 MOVED = 0.1  # of the axis' limit
-TRIES = 6  # where a busy machine holds the robot up
+TRIES = 3  # where a busy machine holds the robot up
 
 
 def registered(name: str) -> Starting:
@@ -141,8 +141,7 @@ async def _saw_every_camera(console: ConsolePage, robot: Any) -> None:
         assert stream["stamp"] is not None, camera["name"]
         assert stream["violations"] == 0, camera["name"]
         assert stream["max_gap"] <= statistics["tolerance"]["video"], camera["name"]
-    # What a busy machine has held up is said until the next motion.
-    await console.until("s.faults.every((each) => each.includes('was held up'))")
+    await console.until("s.faults.length === 0")
     assert statistics["bad_messages"] == 0
 
 

@@ -22,10 +22,9 @@ SPREAD = """(name) => {
 }"""
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="session")
-async def manipulator(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stack]:
-    directory: Path = tmp_path_factory.mktemp("manipulator")
-    async with running_stack(directory, robot="mobile-manipulator") as running:
+@pytest_asyncio.fixture(loop_scope="session")
+async def manipulator(tmp_path: Path) -> AsyncIterator[Stack]:
+    async with running_stack(tmp_path, robot="mobile-manipulator") as running:
         yield running
 
 

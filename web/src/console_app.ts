@@ -99,7 +99,7 @@ export class ConsoleApp {
       state: (link) => (this.link = link),
       message: (channel, data, at) => this.received(channel, data, at),
       opened: (peer) => (this.peer = peer),
-      streams: (peer, streams) => this.room.reopen(peer, streams, performance.now()),
+      streams: (peer, streams) => this.room.reopen(peer, streams),
       closed: () => this.connectionClosed(),
     });
     this.stopping = new StopSender(api, this.connection);
@@ -315,7 +315,7 @@ export class ConsoleApp {
       this.peer.id = welcome.peer;
       this.pulse.isSlow = this.peer.isRelayed;
       this.pulse.isOnLine = this.peer.isOnLine;
-      this.room.open(this.peer, welcome.streams, this.heardMs);
+      this.room.open(this.peer, welcome.streams);
     }
     this.voice?.attach(this.peer?.voiceSender(welcome.voice) ?? null);
     this.session.welcomed(welcome);

@@ -3,6 +3,7 @@ import "./style/console_page_later.css";
 export { Rumble } from "./input/rumble";
 export { installHook } from "./lockstep_hook";
 export { ContactTone } from "./media/contact_tone";
+export { SoundStream } from "./media/sound_stream";
 export { PageSide } from "./page_side";
 export { createForceGauge } from "./ui/force_gauge";
 export { createScene } from "./ui/page_scene";

@@ -2,20 +2,16 @@ import type { GateContext } from "./core/medium_counts";
 import type { ConsoleState } from "./core/console_state";
 import { NewestLog } from "./core/newest_log";
 import type { AudioDesk } from "./media/audio_desk";
-import { SoundStream } from "./media/sound_stream";
+import type { SoundStream } from "./media/sound_stream";
 import { VideoStream } from "./media/video_stream";
 import type { Peer } from "./rtc/peer";
 import type { Section } from "./rtc/section";
 import type { StampReader } from "./rtc/stamp_reader";
 import type { StreamInfo } from "./wire";
 
-/** Sound waits for the first picture, at most this long: opening it holds the page up. */
-const SOUND_WAIT_MS = 1000;
-
 interface WaitingSound {
   readonly info: StreamInfo;
   readonly section: Section;
-  readonly untilMs: number;
 }
 
 /** When an event's first feedback came. */
@@ -33,6 +29,7 @@ export interface MediaRoomEvents {
 export class MediaRoom {
   readonly videos = new Map<string, VideoStream>();
   readonly sounds = new Map<string, SoundStream>();
+  sound: typeof SoundStream | null = null; // until its code is there, after the first picture
   relay: string | null = null; // that the streams come through; null: from the console
   readonly feedbacks = new NewestLog<FeedbackArrival>();
   private newest: number | null = null; // event of the last feedback
@@ -46,21 +43,21 @@ export class MediaRoom {
   ) {}
 
   /** Opens the streams that the console named. */
-  open(peer: Peer, streams: readonly StreamInfo[], now: number): void {
+  open(peer: Peer, streams: readonly StreamInfo[]): void {
     for (const info of streams) {
       const section = peer.section(info.mid);
       if (section === undefined || this.videos.has(info.stream)) continue;
       if (info.kind === "video") this.videos.set(info.stream, this.openVideo(info, section));
-      else this.waitingSounds.push({ info, section, untilMs: now + SOUND_WAIT_MS });
+      else this.waitingSounds.push({ info, section });
     }
     this.changed();
   }
 
   /** The same streams come from elsewhere now. What is on screen stays until they do. */
-  reopen(peer: Peer, streams: readonly StreamInfo[], now: number): void {
+  reopen(peer: Peer, streams: readonly StreamInfo[]): void {
     this.close();
     this.relay = peer.relayName;
-    this.open(peer, streams, now);
+    this.open(peer, streams);
   }
 
   /** The feedback or a setting changed: everything is judged again. */
@@ -104,14 +101,12 @@ export class MediaRoom {
   }
 
   private openSounds(): void {
-    if (this.waitingSounds.length === 0) return;
-    const hasPicture = [...this.videos.values()].some((video) => video.lastDrawnMs !== null);
-    if (!hasPicture && this.waitingSounds.every((sound) => performance.now() < sound.untilMs)) return;
-    for (const { info, section } of this.waitingSounds.splice(0))
-      this.sounds.set(
-        info.stream,
-        new SoundStream(info, section, this.reader, this.audio.open(), () => this.context("audio")),
-      );
+    const { sound: Sound } = this;
+    if (Sound === null) return;
+    for (const { info, section } of this.waitingSounds.splice(0)) {
+      const context = (): GateContext => this.context("audio");
+      this.sounds.set(info.stream, new Sound(info, section, this.reader, this.audio.open(), context));
+    }
   }
 
   private openVideo(info: StreamInfo, section: Section): VideoStream {

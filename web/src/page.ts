@@ -56,7 +56,8 @@ export class Page {
     this.app = new ConsoleApp(api, options, name, new TouchSticks(left, right), events, first);
     this.panels = this.build(left, right, api);
     this.later.use(({ installHook }) => installHook(this));
-    this.later.use(({ Rumble, ContactTone, SceneSwitch, createScene }) => {
+    this.later.use(({ Rumble, ContactTone, SceneSwitch, SoundStream, createScene }) => {
+      this.app.room.sound = SoundStream;
       this.board.takeScene(createScene(this.app, this.board, api), new SceneSwitch());
       this.app.touch.rumble = new Rumble();
       this.app.touch.tone = new ContactTone(this.app.audio);

@@ -250,8 +250,10 @@ function takeSources(state: ConsoleState, sources: readonly SourceStatus[], wall
     const failed = sourceWords(source);
     if (failed !== null) {
       if (before !== undefined) note(state, "warning", `${source.label}: ${failed}`, wallMs);
-    } else if (before === "reconnecting") note(state, "info", `${source.label} is back`, wallMs);
-    else if (source.detail !== "") note(state, "info", `${source.label} is ${source.detail}`, wallMs);
+    } else {
+      const said = [before === "reconnecting" ? "back" : "", source.detail].filter((words) => words !== "");
+      if (said.length > 0) note(state, "info", `${source.label} is ${said.join(", ")}`, wallMs);
+    }
   }
   state.sources = sources;
 }

@@ -1,3 +1,4 @@
+import { UNMARKED, type FrameMark } from "./medium_counts";
 import { isEvent } from "./serial";
 
 /**
@@ -12,6 +13,13 @@ export interface Trailer {
 export interface SplitFrame {
   readonly length: number; // bytes of the payload, without the trailer
   readonly trailer: Trailer | null; // null without a well-formed one
+}
+
+/** What a frame says by its trailer. */
+export function markOfTrailer(trailer: Trailer | null): FrameMark {
+  if (trailer === null) return UNMARKED;
+  const microseconds = trailer.captureTimeUs;
+  return { stamp: trailer.event, capturedMs: microseconds === null ? null : Number(microseconds) / 1000 };
 }
 
 const MAGIC = [0x4c, 0x4b, 0x54, 0x53]; // "LKTS"

@@ -133,7 +133,7 @@ export class Thumbnail {
   private follow(message: ServerMessage): void {
     if (message.type === "welcome") {
       this.link = { kind: "connected" };
-      if (this.peer !== null) this.room.open(this.peer, message.streams, this.heardMs);
+      if (this.peer !== null) this.room.open(this.peer, message.streams);
     } else if (message.type === "pong") this.pulse.answered(message.id, this.heardMs);
     else if (message.type === "feedback" && this.state.feedback === message) {
       this.room.changed();

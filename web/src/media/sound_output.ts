@@ -1,5 +1,3 @@
-import type { PacketPlayer } from "../rtc/section";
-
 /** Fades faster than a segment lasts and slower than a click. */
 const RAMP_S = 0.004;
 /** The gate must confirm itself this often, else the sound fades out on its own: a stalled page falls silent. */
@@ -7,30 +5,18 @@ const CONFIRM_S = 0.08;
 
 /** The speaker of one medium behind a gain that shuts by itself. */
 export class SoundOutput {
-  private readonly element = new Audio();
-  private readonly source: AudioNode;
   private readonly gain: GainNode;
   private readonly meter: AnalyserNode;
   private readonly samples: Float32Array<ArrayBuffer>;
 
   constructor(
     private readonly context: AudioContext,
-    source: MediaStreamTrack | PacketPlayer,
+    source: AudioNode,
   ) {
-    this.source = source instanceof MediaStreamTrack ? this.ofTrack(source) : source.connect(context);
     this.gain = new GainNode(context, { gain: 0 });
     this.meter = new AnalyserNode(context, { fftSize: 1024 });
     this.samples = new Float32Array(this.meter.fftSize);
-    this.source.connect(this.gain).connect(this.meter).connect(context.destination);
-  }
-
-  private ofTrack(track: MediaStreamTrack): AudioNode {
-    const stream = new MediaStream([track]);
-    // Chromium decodes a remote track only while an element plays it; the element itself stays silent.
-    this.element.muted = true;
-    this.element.srcObject = stream;
-    this.element.play().catch(() => undefined);
-    return this.context.createMediaStreamSource(stream);
+    source.connect(this.gain).connect(this.meter).connect(context.destination);
   }
 
   /** Lets sound through until the next call is due, or shuts it. */
@@ -50,9 +36,7 @@ export class SoundOutput {
   }
 
   close(): void {
-    this.source.disconnect();
     this.gain.disconnect();
     this.meter.disconnect();
-    this.element.srcObject = null;
   }
 }

@@ -1,38 +1,41 @@
 import { judge } from "../core/media_gate";
 import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../core/medium_counts";
-import { createSoundBacklog, skipTarget, waitingMs } from "../core/sound_backlog";
 import { START_MS, createSoundGate, observeSound } from "../core/sound_gate";
 import { findMark } from "../core/stamp_book";
 import type { Section } from "../rtc/section";
 import type { StreamInfo } from "../wire";
 import type { StampReader } from "../rtc/stamp_reader";
+import { PacketSound } from "./packet_sound";
 import { RenderLog } from "./render_log";
 import { SoundOutput } from "./sound_output";
+import type { SoundSource } from "./sound_source";
+import { TrackSound } from "./track_sound";
 
 /** One microphone: the segment being played is judged, and heard only while it passes. */
 export class SoundStream {
   readonly gate = createSoundGate();
   readonly log = new RenderLog();
   isOpen = false;
+  private readonly source: SoundSource;
   private readonly output: SoundOutput;
-  private readonly backlog = createSoundBacklog();
-  private droppedAtStart = 0; // before decoding, to begin with the newest
-  private skipsStart = false; // what is left out, or was last, waited while the browser opened its sound device
+  private droppedAtStart: number; // before decoding, to begin with the newest
 
   constructor(
     readonly info: StreamInfo,
     readonly section: Section,
-    private readonly reader: StampReader | null,
+    reader: StampReader | null,
     audio: AudioContext,
     private readonly context: () => GateContext,
   ) {
-    this.output = new SoundOutput(audio, section.source);
+    this.source = sourceOf(section, info.codec, reader, audio);
+    this.output = new SoundOutput(audio, this.source.node);
+    this.droppedAtStart = section.stamps?.dropped ?? 0;
     if (section.stamps !== null) section.stamps.onstamp = () => this.arrived();
   }
 
   /** Judges what plays now. Called at every feedback and every few milliseconds. */
   observe(context: GateContext, audible: boolean): void {
-    const playing = this.section.playing();
+    const playing = this.source.playing();
     const { stamps } = this.section;
     const mark = playing === undefined || stamps === null ? UNMARKED : findMark(stamps.book, playing);
     const before = this.gate.counts.rendered;
@@ -49,11 +52,11 @@ export class SoundStream {
     audible: boolean,
     now: number,
   ): boolean {
-    const queued = this.section.stamps?.queued ?? null;
-    const waiting = queued === null ? 0 : waitingMs(queued, playing, this.clockRate());
+    const waiting = this.source.waiting(playing);
     const passes = observeSound(this.gate, playing, mark, context, audible, now, waiting);
-    if (queued !== null) this.catchUp(playing, queued, now);
-    if (this.isStarting() || (this.skipsStart && this.backlog.skipTo !== null))
+    this.source.catchUp(playing, this.gate.isTooOld, (time) => this.wouldPass(time, context));
+    const isEarly = now - (this.gate.playsSinceMs ?? now) < START_MS;
+    if (this.isStarting() || (isEarly && this.source.leavesOut()))
       this.droppedAtStart = this.section.stamps?.dropped ?? 0;
     return passes;
   }
@@ -73,17 +76,12 @@ export class SoundStream {
     noteSeen(this.gate.counts, judge(feedback, mark.stamp, tolerance, gate, null).gap);
   }
 
-  private catchUp(playing: number, queued: number, now: number): void {
+  private wouldPass(rtpTimestamp: number, context: GateContext): boolean {
     const { stamps } = this.section;
-    if (this.reader === null || stamps === null) return;
-    const before = skipTarget(this.backlog, queued, playing, this.clockRate(), now, this.gate.isTooOld);
-    if (before === null) return;
-    this.skipsStart = now - (this.gate.playsSinceMs ?? now) < START_MS;
-    this.reader.skip(stamps, before);
-  }
-
-  private clockRate(): number {
-    return this.info.codec === "PCMU" ? 8000 : 48_000;
+    const mark = stamps === null ? undefined : findMark(stamps.book, rtpTimestamp);
+    if (mark === undefined) return false;
+    const { feedback, tolerance, gate } = context;
+    return judge(feedback, mark.stamp, tolerance, gate, ageOf(mark, context)).verdict === "render";
   }
 
   /** Whether the browser still plays what waited while it opened its sound device. */
@@ -111,5 +109,18 @@ export class SoundStream {
 
   close(): void {
     this.output.close();
+    this.source.close();
   }
+}
+
+function sourceOf(
+  section: Section,
+  codec: string,
+  reader: StampReader | null,
+  context: AudioContext,
+): SoundSource {
+  const { track, stamps } = section;
+  if (stamps?.packets === true) return new PacketSound(stamps, codec, context);
+  if (track === null) throw new TypeError("sound without a track and without packets");
+  return new TrackSound(section, track, reader, codec === "PCMU" ? 8000 : 48_000, context);
 }

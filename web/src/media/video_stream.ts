@@ -37,8 +37,7 @@ export class VideoStream {
       this.lastGoodMs = performance.now();
       offerPicture(this.gate, picture, rtpTimestamp, this.lookup, events.context(), this.draw);
     };
-    const { source } = section;
-    this.endFrames = source instanceof MediaStreamTrack ? openFrames(source, take) : () => undefined;
+    this.endFrames = section.track === null ? () => undefined : openFrames(section.track, take);
   }
 
   /** Judges the waiting picture again. */

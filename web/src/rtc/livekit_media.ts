@@ -10,18 +10,18 @@ import {
 import type { IceServer } from "../core/ice_servers";
 import type { LiveKitTicket } from "../core/relay";
 import { splitSounds } from "../core/sound_packets";
-import { PacketSound } from "./packet_sound";
+import { markOfTrailer, splitTrailer } from "../core/trailer";
 import type { RelayEvents, RelayLink } from "./relay_link";
 import { receivedSection, type Section } from "./section";
 import { SilenceWatch } from "./silence_watch";
-import type { StampReader } from "./stamp_reader";
+import { createStamps, notePacket, type ReceiverStamps, type StampReader } from "./stamp_reader";
 
 const OPEN_MS = 6000;
 
 /** Pictures, sound and feedback through a LiveKit. It ends once; trying again is not its client's business. */
 export class LiveKitMedia implements RelayLink {
   readonly sections = new Map<string, Section>();
-  private readonly sounds = new Map<number, PacketSound>();
+  private readonly sounds = new Map<number, ReceiverStamps>();
   private readonly room: Room;
   private readonly silence = new SilenceWatch(() => this.lose("the relay fell silent"));
   private readonly complete = Promise.withResolvers<null>();
@@ -48,10 +48,10 @@ export class LiveKitMedia implements RelayLink {
     });
     this.room.on(RoomEvent.Disconnected, () => this.lose("the connection to the relay was closed"));
     for (const { kind, mid, codec } of ticket.streams) {
-      if (kind !== "audio" || !PacketSound.canPlay(codec)) continue;
-      const sound = new PacketSound(codec);
-      this.sounds.set(Number(mid), sound);
-      this.sections.set(mid, sound);
+      if (kind !== "audio" || (codec !== "PCMU" && !("AudioDecoder" in globalThis))) continue;
+      const stamps = createStamps(true);
+      this.sounds.set(Number(mid), stamps);
+      this.sections.set(mid, { kind, track: null, stamps, playing: () => undefined });
     }
   }
 
@@ -69,7 +69,6 @@ export class LiveKitMedia implements RelayLink {
     this.silence.close();
     this.complete.resolve(null);
     for (const { stamps } of this.sections.values()) if (stamps !== null) this.reader?.detach(stamps);
-    for (const sound of this.sounds.values()) sound.close();
     this.room.disconnect().catch(() => undefined); // it is gone already
   }
 
@@ -107,8 +106,15 @@ export class LiveKitMedia implements RelayLink {
       this.silence.heard();
       this.events.feedback(new TextDecoder().decode(payload));
     } else if (topic === "sound") {
-      for (const { stream, time, data } of splitSounds(payload)) this.sounds.get(stream)?.take(time, data);
+      for (const { stream, time, data } of splitSounds(payload)) this.heardSound(stream, time, data);
     }
+  }
+
+  private heardSound(stream: number, time: number, data: Uint8Array): void {
+    const stamps = this.sounds.get(stream);
+    if (stamps === undefined) return;
+    const { length, trailer } = splitTrailer(data);
+    notePacket(stamps, time, markOfTrailer(trailer), false, data.slice(0, length).buffer);
   }
 
   private lose(why: string): void {

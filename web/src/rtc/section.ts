@@ -1,17 +1,11 @@
 import type { ReceiverStamps } from "./stamp_reader";
 
-/** Sound that comes in packets and not over RTP. */
-export interface PacketPlayer {
-  /** Plays from now on, into what is returned. */
-  connect(context: AudioContext): AudioNode;
-}
-
 /** One medium that is received, and the stamps of its frames. */
 export interface Section {
   readonly kind: "audio" | "video";
-  readonly source: MediaStreamTrack | PacketPlayer;
+  readonly track: MediaStreamTrack | null; // null: sound whose packets come to the page, as `stamps` tells
   readonly stamps: ReceiverStamps | null; // null where the browser has no transforms
-  playing(): number | undefined; // RTP timestamp of the sound that plays now
+  playing(): number | undefined; // RTP timestamp of the sound of `track` that plays now
 }
 
 /** What a browser receives over RTP. */
@@ -21,5 +15,5 @@ export function receivedSection(
   stamps: ReceiverStamps | null,
 ): Section {
   const playing = (): number | undefined => receiver.getSynchronizationSources()[0]?.rtpTimestamp;
-  return { kind, source: receiver.track, stamps, playing };
+  return { kind, track: stamps?.packets === true ? null : receiver.track, stamps, playing };
 }

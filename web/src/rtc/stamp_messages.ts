@@ -7,6 +7,7 @@ export interface TransformOptions {
   readonly receiver: number; // our own number of the receiver
   readonly kind: "audio" | "video";
   readonly trailer: boolean; // the carrier is the trailer
+  readonly packets: boolean; // sound that the page decodes and plays, and not the browser
 }
 
 /** Page to worker, at every feedback and change of settings: what sound is judged against. */
@@ -28,6 +29,7 @@ export interface FrameNote {
   readonly rtpTimestamp: number;
   readonly mark: FrameMark;
   readonly dropped: boolean; // too old already or skipped; never decoded
+  readonly packet: ArrayBuffer | null; // what the page decodes, without the trailer
 }
 
 export function isFrameNote(value: unknown): value is FrameNote {

@@ -1,5 +1,6 @@
 import { createArrivals, noteArrival, type Arrivals } from "../core/sound_backlog";
 import { createStampBook, noteMark, type StampBook } from "../core/stamp_book";
+import type { FrameMark } from "../core/medium_counts";
 import StampWorker from "./stamp_worker?worker&inline"; // a request of its own would cost a round trip
 import { isFrameNote, type SoundContext, type SoundSkip, type TransformOptions } from "./stamp_messages";
 
@@ -8,7 +9,33 @@ const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
 /** Stamps of one receiver's frames. */
 export interface ReceiverStamps extends Arrivals {
   readonly book: StampBook;
+  readonly packets: boolean; // its packets go to `onpacket`, not to the browser's decoder
   onstamp: (() => void) | null;
+  onpacket: ((rtpTimestamp: number, packet: ArrayBuffer) => void) | null;
+}
+
+export function createStamps(packets: boolean): ReceiverStamps {
+  return {
+    book: createStampBook(BOOK_LIMIT),
+    packets,
+    ...createArrivals(),
+    onstamp: null,
+    onpacket: null,
+  };
+}
+
+/** A frame came; `packet` is null where the page does not decode it. */
+export function notePacket(
+  stamps: ReceiverStamps,
+  rtpTimestamp: number,
+  mark: FrameMark,
+  dropped: boolean,
+  packet: ArrayBuffer | null,
+): void {
+  noteMark(stamps.book, rtpTimestamp, mark);
+  noteArrival(stamps, rtpTimestamp, dropped);
+  stamps.onstamp?.();
+  if (packet !== null) stamps.onpacket?.(rtpTimestamp, packet);
 }
 
 /** null where the browser has no transforms: no picture passes the gate there. */
@@ -32,12 +59,9 @@ export class StampReader {
 
   /** Puts the transform in front of a receiver's decoder. Call before the first frame arrives. */
   attach(receiver: RTCRtpReceiver, kind: "audio" | "video", trailer: boolean): ReceiverStamps {
-    const options: TransformOptions = { receiver: this.nextReceiver++, kind, trailer };
-    const stamps: ReceiverStamps = {
-      book: createStampBook(BOOK_LIMIT),
-      ...createArrivals(),
-      onstamp: null,
-    };
+    const packets = kind === "audio" && "AudioDecoder" in globalThis;
+    const options: TransformOptions = { receiver: this.nextReceiver++, kind, trailer, packets };
+    const stamps = createStamps(packets);
     this.receivers.set(options.receiver, stamps);
     receiver.transform = new RTCRtpScriptTransform(this.worker, options);
     return stamps;
@@ -67,9 +91,6 @@ export class StampReader {
   private note(data: unknown): void {
     if (!isFrameNote(data)) return;
     const stamps = this.receivers.get(data.receiver);
-    if (stamps === undefined) return;
-    noteMark(stamps.book, data.rtpTimestamp, data.mark);
-    noteArrival(stamps, data.rtpTimestamp, data.dropped);
-    stamps.onstamp?.();
+    if (stamps !== undefined) notePacket(stamps, data.rtpTimestamp, data.mark, data.dropped, data.packet);
   }
 }

@@ -1,9 +1,9 @@
 /** Transform worker: reads the stamp of every encoded frame before it is decoded, and takes the trailer off. */
 import { eventOfOffset } from "../core/capture_time";
 import { judge } from "../core/media_gate";
-import { UNMARKED, ageOf, type FrameMark, type GateContext } from "../core/medium_counts";
+import { ageOf, type FrameMark, type GateContext } from "../core/medium_counts";
 import { rtpGap } from "../core/sound_backlog";
-import { splitTrailer } from "../core/trailer";
+import { markOfTrailer, splitTrailer } from "../core/trailer";
 import type { FrameNote, SoundContext, SoundSkip, TransformOptions } from "./stamp_messages";
 
 interface EncodedFrame {
@@ -20,7 +20,7 @@ interface Transformer {
 interface TransformScope {
   onrtctransform: ((event: { readonly transformer: Transformer }) => void) | null;
   onmessage: ((event: MessageEvent<SoundContext | SoundSkip>) => void) | null;
-  postMessage(note: FrameNote): void;
+  postMessage(note: FrameNote, transfer: Transferable[]): void;
 }
 
 const scope = self as unknown as TransformScope;
@@ -51,9 +51,13 @@ function passes(frame: EncodedFrame, options: TransformOptions): boolean {
   const mark = options.trailer ? takeTrailer(frame) : markOf(metadata);
   const dropped =
     options.kind === "audio" && (isSkipped(options.receiver, metadata.rtpTimestamp) || isTooOld(mark));
-  if (metadata.rtpTimestamp !== undefined)
-    scope.postMessage({ receiver: options.receiver, rtpTimestamp: metadata.rtpTimestamp, mark, dropped });
-  return !dropped;
+  const packet = options.packets && !dropped ? frame.data : null;
+  if (metadata.rtpTimestamp !== undefined) {
+    const { receiver } = options;
+    const note = { receiver, rtpTimestamp: metadata.rtpTimestamp, mark, dropped, packet };
+    scope.postMessage(note, packet === null ? [] : [packet]);
+  }
+  return !dropped && packet === null;
 }
 
 /** `captureTime` counts from this worker's own time origin. */
@@ -67,10 +71,8 @@ function markOf(metadata: ReturnType<EncodedFrame["getMetadata"]>): FrameMark {
 
 function takeTrailer(frame: EncodedFrame): FrameMark {
   const { length, trailer } = splitTrailer(new Uint8Array(frame.data));
-  if (trailer === null) return UNMARKED;
-  frame.data = frame.data.slice(0, length);
-  const microseconds = trailer.captureTimeUs;
-  return { stamp: trailer.event, capturedMs: microseconds === null ? null : Number(microseconds) / 1000 };
+  if (trailer !== null) frame.data = frame.data.slice(0, length);
+  return markOfTrailer(trailer);
 }
 
 function isSkipped(receiver: number, rtpTimestamp: number | undefined): boolean {
