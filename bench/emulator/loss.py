@@ -1,12 +1,15 @@
 """Which packets are lost: the Gilbert–Elliott model, of which independent loss is a case. No I/O.
 
 The path is in a good or a bad state and changes between them with fixed probabilities at every packet; each state
-loses packets with a probability of its own.
+loses packets with a probability of its own. A burst is a matter of milliseconds: after a pause the state is drawn
+anew, else five packets of a path that has one every other second would be lost for ten seconds on end.
 """
 
 from dataclasses import dataclass
 
 __all__ = ["NO_LOSS", "Loss", "LossState", "bursty", "independent"]
+
+PAUSE = 0.5  # s
 
 
 @dataclass(frozen=True)
@@ -19,13 +22,15 @@ class Loss:
     bad: float = 0.0  # loss while bad
 
     @property
+    def in_bad(self) -> float:
+        """The share of packets that meet the bad state in the long run."""
+        changing = self.to_bad + self.to_good
+        return self.to_bad / changing if changing else 0.0
+
+    @property
     def mean(self) -> float:
         """The share of packets lost in the long run."""
-        changing = self.to_bad + self.to_good
-        if changing == 0:
-            return self.good
-        bad = self.to_bad / changing
-        return bad * self.bad + (1 - bad) * self.good
+        return self.in_bad * self.bad + (1 - self.in_bad) * self.good
 
 
 NO_LOSS = Loss()
@@ -62,8 +67,13 @@ class LossState:
 
     def __init__(self) -> None:
         self._bad = False
+        self._last = -float("inf")  # s, when the last packet came
 
-    def loses(self, loss: Loss, change: float, fate: float) -> bool:
-        """Whether the next packet is lost."""
-        self._bad = change >= loss.to_good if self._bad else change < loss.to_bad
+    def loses(self, loss: Loss, change: float, fate: float, now: float) -> bool:
+        """Whether the packet that comes `now` (s) is lost."""
+        if now - self._last > PAUSE:
+            self._bad = change < loss.in_bad
+        else:
+            self._bad = change >= loss.to_good if self._bad else change < loss.to_bad
+        self._last = now
         return fate < (loss.bad if self._bad else loss.good)

@@ -69,7 +69,7 @@ class ImpairedPath:
         change, fate, share, swap = (self._random.random() for _ in range(4))
         counts, impairment = self.statistics, self.impairment
         counts.offered += 1
-        lost = self._loss.loses(impairment.loss, change, fate)
+        lost = self._loss.loses(impairment.loss, change, fate, now)
         silence = None if self._outages is None else self._outages.at(now)
         if silence is not None and not silence.hold:
             counts.outage_dropped += 1

@@ -10,9 +10,10 @@ from bench.emulator.loss import NO_LOSS, Loss, LossState, bursty, independent
 COUNT = 100_000
 
 
-def pattern(loss: Loss, seed: int = 1) -> list[bool]:
+def pattern(loss: Loss, seed: int = 1, apart: float = 0.01) -> list[bool]:
+    """Packets `apart` seconds."""
     random, state = Random(seed), LossState()
-    return [state.loses(loss, random.random(), random.random()) for _ in range(COUNT)]
+    return [state.loses(loss, random.random(), random.random(), apart * number) for number in range(COUNT)]
 
 
 def mean_burst(lost: list[bool]) -> float:
@@ -31,6 +32,12 @@ def test_bursty_loss_has_its_share_and_its_length(share: float, length: float) -
     lost = pattern(bursty(share, length))
     assert sum(lost) / COUNT == pytest.approx(share, rel=0.1)
     assert mean_burst(lost) == pytest.approx(length, rel=0.1)
+
+
+def test_a_burst_is_over_after_a_pause_so_that_of_seldom_packets_each_is_lost_for_itself() -> None:
+    lost = pattern(bursty(0.05, 10), apart=2.0)
+    assert sum(lost) / COUNT == pytest.approx(0.05, rel=0.05)
+    assert mean_burst(lost) == pytest.approx(1 / 0.95, rel=0.05)
 
 
 def test_both_states_may_lose_their_own_share() -> None:
