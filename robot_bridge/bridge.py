@@ -42,6 +42,7 @@ from robot_bridge.watchdogs import Held, Watchdogs
 __all__ = ["Bridge"]
 
 REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
+ADDRESSES_FILE = "addresses.txt"  # in the state directory
 MAX_FAULT = 500  # characters, of one
 MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
 
@@ -93,6 +94,7 @@ class Bridge:
             max_links=settings.max_links,
             max_strangers=settings.max_strangers,
             operator_grace=settings.operator_grace,
+            addresses_file=None if settings.state_dir is None else settings.state_dir / ADDRESSES_FILE,
             secret=settings.secret,
             tls=None if settings.tls is None else settings.tls.bridge_context(),
         )

@@ -7,7 +7,8 @@ import ssl
 from collections.abc import Callable
 from functools import partial
 
-from robot_bridge.applicants import Applicants, address_group
+from robot_bridge.applicants import Applicants
+from robot_bridge.known_addresses import KnownAddresses
 
 __all__ = ["LinkAcceptor", "listening_socket"]
 
@@ -19,7 +20,6 @@ RATE = 1000.0  # connections accepted per second; the others wait in the kernel,
 BURST = 100
 HANDSHAKE_RATE = 100.0  # TLS handshakes a second, each a millisecond of the loop, and as many of known addresses
 HANDSHAKE_BURST = 20
-MAX_KNOWN = 64  # addresses whose links were admitted, the newest
 TLS_HEADER = 5  # bytes of a TLS record, of which the last two are its length (RFC 8446 5.1)
 MAX_HELLO = 16 * 1024  # bytes of a record
 
@@ -71,6 +71,7 @@ class LinkAcceptor:
         failed: Callable[[], None],
         *,
         max_handshakes: int,
+        known: KnownAddresses | None = None,
     ) -> None:
         """`failed`: a TLS handshake did. `max_handshakes`: that wait for a first record, and as many that go on."""
         self._listener = listener
@@ -83,7 +84,8 @@ class LinkAcceptor:
         self._accepts = _Pace(RATE, BURST)
         self._strangers = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
         self._acquainted = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
-        self._known: dict[str, None] = {}  # address groups, oldest first
+        self._known = known or KnownAddresses(None)
+        self._writing: asyncio.Task[None] | None = None
 
     def start(self) -> None:
         self._listener.setblocking(False)
@@ -91,11 +93,9 @@ class LinkAcceptor:
 
     def admitted(self, address: str) -> None:
         """A link from there was."""
-        group = address_group(address)
-        self._known.pop(group, None)
-        self._known[group] = None
-        if len(self._known) > MAX_KNOWN:
-            del self._known[next(iter(self._known))]
+        if self._known.add(address) and (self._writing is None or self._writing.done()):
+            writing = asyncio.to_thread(self._known.write)
+            self._writing = asyncio.get_running_loop().create_task(writing, name="known addresses")
 
     async def close(self) -> None:
         """May be called again."""
@@ -104,6 +104,8 @@ class LinkAcceptor:
             if accepting is not None:
                 accepting.cancel()
                 await asyncio.wait([accepting])
+            if self._writing is not None:
+                await asyncio.wait([self._writing])
         finally:  # also when the closing is cancelled: nobody comes back to it
             self._listener.close()
 
@@ -141,7 +143,7 @@ class LinkAcceptor:
             assert task is not None  # this is one
             self._silent.remove(task)
             self._bound(self._shaking, task, address)
-            await (self._acquainted if address_group(address) in self._known else self._strangers).take()
+            await (self._acquainted if address in self._known else self._strangers).take()
             await loop.connect_accepted_socket(
                 self._factory, connection, ssl=self._context, ssl_handshake_timeout=HANDSHAKE_TIMEOUT
             )

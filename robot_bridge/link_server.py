@@ -7,11 +7,13 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Protocol
 
 from robot_bridge.applicants import Applicants
 from robot_bridge.counters import BridgeCounters
 from robot_bridge.errors import ListenError
+from robot_bridge.known_addresses import KnownAddresses
 from robot_bridge.link_acceptor import LinkAcceptor, listening_socket
 from robot_bridge.link_session import BadInput, BridgeSession
 from robot_bridge.link_transport import TICK_INTERVAL, LinkTransport
@@ -117,6 +119,7 @@ class LinkServer:
         max_links: int,
         max_strangers: int,
         operator_grace: float = 0.0,
+        addresses_file: Path | None = None,
         secret: LinkSecret | None = None,
         tls: ssl.SSLContext | None = None,
         clock: Callable[[], float] = time.monotonic,
@@ -127,6 +130,7 @@ class LinkServer:
         self._max_links = max_links
         self._max_strangers = max_strangers
         self._operator_grace = operator_grace
+        self._addresses = KnownAddresses(addresses_file)
         self._kept_for = ""  # name of the client whose operator link broke; "" when none has
         self._kept_until = -math.inf  # s, for that client
         self._secret = secret
@@ -160,11 +164,14 @@ class LinkServer:
         """
         try:
             listener = await asyncio.to_thread(listening_socket, host, port)  # which may look up a name
+            await asyncio.to_thread(self._addresses.read)
         except OSError as error:
             raise ListenError(f"cannot listen on {host}:{port}: {error}") from error
         address = listener.getsockname()
         self._acceptor = LinkAcceptor(
-            listener, self._tls, self._new_peer, self._tls_failed, max_handshakes=self._max_strangers
+            *(listener, self._tls, self._new_peer, self._tls_failed),
+            max_handshakes=self._max_strangers,
+            known=self._addresses,
         )
         self._acceptor.start()
         return str(address[0]), int(address[1])

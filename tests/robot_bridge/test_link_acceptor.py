@@ -92,13 +92,6 @@ async def test_what_is_not_a_whole_record_takes_no_handshake_from_anybody(tmp_pa
             each.transport.abort()
 
 
-async def test_no_more_addresses_are_known_than_a_few(tmp_path: Path) -> None:
-    async with tls_acceptor(tmp_path) as tls:
-        for number in range(1000):
-            tls.acceptor.admitted(f"10.0.{number // 250}.{number % 250}")
-        assert len(tls.acceptor._known) == 64
-
-
 async def test_a_closing_that_is_cancelled_leaves_no_socket_open(monkeypatch: pytest.MonkeyPatch) -> None:
     listener = listening_socket("127.0.0.1", 0)
     acceptor = LinkAcceptor(listener, None, asyncio.Protocol, lambda: None, max_handshakes=1)

@@ -148,3 +148,24 @@ async def test_a_console_that_was_admitted_comes_back_while_strangers_take_all_h
         for _ in range(2):
             async with RobotLink(*bridge.address, "operator", secret=SECRET, tls=trust) as link:
                 assert link.connected
+
+
+async def test_it_comes_back_to_the_next_bridge_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robot_bridge.link_acceptor.HANDSHAKE_RATE", 0.001)
+    monkeypatch.setattr("robot_bridge.link_acceptor.HANDSHAKE_BURST", 1)
+    authority = Authority(tmp_path)
+    trust = LinkTls(authority=authority.certificate).client_context()
+    tls = LinkTls(certificate=authority.issue("bridge"))
+    settings = BridgeSettings(port=0, secret=SECRET, tls=tls, state_dir=tmp_path / "state")
+    async with (
+        Bridge(RecordingRobot(), settings) as bridge,
+        RobotLink(*bridge.address, "operator", secret=SECRET, tls=trust) as link,
+    ):
+        assert link.connected
+    async with Bridge(RecordingRobot(), settings) as bridge:
+        _, stranger = await asyncio.open_connection(
+            *bridge.address, ssl=trust, server_hostname="127.0.0.1", local_addr=("127.0.0.2", 0)
+        )
+        async with RobotLink(*bridge.address, "operator", secret=SECRET, tls=trust) as link:
+            assert link.connected
+        stranger.transport.abort()
