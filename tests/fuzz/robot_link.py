@@ -61,6 +61,9 @@ class Rig:
         self.bridge._issue()
         self.executed_at = float("-inf")
 
+    def admitted(self, address: str) -> None:
+        """As the acceptor is told; nobody waits here."""
+
     def connect(self) -> LinkPeer:
         peer = LinkPeer(self.links, self.clock, self.bridge._settings.secret)
         peer.connection_made(Wire())
