@@ -86,6 +86,7 @@ class LinkAcceptor:
         self._acquainted = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
         self._known = known or KnownAddresses(None)
         self._writing: asyncio.Task[None] | None = None
+        self._is_unwritten = False
 
     def start(self) -> None:
         self._listener.setblocking(False)
@@ -93,9 +94,16 @@ class LinkAcceptor:
 
     def admitted(self, address: str) -> None:
         """A link from there was."""
-        if self._known.add(address) and (self._writing is None or self._writing.done()):
-            writing = asyncio.to_thread(self._known.write)
-            self._writing = asyncio.get_running_loop().create_task(writing, name="known addresses")
+        if self._context is None or not self._known.add(address):
+            return
+        self._is_unwritten = True
+        if self._writing is None or self._writing.done():
+            self._writing = asyncio.get_running_loop().create_task(self._write_known(), name="known addresses")
+
+    async def _write_known(self) -> None:
+        while self._is_unwritten:
+            self._is_unwritten = False
+            await asyncio.to_thread(self._known.write)
 
     async def close(self) -> None:
         """May be called again."""

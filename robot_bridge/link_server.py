@@ -162,9 +162,9 @@ class LinkServer:
         Raises:
             ListenError: the address cannot be had.
         """
+        await asyncio.to_thread(self._addresses.read)
         try:
             listener = await asyncio.to_thread(listening_socket, host, port)  # which may look up a name
-            await asyncio.to_thread(self._addresses.read)
         except OSError as error:
             raise ListenError(f"cannot listen on {host}:{port}: {error}") from error
         address = listener.getsockname()

@@ -1,12 +1,15 @@
 import asyncio
 import contextlib
+import os
 import ssl
+import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
 
+from robot_bridge.known_addresses import KnownAddresses
 from robot_bridge.link_acceptor import LinkAcceptor, listening_socket
 from robot_bridge.link_tls import LinkTls
 from tests.support.certificates import Authority
@@ -17,7 +20,7 @@ PATIENCE = 20.0  # s
 class Tls:
     """An acceptor that speaks TLS, and clients of it."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, known: KnownAddresses | None) -> None:
         authority = Authority(directory)
         listener = listening_socket("127.0.0.1", 0)
         self.port = int(listener.getsockname()[1])
@@ -29,6 +32,7 @@ class Tls:
             asyncio.Protocol,
             lambda: self.failures.put_nowait(None),
             max_handshakes=8,
+            known=known,
         )
 
     async def shake(self, host: str) -> None:
@@ -49,8 +53,8 @@ class Tls:
 
 
 @asynccontextmanager
-async def tls_acceptor(directory: Path) -> AsyncIterator[Tls]:
-    tls = Tls(directory)
+async def tls_acceptor(directory: Path, known: KnownAddresses | None = None) -> AsyncIterator[Tls]:
+    tls = Tls(directory, known)
     tls.acceptor.start()
     try:
         async with asyncio.timeout(PATIENCE):
@@ -90,6 +94,27 @@ async def test_what_is_not_a_whole_record_takes_no_handshake_from_anybody(tmp_pa
         await tls.shake("127.0.0.2")
         for each in said:
             each.transport.abort()
+
+
+async def test_an_address_that_is_admitted_while_others_are_written_is_written_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "addresses.txt"
+    begun, goes_on = threading.Event(), threading.Event()
+    replace = os.replace
+
+    def slow(fresh: Path, to: Path) -> None:
+        begun.set()
+        assert goes_on.wait(PATIENCE)
+        replace(fresh, to)
+
+    monkeypatch.setattr("robot_bridge.known_addresses.os.replace", slow)
+    async with tls_acceptor(tmp_path, KnownAddresses(path)) as tls:
+        tls.acceptor.admitted("192.0.2.1")
+        await asyncio.to_thread(begun.wait, PATIENCE)
+        tls.acceptor.admitted("192.0.2.2")
+        goes_on.set()
+    assert path.read_text().split() == ["192.0.2.1", "192.0.2.2"]
 
 
 async def test_a_closing_that_is_cancelled_leaves_no_socket_open(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,6 +123,7 @@ async def test_an_operator_that_floods_gets_its_answers_and_the_stop_of_others_i
             assert (await watcher.find(StopTaken)).press == "a" * 32
             assert bridge.counters.refusals["wrong_size"] > 0
         assert counting.most <= 4 * READ_BURST
+        await counting.until(lambda: bridge.links == 0, "the bridge has read to the end what the flood left")
         async with operator(bridge, armed=False) as driver:
             await driver.heard(lambda feedback: feedback.stop.stopped)
 
