@@ -11,6 +11,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from bench.driving import drive_on
 from bench.emulator.delay import Delay
 from bench.emulator.network_process import NetworkProcess
 from bench.emulator.profile import Profile, TwoWay
@@ -132,7 +133,7 @@ async def _drive(operator: Console, rate: float, seconds: float) -> None:
     values = [0.2, *[0.0] * (len(operator.description.axes) - 2), 0.8]
     end = time.monotonic() + seconds
     while (now := time.monotonic()) < end:
-        await operator.drive(values)
+        await drive_on(operator, values)
         await asyncio.sleep(max(0.0, now + 1 / rate - time.monotonic()))
 
 

@@ -10,6 +10,7 @@ import math
 import sys
 import time
 
+from bench.driving import drive_on
 from client import Console
 
 __all__ = ["main"]
@@ -27,7 +28,7 @@ async def drive(link: str, interval: float) -> None:
         while True:
             began = time.monotonic()
             swing = math.sin(2 * math.pi * began / SWING_SECONDS)
-            await console.drive({axis.name: axis.rest + reach * swing})
+            await drive_on(console, {axis.name: axis.rest + reach * swing})
             trips.append(round((time.monotonic() - began) * 1000, 3))
             if began - told >= 1.0:
                 print(json.dumps({"at": began, "event": console.stats().event, "trips_ms": trips}), flush=True)

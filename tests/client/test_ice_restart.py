@@ -109,9 +109,9 @@ async def test_after_the_path_is_cut_a_restart_brings_commands_and_pictures_back
                 assert len(rig.services.console.peers) == 1
                 await console.rest()
                 assert paths.forwarders[1].passed > 0
+                assert rig.count("lockstep_rests_total", why="disconnected") == 0
         finally:
             paths.close()
-    assert rig.count("lockstep_rests_total", why="disconnected") == 0
 
 
 async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was() -> None:
@@ -164,9 +164,9 @@ async def test_an_old_path_without_answers_ends_nothing_while_a_restart_is_under
                 after = await drive_on(console, values)
                 assert after.event > before.event
                 assert len(rig.services.console.peers) == 1
+                assert rig.count("lockstep_rests_total", why="disconnected") == 0
         finally:
             paths.close()
-    assert rig.count("lockstep_rests_total", why="disconnected") == 0
 
 
 @pytest.mark.usefixtures("hasty_consent")

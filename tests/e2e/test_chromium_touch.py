@@ -87,9 +87,9 @@ async def test_a_contact_is_felt_no_later_than_it_is_seen_and_rumble_ends_with_e
 
 
 async def test_triggers_rumble_where_the_pad_has_motors_in_them_and_rumble_can_be_switched_off(
-    stack: Stack, chromium: Browser
+    own_stack: Stack, chromium: Browser
 ) -> None:
-    async with open_console(chromium, stack.operator) as console:
+    async with open_console(chromium, own_stack.operator) as console:
         page = console.page
         await console.until_live()
         await page.evaluate("testPad.unplug(); testPad.plug({ effects: ['dual-rumble', 'trigger-rumble'] })")

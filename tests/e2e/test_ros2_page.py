@@ -43,7 +43,7 @@ async def test_the_page_drives_the_node_and_shows_what_it_says(base: Stack, node
         await console.press(RB, False)
         await console.until("!s.driving && s.at_rest === true")  # so is a robot that still has a last 1 cm/s to go
         twists = [note["values"] for note in await node.ended_in_one_zero()]
-        assert max(forward for forward, _ in twists) == pytest.approx(0.5)
+        assert 0.45 < max(forward for forward, _ in twists) < 0.501, "the stick's full travel, or nearly"
 
         await console.press(RB)
         await console.until("s.driving && s.at_rest === false")

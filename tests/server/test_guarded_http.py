@@ -334,11 +334,10 @@ async def test_who_does_not_read_its_answer_loses_the_connection() -> None:
 
 @pytest.mark.parametrize(("taken", "stays"), [(guarded_http.LEAST_READ // 2, False), (guarded_http.LEAST_READ, True)])
 async def test_an_answer_has_to_be_read_so_fast(taken: int, stays: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    places: list[Place] = []
     served = ConnectionPlaces.serve
 
     def serve(self: ConnectionPlaces, place: Place, address: str, link: str) -> bool:
-        places.append(place)
+        place.close.__self__.get_write_buffer_size = size  # type: ignore[attr-defined]
         return served(self, place, address, link)
 
     monkeypatch.setattr(ConnectionPlaces, "serve", serve)
@@ -354,7 +353,6 @@ async def test_an_answer_has_to_be_read_so_fast(taken: int, stays: bool, monkeyp
     async with guarded_console(request_timeout=0.1) as (rig, port):
         reader, writer = await _open(port, HEAD + b"\r\n")
         await _answer(reader)
-        places[0].close.__self__.get_write_buffer_size = size  # type: ignore[attr-defined]
         if stays:
             async with asyncio.timeout(PATIENCE):
                 await looked.wait()

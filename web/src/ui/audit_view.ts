@@ -72,7 +72,7 @@ class AuditView<Entry extends AuditEntry> {
     this.scroll = h(
       "div",
       "audit-scroll",
-      { tabindex: "0", "aria-label": "Audit trail" },
+      { role: "region", tabindex: "0", "aria-label": "Audit trail" },
       this.table,
       this.more,
     );

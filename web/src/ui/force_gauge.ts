@@ -42,7 +42,7 @@ export function createForceGauge(app: ForceSource, onContact: boolean): Panel {
   const element = h(
     "div",
     onContact ? "gauge force contact" : "gauge force",
-    { "aria-label": "Contact force" },
+    { role: "group", "aria-label": "Contact force" },
     h("span", "gauge-name", {}, "Force"),
     drawing,
     value,

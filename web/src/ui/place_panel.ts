@@ -15,7 +15,7 @@ export function createPlacePanel(app: ConsoleApp): Panel {
   const rows = h("dl", "place-rows");
   const stale = createStaleMark(app);
   const name = h("span", "gauge-name", {}, "Position");
-  const element = h("div", "places", { "aria-label": "Position" }, name, rows, stale.element);
+  const element = h("div", "places", { role: "group", "aria-label": "Position" }, name, rows, stale.element);
   let description: RobotDescription | null = null;
   let shown: { place: Place; value: HTMLElement }[] = [];
   let fits = false;

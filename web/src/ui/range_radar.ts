@@ -21,7 +21,7 @@ export function createRangeRadar(app: ConsoleApp): Panel {
   const element = h(
     "div",
     "gauge radar",
-    { "aria-label": "Nearest obstacle" },
+    { role: "group", "aria-label": "Nearest obstacle" },
     h("span", "gauge-name", {}, "Nearest"),
     drawing,
     value,

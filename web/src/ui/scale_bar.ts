@@ -8,7 +8,7 @@ const SHARE = 0.22; // of the picture's width, at most
 export function createScaleBar(app: ConsoleApp, largeStream: () => string | null): Panel {
   const line = h("span", "scale-line", { "aria-hidden": "true" });
   const words = h("span", "scale-words");
-  const element = h("div", "scale-bar", { "aria-label": "Scale" }, words, line);
+  const element = h("div", "scale-bar", { role: "group", "aria-label": "Scale" }, words, line);
   return {
     element,
     update() {
