@@ -120,7 +120,7 @@ class Watcher:
         reply = promise.get_reply()  # the offer lives as long as this
         offer = reply.get_value("offer")
         text = offer.sdp.as_text()
-        self.peer.emit("set-local-description", offer, Gst.Promise.new())
+        self._describe("set-local-description", offer)
         GLib.idle_add(self._post, text.encode())  # not in this thread, which is the connection's own
 
     def _post(self, offer: bytes) -> None:
@@ -133,7 +133,12 @@ class Watcher:
         else:
             parsed = GstSdp.SDPMessage.new_from_text(answer)[1]
             described = GstWebRTC.WebRTCSessionDescription.new(GstWebRTC.WebRTCSDPType.ANSWER, parsed)
-            self.peer.emit("set-remote-description", described, Gst.Promise.new())
+            self._describe("set-remote-description", described)
+
+    def _describe(self, signal: str, description: GstWebRTC.WebRTCSessionDescription) -> None:
+        promise = Gst.Promise.new()
+        self.peer.emit(signal, description, promise)
+        promise.interrupt()  # nobody waits for it
 
     def _request(self, method: str, path: str, body: bytes | None = None) -> tuple[str, str]:
         """The body, and the Location that came with it. Raises OSError, HTTPError among them."""
