@@ -4,8 +4,8 @@ import asyncio
 
 from aiortc import RTCPeerConnection, RTCSessionDescription
 
-from client.aiortc_private import gather_only_on
 from client.peer import Route
+from server.media.aiortc_private import restrict_ice_hosts
 
 __all__ = ["connect_through"]
 
@@ -21,11 +21,10 @@ async def connect_through(route: Route, asking: RTCPeerConnection, answering: RT
         if asking.connectionState == "connected":
             connected.set()
 
-    gather_only_on(asking, ["127.0.0.1"])
+    restrict_ice_hosts(["127.0.0.1"])
     await asking.setLocalDescription(await asking.createOffer())
     offer = route.offer(asking.localDescription.sdp)
     await answering.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-    gather_only_on(answering, ["127.0.0.1"])
     await answering.setLocalDescription(await answering.createAnswer())
     answer = route.answer(answering.localDescription.sdp)
     await asking.setRemoteDescription(RTCSessionDescription(answer, "answer"))

@@ -14,8 +14,6 @@ SEQUENCES = 1 << 16
 WINDOW = 1024  # packets that may wait for a missing one
 PATIENCE = 0.3  # s to wait for a missing packet, at least
 PATIENT_TRIPS, MOST_PATIENCE = 2.2, 1.6  # round trips, s; a second try over a satellite takes 1.2 s
-RETRY = 0.06  # s between two requests for the same missing packets, at least; and a round trip
-MOST_ASKED = 128  # sequence numbers after the first missing one that one request covers
 KEYFRAME_RETRY = 0.4  # s between two keyframe requests, at least; and a round trip and a half
 
 
@@ -47,8 +45,6 @@ class Assembler(Protocol):
 
     def add(self, packet: MediaPacket, now: float) -> list[EncodedFrame]: ...
 
-    def missing(self, now: float) -> list[int]: ...
-
     def wants_keyframe(self, now: float) -> bool: ...
 
     def broken(self) -> None: ...
@@ -73,9 +69,6 @@ class AudioAssembler:
         self._newest = packet.sequence
         return [EncodedFrame(packet.timestamp, packet.data, packet.stamp, packet.captured)]
 
-    def missing(self, now: float) -> list[int]:
-        return []
-
     def wants_keyframe(self, now: float) -> bool:
         return False
 
@@ -84,7 +77,7 @@ class AudioAssembler:
 
 
 class VideoAssembler:
-    """Frames in order. Call `add` with every packet, then `missing` and `wants_keyframe` for what to ask the sender."""
+    """Frames in order. Call `add` with every packet, then `wants_keyframe`. Others ask for what is missing."""
 
     def __init__(self, is_keyframe: Callable[[bytes], bool]) -> None:
         self.lost = 0  # packets given up
@@ -94,11 +87,8 @@ class VideoAssembler:
         self._packets: dict[int, MediaPacket] = {}
         self._start: int | None = None  # sequence number that begins the next frame
         self._end = 0  # the first one after `_start` that is not there
-        self._highest = 0
         self._gap_since: float | None = None  # since when the first missing packet has held up all others
         self._gap_at = 0  # that packet
-        self._open_since: float | None = None  # since when packets have been missing at all
-        self._asked_at = float("-inf")
         self._needs_keyframe = True
         self._keyframe_due = float("inf")
 
@@ -112,24 +102,9 @@ class VideoAssembler:
         elif self._offset(packet.sequence) >= WINDOW or self._waited_too_long(now):
             self._give_up(packet.sequence)
         self._packets[packet.sequence] = packet
-        if (packet.sequence - self._highest) % SEQUENCES < SEQUENCES // 2:
-            self._highest = packet.sequence
         frames = self._complete()
         self._note_gap(now)
         return frames
-
-    def missing(self, now: float) -> list[int]:
-        """Sequence numbers to ask for once more; the first request is made when a gap opens."""
-        if (
-            self._start is None
-            or self._open_since is None
-            or now - max(self._open_since, self._asked_at) < max(RETRY, 1.1 * self.round_trip)
-        ):
-            return []
-        self._asked_at = now
-        count = min((self._highest - self._end) % SEQUENCES, MOST_ASKED)
-        absent = ((self._end + offset) % SEQUENCES for offset in range(count))
-        return [sequence for sequence in absent if sequence not in self._packets]
 
     def wants_keyframe(self, now: float) -> bool:
         """Whether to ask for a keyframe now."""
@@ -148,8 +123,8 @@ class VideoAssembler:
 
     def _begin_at(self, sequence: int) -> None:
         self._packets.clear()
-        self._start = self._end = self._highest = sequence
-        self._gap_since = self._open_since = None
+        self._start = self._end = sequence
+        self._gap_since = None
 
     def _give_up(self, sequence: int) -> None:
         """Start again at `sequence`, with a keyframe."""
@@ -167,10 +142,8 @@ class VideoAssembler:
     def _note_gap(self, now: float) -> None:
         waiting = self._offset(self._end) < len(self._packets)
         if not waiting:
-            self._gap_since = self._open_since = None
+            self._gap_since = None
             return
-        if self._open_since is None:
-            self._open_since = now
         if self._gap_since is None or self._gap_at != self._end:  # over a long path one gap opens before another closes
             self._gap_since, self._gap_at = now, self._end
 

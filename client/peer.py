@@ -1,41 +1,17 @@
-"""One WHEP connection to a console: peer connection, data channels, received streams."""
+"""One WHEP connection to a console: connection, data channels, received streams."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal, Protocol
 
-from aiortc import (
-    RTCBundlePolicy,
-    RTCConfiguration,
-    RTCDataChannel,
-    RTCIceGatherer,
-    RTCIceServer,
-    RTCIceTransportPolicy,
-    RTCPeerConnection,
-    RTCSessionDescription,
-)
-from aiortc.rtcrtpparameters import RTCRtpCodecCapability
-from aiortc.rtcrtpreceiver import RTCRtpReceiver
-
-from client.aiortc_private import (
-    PacketSink,
-    drain_dtls,
-    gather_only_on,
-    hasten_sctp,
-    keep_path,
-    send_control,
-    take_packets,
-    take_raw_rtp,
-    tell_data_from_stun,
-    use_ice_servers,
-)
+from client.endpoints import open_endpoint
 from client.errors import ConnectFailed, ConsoleError
-from client.finish import within
-from client.ice_restart_private import IceRestart
 from client.link import ConsoleLink
+from client.media_sections import receiving
+from client.packets import Packets, PacketSink
 from client.relay import RelayTicket
-from client.sdp import Section, offer_extension, read_sections
+from client.sdp import Section, read_sections
 from client.whep import Whep
 from robot_bridge.protocol.carriers import (
     CAPTURE_TIME_URI,
@@ -46,15 +22,31 @@ from robot_bridge.protocol.carriers import (
 )
 from robot_bridge.protocol.console import ClientMessage, encode_console_message
 from robot_bridge.protocol.messages import StopTaken
+from rtc.channels import ChannelClosed, ChannelMessage, ChannelNotOpen, ChannelOpened
+from rtc.dcep import Reliability
+from rtc.endpoint import Connection, Endpoint
+from rtc.interfaces import own_addresses
+from rtc.peer import OfferedMedia, PeerNotReady
+from rtc.peer_events import PeerEnded, PeerEvent, Restarted, RestartFailed
+from rtc.sctp import AssociationClosed, SendQueueFull
+from rtc.sdp import SdpError, parse_description, parse_fragment, write_description, write_fragment
+from rtc.turn.servers import IceServer
 
 __all__ = ["ChannelName", "Peer", "Route", "stamp_reader"]
 
 ChannelName = Literal["control", "session", "stop"]
-CHANNELS: tuple[ChannelName, ...] = ("control", "session", "stop")
-CONTROL_BACKLOG = 4096  # bytes; a message on `control` is worth nothing behind so many others
+CHANNELS: Mapping[ChannelName, Reliability] = {
+    "control": Reliability(ordered=False, max_retransmits=0),
+    "session": Reliability(),
+    "stop": Reliability(),
+}
 CLOSE_SECONDS = 3.0
-CODECS = {"video": ("VP8", "H264"), "audio": ("opus", "PCMU")}
+LOOPBACK = "127.0.0.1"
 EXTENSION_URIS: dict[Carrier, str] = {"native": EVENT_REFERENCE_URI, "capture-time": CAPTURE_TIME_URI}
+ENDS = {
+    "consent_expired": "the console answered nothing for 30 s",
+    "no_path": "no way to the console was found: is UDP between here and the console blocked?",
+}  # others: it closed the connection
 
 
 class Route(Protocol):
@@ -97,42 +89,47 @@ class Peer:
         self._on_message = on_message
         self._relay_only = relay_only
         self._relay = relay  # that media come from; "": from the console
-        self._ice_servers: list[RTCIceServer] = []
+        self._ice_servers: list[IceServer] = []
         self._whep = Whep(link, tls_ca)
         self._resource = ""
+        self._answer = ""
         self._closing = False
-        tell_data_from_stun()
-        self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
+        uri = EXTENSION_URIS.get(carrier)
+        media = [("video", receiving("video", codec, uri))] * video
+        media += [("audio", receiving("audio", sound_codec, uri))] * audio
+        self._offered = [OfferedMedia(str(number), kind, own) for number, (kind, own) in enumerate(media)]
+        self._endpoint: Endpoint | None = None
+        self._connection: Connection | None = None
+        self._packets: Packets | None = None
+        self._channels: dict[ChannelName, int] = {}
+        self._open: set[int] = set()  # channels
         self._stepped = asyncio.Event()  # a channel opened, or the connection ended
-        for _ in range(video):
-            transceiver = self._pc.addTransceiver("video", direction="recvonly")
-            if codec is not None:
-                transceiver.setCodecPreferences(_preferred("video", codec))
-        if audio:
-            transceiver = self._pc.addTransceiver("audio", direction="recvonly")
-            if sound_codec is not None:
-                transceiver.setCodecPreferences(_preferred("audio", sound_codec))
-        self._channels = {name: self._create_channel(name) for name in CHANNELS}
-        self._pc.on("connectionstatechange", self._state_changed)
+        self._restarted: asyncio.Future[bool] | None = None  # while ICE is restarted
 
-    @property
-    def _gather_on(self) -> list[str] | None:
-        """aioice never looks at loopback by itself; None: where it does look."""
-        return ["127.0.0.1"] if self._link.loopback and not self._relay_only else None
+    def _hosts(self) -> list[str]:
+        if self._relay_only:
+            return []
+        return [LOOPBACK] if self._link.loopback else own_addresses()
 
-    def _create_channel(self, name: ChannelName) -> RTCDataChannel:
-        if name == "control":
-            channel = self._pc.createDataChannel(name, ordered=False, maxRetransmits=0)
-        else:
-            channel = self._pc.createDataChannel(name)
-        channel.on("open", self._stepped.set)
-        channel.on("message", self._on_message)
-        channel.on("close", lambda: self.lose(f"the console closed the channel {name}"))
-        return channel
-
-    def _state_changed(self) -> None:
-        if self._pc.connectionState in ("failed", "closed"):
-            self.lose("the console closed the connection")
+    def _happened(self, event: PeerEvent) -> None:
+        match event:
+            case ChannelMessage(data=data):
+                self._on_message(data)
+            case ChannelOpened(channel=channel):
+                self._open.add(channel)
+                self._stepped.set()
+            case ChannelClosed(channel=channel):
+                self._open.discard(channel)
+                name = next((name for name, number in self._channels.items() if number == channel), "")
+                self.lose(f"the console closed the channel {name}")
+            case PeerEnded(reason=reason):
+                self.lose(ENDS.get(reason, "the console closed the connection"))
+            case Restarted() | RestartFailed():
+                if self._restarted is not None and not self._restarted.done():
+                    self._restarted.set_result(isinstance(event, Restarted))
+            case _:
+                if self._packets is not None:
+                    self._packets.heard(event)
 
     def lose(self, why: str) -> None:
         """Count the connection as lost; the first reason stands."""
@@ -150,40 +147,57 @@ class Peer:
 
         Raises:
             SignallingRefused, ConnectFailed: as `Whep.offer`.
+            ConnectFailed: also when only relays may be used, and none gives an address.
         """
         self._ice_servers = await self._whep.ice_servers()
-        use_ice_servers(self._pc, self._ice_servers, relay_only=self._relay_only)
-        if self._gather_on is not None:
-            gather_only_on(self._pc, self._gather_on)
-        keep_path(self._pc, lambda: self.lose("the console answered nothing for 30 s"))
-        hasten_sctp(self._pc)
-        drain_dtls(self._pc)
-        offer = await self._pc.createOffer()
-        uri = EXTENSION_URIS.get(self._carrier)
-        await self._pc.setLocalDescription(RTCSessionDescription(offer_extension(offer.sdp, uri), "offer"))
-        sdp = self._pc.localDescription.sdp
+        endpoint = self._endpoint = open_endpoint(self._hosts())
+        await self._ask_servers(endpoint)
+        connection = self._connection = endpoint.connect(controlling=True, listener=self._happened)
+        self._packets = Packets(connection)
+        sdp = write_description(connection.offer(self._offered))
         sent = sdp if self._route is None else self._route.offer(sdp)
         answer = await self._whep.offer(sent, trailer=self._carrier == "trailer", relay=self._relay)
         self._resource = answer.resource
         self._answer = answer.sdp if self._route is None else self._route.answer(answer.sdp)
         return read_sections(self._answer)
 
+    async def _ask_servers(self, endpoint: Endpoint) -> None:
+        troubles = await endpoint.ask(self._ice_servers)
+        if self._relay_only and not endpoint.candidates:
+            why = "; ".join(map(str, troubles)) or "the console knows none that answers"
+            raise ConnectFailed(f"no TURN server gave an address: {why}")
+
     def extension_id(self, sections: list[Section]) -> int | None:
         """The id under which the console sends the carrier's header extension."""
         uri = EXTENSION_URIS.get(self._carrier)
         return next((section.extensions[uri] for section in sections if uri and uri in section.extensions), None)
 
-    def take_packets(self, sinks: dict[str, PacketSink], extension_id: int | None) -> None:
+    def take_packets(self, sinks: Mapping[str, PacketSink], sections: list[Section]) -> None:
         """Give packets to the sink of their section's mid. Between `negotiate` and `connect`."""
-        take_packets(self._pc, sinks, extension_id, stamp_reader(self._carrier))
+        uri = EXTENSION_URIS.get(self._carrier)
+        self._need_packets().to_sinks(sinks, sections, uri, stamp_reader(self._carrier))
 
     def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
         """Give every RTP packet to `take`, and nothing to anybody else. Between `negotiate` and `connect`."""
-        take_raw_rtp(self._pc, take, control)
+        self._need_packets().plain(take, control)
 
-    async def send_control(self, packet: bytes) -> None:
+    def send_control(self, packet: bytes) -> None:
         """Send an RTCP packet, if the connection is up."""
-        await send_control(self._pc, packet)
+        self._need_packets().send_control(packet)
+
+    def round_trip(self, seconds: float) -> None:
+        """A round trip to the console takes so long: lost packets are asked for accordingly."""
+        self._need_connection().peer.note_round_trip(seconds)
+
+    def _need_connection(self) -> Connection:
+        if self._connection is None:
+            raise RuntimeError("negotiate first")
+        return self._connection
+
+    def _need_packets(self) -> Packets:
+        if self._packets is None:
+            raise RuntimeError("negotiate first")
+        return self._packets
 
     async def connect(self, seconds: float) -> None:
         """Connect; returns when the data channels are open.
@@ -191,13 +205,15 @@ class Peer:
         Raises:
             ConnectFailed: no way to the console over UDP within `seconds`.
         """
+        connection = self._need_connection()
         try:
-            await self._pc.setRemoteDescription(RTCSessionDescription(self._answer, "answer"))
-        except ValueError as error:
-            raise ConnectFailed(f"the console's answer cannot be read: {error}") from error
+            connection.accept(parse_description(self._answer))
+            self._channels = {name: connection.open_channel(name, reliability=CHANNELS[name]) for name in CHANNELS}
+        except (SdpError, PeerNotReady) as error:
+            raise ConnectFailed(f"the console's answer cannot be used: {error}") from error
         try:
             async with asyncio.timeout(seconds):
-                while not self.ended.is_set() and any(each.readyState != "open" for each in self._channels.values()):
+                while not self.ended.is_set() and not self._open >= set(self._channels.values()):
                     self._stepped.clear()
                     await self._stepped.wait()
         except TimeoutError:
@@ -208,13 +224,19 @@ class Peer:
 
     def send(self, channel: ChannelName, message: ClientMessage) -> None:
         """Send; on `control`, unless others still wait: an old command must not leave behind a newer one."""
-        target = self._channels[channel]
-        if target.readyState != "open":
+        connection, number = self._connection, self._channels.get(channel)
+        if connection is None or number is None or number not in self._open or self.ended.is_set():
             return
-        if channel == "control" and target.bufferedAmount > CONTROL_BACKLOG:
+        channels = connection.peer.channels
+        if channel == "control" and channels is not None and channels.association.has_waiting(number):
             self.skipped += 1
             return
-        target.send(encode_console_message(message))
+        try:
+            connection.send(number, encode_console_message(message))
+        except (PeerNotReady, ChannelNotOpen, AssociationClosed):
+            pass  # it has just ended, and says so
+        except SendQueueFull:
+            self.lose("the console takes nothing any more")
 
     async def restart_ice(self, seconds: float) -> None:
         """Look for a new path to the console; channels and media live on, and move to it when it is found.
@@ -223,22 +245,34 @@ class Peer:
             SignallingRefused: the console does not restart this session.
             ConnectFailed: no other path within `seconds`; the old one is as it was.
         """
-        first = read_sections(self._answer)[0]
+        connection, endpoint = self._need_connection(), self._endpoint
+        if endpoint is None:
+            raise RuntimeError("negotiate first")
         if self._ice_servers:  # their credentials may have ended
             self._ice_servers = await self._whep.ice_servers()
-        policy = RTCIceTransportPolicy.RELAY if self._relay_only else RTCIceTransportPolicy.ALL
-        restart = IceRestart(self._pc, RTCIceGatherer(self._ice_servers, policy), self._gather_on)
+        restarted = self._restarted = asyncio.get_running_loop().create_future()
         try:
             async with asyncio.timeout(seconds):
-                await restart.gather()
-                fragment = restart.fragment(first.kind, first.mid)
-                sent = fragment if self._route is None else self._route.offer(fragment)
-                answer = await self._whep.restart_ice(self._resource, sent)
-                await restart.connect(answer if self._route is None else self._route.answer(answer))
-        except (ValueError, ConnectionError, TimeoutError) as error:
+                endpoint.use_hosts(self._hosts())
+                await self._ask_servers(endpoint)
+                await self._signal_restart(connection)
+                found = await restarted
+        except (ValueError, PeerNotReady, TimeoutError) as error:
             raise ConnectFailed(f"no new path to the console: {error or 'none within the time'}") from error
         finally:
-            await restart.close()
+            self._restarted = None
+            if not (restarted.done() and not restarted.cancelled() and restarted.result()):
+                connection.cancel_restart()
+        if not found:
+            raise ConnectFailed("no new path to the console")
+
+    async def _signal_restart(self, connection: Connection) -> None:
+        section = connection.peer.tagged
+        fragment = write_fragment(connection.restart(), section.kind, section.mid)
+        sent = fragment if self._route is None else self._route.offer(fragment)
+        answer = await self._whep.restart_ice(self._resource, sent)
+        answer = answer if self._route is None else self._route.answer(answer)
+        connection.accept_restart(parse_fragment(answer, section.mid))
 
     async def stop_by_http(self, reason: str, press: str) -> StopTaken:
         """The way to stop that needs no data channel; raises as `Whep.stop`."""
@@ -257,15 +291,6 @@ class Peer:
         except (TimeoutError, ConsoleError):
             pass  # it ends the session by itself when nothing arrives any more
         finally:
-            await within(CLOSE_SECONDS, self._pc.close())
+            if self._endpoint is not None:
+                self._endpoint.close()
             await self._whep.aclose()
-
-
-def _preferred(kind: Literal["video", "audio"], codec: str) -> list[RTCRtpCodecCapability]:
-    """The capabilities with `codec` alone, and its retransmissions."""
-    if codec not in CODECS[kind]:
-        raise ValueError(f"no codec {codec}; there are {' and '.join(CODECS[kind])}")
-    capabilities = RTCRtpReceiver.getCapabilities(kind)
-    known = capabilities.codecs if capabilities is not None else []
-    names = {f"{kind}/{codec}".lower(), f"{kind}/rtx"}
-    return [capability for capability in known if capability.mimeType.lower() in names]

@@ -3,13 +3,13 @@
 import asyncio
 import random
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
-from client.aiortc_private import PacketSink
 from client.errors import NoSuchStream
 from client.media_gate import GateMode, MediaGate
+from client.packets import PacketSink
 from client.peer import stamp_reader
 from client.receiver_reports import ReceiverReports
 from client.render_log import Rendering
@@ -31,9 +31,10 @@ class PacketSource(Protocol):
     """Where packets come from."""
 
     def extension_id(self, sections: list[Section]) -> int | None: ...
-    def take_packets(self, sinks: dict[str, PacketSink], extension_id: int | None) -> None: ...
+    def take_packets(self, sinks: Mapping[str, PacketSink], sections: list[Section]) -> None: ...
     def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None: ...
-    async def send_control(self, packet: bytes) -> None: ...
+    def send_control(self, packet: bytes) -> None: ...
+    def round_trip(self, seconds: float) -> None: ...
 
 
 class Reception:
@@ -53,27 +54,27 @@ class Reception:
         self._streams: list[Stream] = []
         self._counters: dict[int, tuple[Section, RtpCounter]] = {}  # by SSRC
         self._executor: ThreadPoolExecutor | None = None
-        self._source: PacketSource | None = None  # of packets that are only counted
+        self._source: PacketSource | None = None
         self._reports = ReceiverReports(random.getrandbits(32))
 
     def prepare(self, source: PacketSource, sections: list[Section], decode: bool) -> None:
         """Take the packets of `source`: into decoders, or only counting them."""
-        extension_id = source.extension_id(sections)
+        self._source = source
         received = [section for section in sections if section.receives]
         if not decode:
+            extension_id = source.extension_id(sections)
             for section in received:
                 counter = RtpCounter(extension_id, stamp_reader(self._carrier))
                 ssrc = section.ssrcs[0] if section.ssrcs else 0
                 self._counters[ssrc] = (section, counter)
                 self._reports.add(ssrc, CLOCK_RATES[section.kind])
             source.take_raw_rtp(self._count, lambda data: self._reports.control(data, time.monotonic()))
-            self._source = source
             return
         sinks: dict[str, PacketSink] = {}
         for section in received:
             sinks[section.mid] = stream = self._new_stream(section)
             self._streams.append(stream)
-        source.take_packets(sinks, extension_id)
+        source.take_packets(sinks, sections)
         self._executor = ThreadPoolExecutor(DECODERS, thread_name_prefix="decoder")
 
     def _new_stream(self, section: Section) -> Stream:
@@ -95,7 +96,7 @@ class Reception:
 
     async def run(self) -> None:
         """Decode, or report what is only counted, until cancelled."""
-        if self._source is not None:
+        if self._source is not None and self._counters:
             await self._report(self._source)
         if self._executor is None:
             return
@@ -109,10 +110,12 @@ class Reception:
             await asyncio.sleep(REPORT_SECONDS * random.uniform(0.5, 1.5))
             report = self._reports.report(time.monotonic())
             if report is not None:
-                await source.send_control(report)
+                source.send_control(report)
 
     def round_trip(self, seconds: float) -> None:
         """A round trip to the console takes so long: lost packets are waited for accordingly."""
+        if self._source is not None and self._streams:
+            self._source.round_trip(seconds)
         for stream in self._streams:
             stream.round_trip(seconds)
 

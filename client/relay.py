@@ -3,26 +3,18 @@
 import asyncio
 import itertools
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import msgspec
-from aiortc import RTCBundlePolicy, RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidHandshake, WebSocketException
 from websockets.typing import Subprotocol
 
-from client.aiortc_private import (
-    PacketSink,
-    drain_dtls,
-    hasten_sctp,
-    keep_path,
-    send_control,
-    take_packets,
-    take_raw_rtp,
-)
+from client.endpoints import open_endpoint
 from client.errors import ConnectFailed
-from client.finish import within
+from client.media_sections import receiving
+from client.packets import Packets, PacketSink
 from client.sdp import Section, read_sections
 from robot_bridge.protocol.console import StreamInfo
 from robot_bridge.protocol.errors import MessageError
@@ -34,11 +26,17 @@ from robot_bridge.protocol.janus import (
     janus_request,
     parse_janus,
 )
+from rtc.channels import ChannelMessage
+from rtc.dcep import Reliability
+from rtc.endpoint import Connection, Endpoint
+from rtc.interfaces import own_addresses
+from rtc.peer import PeerNotReady, PeerSettings
+from rtc.peer_events import PeerEnded, PeerEvent
+from rtc.sdp import SdpError, SessionDescription, parse_description, write_description
 
 __all__ = ["RelayMedia", "RelayTicket"]
 
 ANSWER_SECONDS = 10.0
-CLOSE_SECONDS = 3.0
 KEEPALIVE_SECONDS = 25.0  # Janus forgets a session after 60 s
 SILENCE_SECONDS = 1.5  # without a word on the feedback channel; the console says something there every 0.4 s
 HELD_UP_SECONDS, MOST_HELD_UP = 0.1, 3  # later than that this process was held up; so often in a row it may be
@@ -73,9 +71,10 @@ class RelayMedia:
         self._numbers = itertools.count(1)
         self._prefix = secrets.token_hex(4)
         self._heard = asyncio.Event()
-        self._pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
-        self._pc.on("datachannel", self._listen)
-        self._pc.on("connectionstatechange", self._state_changed)
+        self._endpoint: Endpoint | None = None
+        self._connection: Connection | None = None
+        self._packets: Packets | None = None
+        self._offer: SessionDescription | None = None
 
     @property
     def name(self) -> str:
@@ -111,34 +110,47 @@ class RelayMedia:
             raise ConnectFailed("the relay offered nothing")
         offer = complete_description(str(heard.jsep["sdp"]))
         try:
-            await self._pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-        except Exception as error:
-            # aiortc has no error of its own for an offer that it cannot use.
+            self._offer = parse_description(offer)
+        except SdpError as error:
             raise ConnectFailed(f"the relay's offer cannot be used: {error}") from error
-        # Janus tells a subscriber of data only when the subscriber has a channel of its own.
-        self._listen(self._pc.createDataChannel("feedback", ordered=False, maxRetransmits=0))
-        keep_path(self._pc)
-        hasten_sctp(self._pc)
-        drain_dtls(self._pc)
+        self._endpoint = open_endpoint(own_addresses())
+        # We open DTLS: we know first that ICE has found a path.
+        settings = PeerSettings(setup="active")
+        self._connection = self._endpoint.connect(controlling=False, settings=settings, listener=self._event)
+        self._packets = Packets(self._connection)
         return _named(read_sections(offer), heard.data, {stream.mid: stream.stream for stream in streams})
 
     def extension_id(self, sections: list[Section]) -> int | None:
         """The stamp is behind the frame."""
         return None
 
-    def take_packets(self, sinks: dict[str, PacketSink], extension_id: int | None) -> None:
-        take_packets(self._pc, sinks, extension_id, lambda _: None)
+    def take_packets(self, sinks: Mapping[str, PacketSink], sections: list[Section]) -> None:
+        self._need_packets().to_sinks(sinks, sections)
 
     def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
-        take_raw_rtp(self._pc, take, control)
+        self._need_packets().plain(take, control)
 
-    async def send_control(self, packet: bytes) -> None:
-        await send_control(self._pc, packet)
+    def send_control(self, packet: bytes) -> None:
+        self._need_packets().send_control(packet)
+
+    def round_trip(self, seconds: float) -> None:
+        """To the console, not to the relay: nothing measures that, and what is assumed serves."""
+
+    @property
+    def connection(self) -> Connection:
+        """Of `rtc`, after `negotiate`; for measurements."""
+        if self._connection is None:
+            raise RuntimeError("negotiate first")
+        return self._connection
+
+    def _need_packets(self) -> Packets:
+        if self._packets is None:
+            raise RuntimeError("negotiate first")
+        return self._packets
 
     async def connect(self) -> None:
         """Returns when feedback can come. Raises ConnectFailed."""
-        await self._pc.setLocalDescription(await self._pc.createAnswer())
-        jsep = {"type": "answer", "sdp": self._pc.localDescription.sdp}
+        jsep = {"type": "answer", "sdp": self._answer()}
         await self._ask("message", body={"request": "start"}, jsep=jsep)
         try:
             async with asyncio.timeout(ANSWER_SECONDS):
@@ -156,20 +168,36 @@ class RelayMedia:
     async def close(self) -> None:
         """Idempotent."""
         self.ended.set()
-        await within(CLOSE_SECONDS, self._pc.close())
+        if self._endpoint is not None:
+            self._endpoint.close()
         if self._socket is not None:
             await self._socket.close()
 
-    def _listen(self, channel: RTCDataChannel) -> None:
-        channel.on("message", self._received)
+    def _answer(self) -> str:
+        offer, connection = self._offer, self._connection
+        if offer is None or connection is None:
+            raise RuntimeError("negotiate first")
+        media = {
+            section.mid: receiving("video" if section.kind == "video" else "audio")
+            for section in offer.sections
+            if section.is_media
+        }
+        try:
+            answer = connection.answer(offer, media)
+            # Janus tells a subscriber of data only when the subscriber has a channel of its own.
+            connection.open_channel("feedback", reliability=Reliability(ordered=False, max_retransmits=0))
+        except (SdpError, PeerNotReady) as error:
+            raise ConnectFailed(f"the relay's offer cannot be used: {error}") from error
+        return write_description(answer)
 
-    def _received(self, data: str | bytes) -> None:
-        self._heard.set()
-        self._on_message(data)
-
-    def _state_changed(self) -> None:
-        if self._pc.connectionState in ("failed", "closed"):
+    def _event(self, event: PeerEvent) -> None:
+        if isinstance(event, ChannelMessage):
+            self._heard.set()
+            self._on_message(event.data)
+        elif isinstance(event, PeerEnded):
             self._lose("the relay closed the connection")
+        elif self._packets is not None:
+            self._packets.heard(event)
 
     def _lose(self, why: str) -> None:
         if not self.ended.is_set():

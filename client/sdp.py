@@ -3,13 +3,8 @@
 import re
 from dataclasses import dataclass, field
 
-__all__ = ["Section", "offer_extension", "read_sections", "replace_candidates"]
+__all__ = ["Section", "read_sections", "replace_candidates"]
 
-# What aiortc needs of its own; everything else in its process-wide list belongs to somebody else.
-KEPT_EXTENSIONS = {
-    "urn:ietf:params:rtp-hdrext:sdes:mid",
-    "http://www.webrtc.org/experiments/rtp-hdrext/abs-send-time",
-}
 EXTMAP = re.compile(r"a=extmap:(\d+)(?:/\w+)? (\S+)")
 RTPMAP = re.compile(r"a=rtpmap:(\d+) ([^/\s]+)")
 SSRC = re.compile(r"a=ssrc:(\d+)")
@@ -58,28 +53,6 @@ def _read_line(section: Section, line: str) -> None:
         section.extensions[match[2]] = int(match[1])
     elif (match := SSRC.match(line)) and int(match[1]) not in section.ssrcs:
         section.ssrcs.append(int(match[1]))
-
-
-def offer_extension(sdp: str, uri: str | None) -> str:
-    """The offer with `uri` (none if None) in every audio and video section, and no other foreign extension.
-
-    The id is the same in all sections, as a BUNDLE demands (RFC 8843 9.1).
-    """
-    used = {int(match[1]) for match in EXTMAP.finditer(sdp) if match[2] in KEPT_EXTENSIONS}
-    free = next(number for number in range(1, 15) if number not in used)
-    lines: list[str] = []
-    for line in sdp.splitlines():
-        match = EXTMAP.match(line)
-        if match and match[2] not in KEPT_EXTENSIONS:
-            continue
-        lines.append(line)
-        if uri is not None and line.startswith("a=mid:") and _kind_at_end(lines) in ("audio", "video"):
-            lines.append(f"a=extmap:{free} {uri}")
-    return "\r\n".join(lines) + "\r\n"
-
-
-def _kind_at_end(lines: list[str]) -> str:
-    return next((line[2:].split(" ", 1)[0] for line in reversed(lines) if line.startswith("m=")), "")
 
 
 def replace_candidates(sdp: str, host: str, port: int) -> str:

@@ -86,10 +86,6 @@ class Stream:
                 break  # those behind it build on it
         return assembler.wants_keyframe(now)
 
-    def missing(self) -> list[int]:
-        """Sequence numbers to ask the sender for again."""
-        return self._assembler.missing(asyncio.get_running_loop().time()) if self._assembler is not None else []
-
     def round_trip(self, seconds: float) -> None:
         """A round trip to the sender takes so long."""
         self._round_trip = seconds

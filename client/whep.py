@@ -8,12 +8,12 @@ from urllib.parse import urljoin, urlsplit
 
 import httpx
 import msgspec
-from aiortc import RTCIceServer
 
 from client.errors import ConnectFailed, SignallingRefused
 from client.link import ConsoleLink
 from client.relay import RelayTicket
 from robot_bridge.protocol.messages import StopTaken
+from rtc.turn.servers import IceServer
 
 __all__ = ["Answer", "Whep"]
 
@@ -85,14 +85,14 @@ class Whep:
     async def aclose(self) -> None:
         await self._client.aclose()
 
-    async def ice_servers(self) -> list[RTCIceServer]:
+    async def ice_servers(self) -> list[IceServer]:
         """STUN and TURN servers with credentials that are good now; raises as `offer`."""
         response = await self._request("GET", self._base + "/api/ice")
         try:
             found = _ice_servers.decode(response.content).ice_servers
         except msgspec.DecodeError as error:
             raise SignallingRefused(response.status_code, "", "not a list of ICE servers") from error
-        return [RTCIceServer(each.urls, each.username, each.credential) for each in found]
+        return [IceServer(each.urls, each.username, each.credential) for each in found]
 
     async def relay(self, peer: str = "") -> RelayTicket | None:
         """Where the console wants this observer to watch; None: with itself. Raises as `offer`.

@@ -14,9 +14,9 @@ from aiortc.rtp import RtcpReceiverInfo, RtcpRrPacket, RtpPacket
 from aiortc.sdp import SessionDescription
 
 from bench.hostile.target import Target
-from client.aiortc_private import gather_only_on
 from robot_bridge.protocol.console import decode_server_message, encode_console_message
 from robot_bridge.protocol.messages import Command, Feedback, Ping, Reset, Rest
+from server.media.aiortc_private import restrict_ice_hosts
 
 __all__ = [
     "forged_commands",
@@ -87,7 +87,7 @@ class Peer:
 
 
 async def offer_of(pc: RTCPeerConnection) -> str:
-    gather_only_on(pc, ["127.0.0.1"])
+    restrict_ice_hosts(["127.0.0.1"])
     await pc.setLocalDescription(await pc.createOffer())
     return pc.localDescription.sdp
 

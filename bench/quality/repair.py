@@ -6,15 +6,17 @@ only: two packets each, keyframes of six, at 30 Hz, as of 640x480 at about 500 k
 
 import heapq
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 
-from aiortc.rtcrtpreceiver import NackGenerator
-from aiortc.rtp import RtpPacket
-
 from bench.quality.freezes import freezes
 from client.frame_assembler import MediaPacket, VideoAssembler
+from rtc.rtp.feedback import Nack
+from rtc.rtp.losses import Losses
+from rtc.rtp.packet import RtpPacket
+from rtc.rtp.repairs import Repairs
+from rtc.rtp.stage import RoundTrip, Sink
 from server.media.frame import EncodedFrame
 from server.media.header_extensions import ExtensionWriter
 from server.media.keyframes import KeyframeScheduler
@@ -78,7 +80,9 @@ class _Simulation:
         self._keyframes = KeyframeScheduler(10.0, 0.3)
         self._client = VideoAssembler(lambda data: data[:1] == b"K")
         self._client.round_trip = round_trip
-        self._nacks = NackGenerator()
+        self._sink = Sink()
+        self._losses = Losses(self._sink, 0, PARAMETERS.ssrc, RoundTrip(round_trip))
+        self._repairs = Repairs(self._losses, PARAMETERS.ssrc, {AGAIN: MEDIA})
         self._found = Repaired()
 
     def run(self, seconds: float) -> Repaired:
@@ -126,7 +130,7 @@ class _Simulation:
     def _send(self, packet: bytes, now: float) -> None:
         self._pass("down", now, lambda then: self._arrived(packet, then))
 
-    def _nacked(self, missing: list[int], now: float) -> None:
+    def _nacked(self, missing: Sequence[int], now: float) -> None:
         for sequence in missing if self._retransmit else ():
             packet = self._server.retransmission(sequence, now)
             if packet is not None:
@@ -139,18 +143,28 @@ class _Simulation:
     # at the client
 
     def _arrived(self, data: bytes, now: float) -> None:
-        packet = RtpPacket.parse(data)
-        payload = packet.payload
-        if packet.payload_type == AGAIN:
-            packet.sequence_number, payload = int.from_bytes(payload[:2], "big"), payload[2:]
-        if self._nacks.add(packet):
-            self._ask(sorted(self._nacks.missing), now)
-        medium = MediaPacket(packet.sequence_number, packet.timestamp, bool(packet.marker), payload, 1)
-        self._found.shown += [now] * len(self._client.add(medium, now))
-        if missing := self._client.missing(now):
-            self._ask(missing, now)
-        if self._client.wants_keyframe(now):
-            self._pass("up", now, self._asked_for_keyframe)
+        self._repairs.rtp(RtpPacket.parse(data), now)
+        for packet in self._sink.drain_packets():
+            medium = MediaPacket(packet.sequence_number, packet.timestamp, packet.marker, packet.payload, 1)
+            self._found.shown += [now] * len(self._client.add(medium, now))
+            if self._client.wants_keyframe(now):
+                self._pass("up", now, self._asked_for_keyframe)
+        self._look_again()
 
-    def _ask(self, missing: list[int], now: float) -> None:
-        self._pass("up", now, lambda then: self._nacked(missing, then))
+    def _look_again(self) -> None:
+        due = self._losses.due()
+        if due is not None:
+            self._at(due, self._look_for_losses)
+
+    def _look_for_losses(self, now: float) -> None:
+        due = self._losses.due()
+        if due is None or due > now:
+            return  # planned anew when it was put off
+        self._losses.handle_timer(now)
+        for control in self._sink.drain_controls():
+            if isinstance(control, Nack):
+                self._pass("up", now, self._nacking(control))
+        self._look_again()
+
+    def _nacking(self, nack: Nack) -> Callable[[float], None]:
+        return lambda then: self._nacked(nack.lost, then)

@@ -18,29 +18,29 @@ from typing import Any
 import uvloop
 
 from client import Console, ConsoleError
+from rtc.addresses import Path
+from rtc.demux import DatagramKind, datagram_kind
 
 __all__ = ["main"]
 
 AT_ONCE = 4  # that connect at the same time
 CONNECT_SECONDS = 60.0
 TRIES = 5
-RTP = range(128, 192)  # first byte (RFC 7983 7)
-RTCP = range(192, 224)  # second byte of those that are not media (RFC 5761 4)
 
 
 class _Counter:
-    """Stands before one observer's ICE connection."""
+    """Stands before what one observer's connection to the relay makes of a datagram."""
 
-    def __init__(self, connection: Any) -> None:
+    def __init__(self, peer: Any) -> None:
         self.packets = 0
-        self._pass_on = connection.data_received
-        connection.data_received = self.take
+        self._pass_on = peer.receive_datagram
+        peer.receive_datagram = self.take
 
-    def take(self, data: bytes, component: int) -> None:
-        if data[0] in RTP and data[1] not in RTCP:
+    def take(self, data: bytes, path: Path, now: float) -> None:
+        if datagram_kind(data) is DatagramKind.RTP:
             self.packets += 1
         else:
-            self._pass_on(data, component)
+            self._pass_on(data, path, now)
 
 
 @asynccontextmanager
@@ -79,7 +79,7 @@ async def watch(link: str, count: int) -> None:
                 console = await stack.enter_async_context(_connected(link, f"watcher {number}"))
             consoles.append(console)
             relay: Any = console._live()._relay
-            counters.append(_Counter(relay._pc.getTransceivers()[0].receiver.transport.transport._connection))
+            counters.append(_Counter(relay.connection.peer))
 
         async with asyncio.TaskGroup() as tasks:
             for number in range(count):

@@ -19,6 +19,8 @@ from bench.relay.janus import JANUS_READY, janus_command
 from client.relay import RelayMedia, RelayTicket
 from robot_bridge.protocol.description import Camera, RobotDescription
 from robot_bridge.protocol.messages import Media
+from rtc.addresses import Path as NetworkPath
+from rtc.demux import DatagramKind, datagram_kind
 from server.media.plane import MediaPlane, MediaSettings
 from server.relay.janus_publishing import publish
 from server.relay.janus_room import JanusRoom, RoomKeys
@@ -54,17 +56,16 @@ async def feed(plane: MediaPlane, camera: str) -> None:
 async def subscribe(ticket: RelayTicket, counts: list[int]) -> RelayMedia:
     media = RelayMedia(ticket, lambda _: None)
     await media.negotiate()
-    media.take_raw_rtp(lambda _: None, lambda _: None)
-    connection: Any = media._pc.getTransceivers()[0].receiver.transport.transport._connection
-    pass_on = connection.data_received
+    peer: Any = media.connection.peer
+    pass_on = peer.receive_datagram
 
-    def take(data: bytes, component: int) -> None:
-        if 128 <= data[0] < 192 and not 192 <= data[1] < 224:
+    def take(data: bytes, path: NetworkPath, now: float) -> None:
+        if datagram_kind(data) is DatagramKind.RTP:
             counts[0] += 1
         else:
-            pass_on(data, component)
+            pass_on(data, path, now)
 
-    connection.data_received = take
+    peer.receive_datagram = take
     await media.connect()
     return media
 

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 from client.frame_assembler import (
     KEYFRAME_RETRY,
     PATIENCE,
-    RETRY,
     SEQUENCES,
     WINDOW,
     AudioAssembler,
@@ -51,7 +50,6 @@ def test_every_frame_comes_out_with_its_last_packet(frame_sizes: list[int], firs
             assert len(frame.data) == 3 * frame_sizes[done]
             done += 1
     assert done == len(frame_sizes)
-    assert assembler.missing(1.0) == []
 
 
 @given(sizes, st.integers(0, SEQUENCES - 1), st.data())
@@ -66,26 +64,13 @@ def test_packets_out_of_order_or_doubled_give_the_same_frames(
 
 
 @given(sizes, st.integers(0, SEQUENCES - 1), st.sets(st.integers(1, 60)))
-def test_what_is_missing_is_asked_for_and_completes_the_frames(
-    frame_sizes: list[int], first: int, absent: set[int]
-) -> None:
+def test_what_comes_late_completes_the_frames(frame_sizes: list[int], first: int, absent: set[int]) -> None:
     packets = packets_of(frame_sizes, first)
     lost = {packets[index].sequence for index in absent if index < len(packets) - 1}
     assembler = VideoAssembler(is_keyframe)
     frames = add_all(assembler, [packet for packet in packets if packet.sequence not in lost])
-    assert set(assembler.missing(RETRY)) == lost
-    frames += add_all(assembler, [packet for packet in packets if packet.sequence in lost], RETRY)
+    frames += add_all(assembler, [packet for packet in packets if packet.sequence in lost], PATIENCE)
     assert frames == add_all(VideoAssembler(is_keyframe), packets)
-
-
-def test_the_same_packets_are_not_asked_for_again_at_once() -> None:
-    assembler = VideoAssembler(is_keyframe)
-    packets = packets_of([1, 3, 1])
-    add_all(assembler, [packet for packet in packets if packet.sequence != 2], 10.0)
-    assert assembler.missing(10.0 + RETRY / 2) == []
-    assert assembler.missing(10.0 + RETRY) == [2]
-    assert assembler.missing(10.0 + 1.5 * RETRY) == []
-    assert assembler.missing(10.0 + 2.1 * RETRY) == [2]
 
 
 def test_after_a_frame_that_never_completes_nothing_comes_before_a_keyframe() -> None:
@@ -141,19 +126,15 @@ def test_sound_comes_out_packet_by_packet_and_never_backwards() -> None:
         stamps += [frame.stamp for frame in frames]
     assert stamps == [65535, 65536, 2, 3]
     assert assembler.lost == 1
-    assert assembler.missing(9.0) == []
     assert not assembler.wants_keyframe(9.0)
     assembler.broken()
 
 
-def test_over_a_satellite_a_lost_packet_is_asked_for_once_a_round_trip_and_waited_for() -> None:
+def test_over_a_satellite_a_lost_packet_is_waited_for() -> None:
     assembler = VideoAssembler(is_keyframe)
     assembler.round_trip = 0.6
     packets = packets_of([1, 3, 1])
     add_all(assembler, [packet for packet in packets if packet.sequence != 2], 10.0)
-    assert assembler.missing(10.5) == []
-    assert assembler.missing(10.7) == [2]
-    assert assembler.missing(11.2) == []
     lost = next(packet for packet in packets if packet.sequence == 2)
     assert len(assembler.add(lost, 11.25)) == 2
     assert assembler.lost == 0

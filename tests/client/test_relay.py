@@ -4,14 +4,14 @@ import time
 from pathlib import Path
 
 import pytest
-from aiortc import RTCIceServer
 
 from bench.driving import drive_on
 from client import Console
-from client.aiortc_private import transport_of
 from client.errors import ConnectFailed
 from client.peer import Peer
 from client.whep import Whep
+from rtc.addresses import Address
+from rtc.turn.servers import IceServer
 from server.access import Identity
 from server.ice_servers import turn_credential
 from tests.server.rig import eventually, running_rig
@@ -33,15 +33,20 @@ async def test_with_only_a_relay_the_robot_is_driven_seen_and_moved_to_another_r
             break
         peer = console._live()._peer
         assert isinstance(peer, Peer)
-        pc = peer._pc
-        pair = transport_of(pc).transport._connection._nominated[1]
-        assert pair.local_candidate.type == "relay"
+        before = _relay_in_use(peer)
         await console.restart_ice()
-        moved = transport_of(pc).transport._connection._nominated[1]
-        assert moved.local_candidate.type == "relay"
-        assert moved.local_candidate.port != pair.local_candidate.port
+        assert _relay_in_use(peer) != before
         assert (await drive_on(console, forward)).event > first.event
         await console.rest()
+
+
+def _relay_in_use(peer: Peer) -> Address:
+    assert peer._connection is not None
+    ice = peer._connection.peer.ice
+    assert ice.path is not None
+    [candidate] = [each.candidate for each in ice.local_candidates if each.base == ice.path.local]
+    assert candidate.type == "relay"
+    return ice.path.local
 
 
 async def test_expired_and_forged_credentials_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,10 +58,8 @@ async def test_expired_and_forged_credentials_are_refused(tmp_path: Path, monkey
         for secret, expires in ((TURN_SECRET, time.time() - 60), ("somebody else's secret", time.time() + 3600)):
             username, credential = turn_credential(secret, "ann", int(expires))
 
-            async def spoilt(
-                whep: object, username: str = username, credential: str = credential
-            ) -> list[RTCIceServer]:
-                return [RTCIceServer([turn.uri], username, credential)]
+            async def spoilt(whep: object, username: str = username, credential: str = credential) -> list[IceServer]:
+                return [IceServer([turn.uri], username, credential)]
 
             monkeypatch.setattr("client.whep.Whep.ice_servers", spoilt)
             with pytest.raises(ConnectFailed):
@@ -71,12 +74,12 @@ async def test_a_session_outlives_the_credentials_that_it_began_with_and_a_resta
     asked: list[float] = []
     good = Whep.ice_servers
 
-    async def short_lived(whep: Whep) -> list[RTCIceServer]:
+    async def short_lived(whep: Whep) -> list[IceServer]:
         asked.append(time.time())
         if len(asked) > 1:
             return await good(whep)
         username, credential = turn_credential(TURN_SECRET, "ann", int(time.time()) + 3)
-        return [RTCIceServer([turn.uri], username, credential)]
+        return [IceServer([turn.uri], username, credential)]
 
     monkeypatch.setattr("client.whep.Whep.ice_servers", short_lived)
     async with (

@@ -1,43 +1,7 @@
-import pytest
-from aiortc import RTCBundlePolicy, RTCConfiguration, RTCPeerConnection
 from hypothesis import given
 from hypothesis import strategies as st
 
-from client.sdp import KEPT_EXTENSIONS, offer_extension, read_sections, replace_candidates
-from robot_bridge.protocol.carriers import EVENT_REFERENCE_URI
-
-
-@pytest.fixture
-async def offer() -> str:
-    pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
-    pc.addTransceiver("video", direction="recvonly")
-    pc.addTransceiver("audio", direction="recvonly")
-    pc.createDataChannel("control")
-    sdp: str = (await pc.createOffer()).sdp
-    await pc.close()
-    return sdp
-
-
-async def test_the_offer_has_the_chosen_extension_in_every_media_section_and_no_foreign_one(offer: str) -> None:
-    foreign = offer.replace("a=mid:", "a=extmap:9 urn:somebody:else\r\na=mid:")
-    sections = read_sections(offer_extension(foreign, EVENT_REFERENCE_URI))
-    assert [section.kind for section in sections] == ["video", "audio", "application"]
-    ids = {section.extensions.get(EVENT_REFERENCE_URI) for section in sections if section.kind != "application"}
-    assert len(ids) == 1
-    assert None not in ids
-    offered = {uri for section in sections for uri in section.extensions}
-    assert offered <= KEPT_EXTENSIONS | {EVENT_REFERENCE_URI}
-    assert not sections[2].extensions
-
-
-async def test_the_extension_takes_an_id_that_nobody_has(offer: str) -> None:
-    for section in read_sections(offer_extension(offer, EVENT_REFERENCE_URI))[:2]:
-        assert len(set(section.extensions.values())) == len(section.extensions)
-
-
-async def test_without_a_uri_nothing_is_added(offer: str) -> None:
-    offered = {uri for section in read_sections(offer_extension(offer, None)) for uri in section.extensions}
-    assert offered <= KEPT_EXTENSIONS
+from client.sdp import read_sections, replace_candidates
 
 
 def test_an_answer_is_read() -> None:

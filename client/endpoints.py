@@ -1,0 +1,17 @@
+"""Endpoints on the addresses of this machine."""
+
+from collections.abc import Sequence
+
+from rtc.endpoint import Endpoint
+
+__all__ = ["open_endpoint"]
+
+
+def open_endpoint(hosts: Sequence[str]) -> Endpoint:
+    """An endpoint on as many of these addresses as can be bound: one that has just come may not be ready yet."""
+    try:
+        return Endpoint(hosts)
+    except OSError:
+        endpoint = Endpoint([])
+        endpoint.use_hosts(hosts)
+        return endpoint
