@@ -12,7 +12,6 @@ from aiortc.rtp import RtcpReceiverInfo, RtcpRrPacket, RtpPacket
 
 from bench.hostile.over_webrtc import offer_of
 from bench.hostile.target import Target
-from client.aiortc_private import transport_of
 
 __all__ = ["publisher_flood"]
 
@@ -41,7 +40,9 @@ async def publisher_flood(target: Target, random: Random) -> None:
         make = random.choice((_endless_picture, _holes, _noise, _sources, _reports))
         (payload_type,) = re.findall(r"a=rtpmap:(\d+) VP8/", answer.text)
         picture = RtpPacket(payload_type=int(payload_type), ssrc=random.getrandbits(32))
-        target.seen[f"publisher{make.__name__}"] += await _flood(transport_of(pc), make, picture, random)
+        target.seen[f"publisher{make.__name__}"] += await _flood(
+            pc.getTransceivers()[0].receiver.transport, make, picture, random
+        )
     finally:
         await pc.close()
 
