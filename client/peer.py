@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from client.endpoints import open_endpoint
-from client.errors import ConnectFailed, ConsoleError
+from client.errors import ConnectFailed, ConsoleError, SignallingRefused
 from client.link import ConsoleLink
 from client.media_sections import receiving
 from client.packets import Packets, PacketSink
@@ -242,12 +242,14 @@ class Peer:
         """Look for a new path to the console; channels and media live on, and move to it when it is found.
 
         Raises:
-            SignallingRefused: the console does not restart this session.
+            SignallingRefused: the console does not restart this session, or it has ended.
             ConnectFailed: no other path within `seconds`; the old one is as it was.
         """
         connection, endpoint = self._need_connection(), self._endpoint
         if endpoint is None:
             raise RuntimeError("negotiate first")
+        if self.ended.is_set():
+            raise SignallingRefused(404, "not_found", self.why)  # as the console would say
         if self._ice_servers:  # their credentials may have ended
             self._ice_servers = await self._whep.ice_servers()
         restarted = self._restarted = asyncio.get_running_loop().create_future()
