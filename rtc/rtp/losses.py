@@ -15,6 +15,7 @@ MAX_ASKED = 200  # packets in one NACK: it fits a datagram however they lie
 @dataclass(frozen=True, slots=True)
 class LossSettings:
     patience: float = 0.01  # s before a packet counts as lost: networks reorder a little
+    again: float = 1.1  # round trips between two requests: a sender answers no second one within its own
     tries: int = 8  # times that a packet is asked for
     seconds: float = 1.5  # after that nobody waits for it any more
     missing: int = 512  # packets that are waited for; with more a keyframe is sooner there
@@ -74,7 +75,7 @@ class Losses(Stage):
         wanted = [(number, each) for number, each in self._missing.items() if now >= each.ask_at]
         for _, each in wanted:
             each.asked += 1
-            each.ask_at = now + max(self._settings.patience, self._round_trip.seconds)
+            each.ask_at = now + max(self._settings.patience, self._settings.again * self._round_trip.seconds)
         numbers = [number & 0xFFFF for number, _ in wanted]
         for start in range(0, len(numbers), MAX_ASKED):
             self.control(Nack(self._own_ssrc, self._ssrc, tuple(numbers[start : start + MAX_ASKED])), now)

@@ -387,7 +387,7 @@ def test_what_is_missing_is_asked_for_until_it_comes() -> None:
     assert sink.drain_controls() == [Nack(1, SSRC, (65535,))]
     stage.handle_timer(0.05)
     assert sink.drain_controls() == []
-    stage.handle_timer(0.11)
+    stage.handle_timer(0.13)
     assert sink.drain_controls() == [Nack(1, SSRC, (65535,))]
     stage.rtp(packet(65535), 0.15)
     assert stage.timer() is None
