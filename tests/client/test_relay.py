@@ -83,15 +83,15 @@ async def test_a_session_outlives_the_credentials_that_it_began_with_and_a_resta
 
     monkeypatch.setattr("client.whep.Whep.ice_servers", short_lived)
     async with (
-        running_turn_server(tmp_path, "--max-allocate-lifetime=5") as turn,
+        running_turn_server(tmp_path, "--max-allocate-lifetime=12") as turn,
         running_rig(turn=turn.uri, turn_secret=TURN_SECRET, ice_hosts="127.0.0.1") as rig,
         Console(f"{rig.url}/#token={rig.access.issue('operator', 'operator')}", relay_only=True) as console,
     ):
         await console.take_seat()
         forward = [0.1] * len(console.description.axes)
         await drive_on(console, [0.0] * len(forward))
-        # Each allocation is renewed after four seconds; the second time long after its credentials' end.
-        await eventually(lambda: turn.log.read_text().count("refreshed") >= 2, 20.0)
+        # The allocation is renewed after 9.6 s, long after its credentials' end.
+        await eventually(lambda: "refreshed" in turn.log.read_text(), 40.0)
         assert time.time() > asked[0] + 3
         await drive_on(console, forward)
         await console.restart_ice()
