@@ -7,8 +7,8 @@
         async for event in connection:
             ...
 
-With `rtc.udp_socket` and `rtc.server_links`, this is the only file of the package that has sockets, a clock and timers.
-It decides nothing.
+With `rtc.udp_socket`, `rtc.tcp_port` and `rtc.server_links`, this is the only file of the package that has sockets, a
+clock and timers. It decides nothing.
 """
 
 import asyncio
@@ -16,7 +16,7 @@ import secrets
 import socket
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Self
@@ -33,6 +33,7 @@ from rtc.peer import OfferedMedia, Peer, PeerSettings
 from rtc.peer_events import PacketReceived, PeerEnded, PeerEvent
 from rtc.sdp import Fragment, LocalMedia, SessionDescription
 from rtc.server_links import RelayLink, RelayRefused, open_relay
+from rtc.tcp_port import TcpPort, TcpPortSettings
 from rtc.turn.servers import IceServer, MappedAddress, ServerUri, server_uris
 from rtc.udp_socket import UdpSocket
 
@@ -53,6 +54,7 @@ class TooManyPeers(RuntimeError):
 class EndpointSettings:
     peer: PeerSettings = field(default_factory=PeerSettings)
     port: PortSettings = field(default_factory=PortSettings)
+    tcp: TcpPortSettings = field(default_factory=TcpPortSettings)
     peers: int = 1024  # at a time; each has half a megabyte of buffers at the most
     waiting_packets: int = 4096  # media packets that an application has not read; more are dropped and counted
     ask_seconds: float = 3.0  # for which STUN and TURN servers are waited for
@@ -251,6 +253,7 @@ class Endpoint:
         hosts: Sequence[str],
         port: int = 0,
         *,
+        tcp: bool = False,
         certificate: Certificate | None = None,
         advertised: Sequence[Advertised] = (),
         settings: EndpointSettings | None = None,
@@ -260,6 +263,7 @@ class Endpoint:
             hosts: addresses of this machine, those to prefer first; all have the same port. None at all: the peer
                 reaches us through TURN servers only (`ask`).
             port: 0: a free one.
+            tcp: whether peers may connect by TCP as well (RFC 6544), to the port of the same number.
             certificate: None: a new one.
             advertised: addresses of a 1:1 NAT in front of us.
 
@@ -273,6 +277,7 @@ class Endpoint:
         self._context = dtls_context(self.certificate)
         self._loop = asyncio.get_running_loop()
         self._sockets: dict[Address, UdpSocket] = {}
+        self._tcp: TcpPort | None = None
         self._flush_is_due = False
         self._connections: dict[Agent, Connection] = {}
         self._hosts = list(hosts)
@@ -282,6 +287,8 @@ class Endpoint:
         self._relays: list[RelayLink] = []
         self._probes: dict[Path, MappedAddress] = {}
         self._probed = asyncio.Event()  # one of them has heard something
+        if tcp:
+            self._tcp = TcpPort(self._receive_stream, self._stream_closed, self._is_used, self.settings.tcp)
         for left in reversed(range(PORT_TRIES)):
             try:
                 self._bind_all()
@@ -301,13 +308,16 @@ class Endpoint:
         self._sockets[found.address] = found
         self._number = found.address[1]
         self._loop.add_reader(found.fileno(), self._readable, found)
+        if self._tcp is not None:
+            self._tcp.bind(host, self._number)
 
     # Where peers reach us
 
     @property
     def candidates(self) -> list[LocalCandidate]:
         """Of our own addresses, and of those that servers have told."""
-        return [*gather(self._hosts, self._number, advertised=self._advertised), *self._told]
+        tcp = self._number if self._tcp is not None else None
+        return [*gather(self._hosts, self._number, tcp, self._advertised), *self._told]
 
     def use_hosts(self, hosts: Sequence[str]) -> None:
         """After a change of the network: these are our addresses now. Those that cannot be bound are left out.
@@ -427,6 +437,8 @@ class Endpoint:
         for link in self._relays:
             link.close()
         self._relays.clear()
+        if self._tcp is not None:
+            self._tcp.close()
         self._flush()
         for found in self._sockets.values():
             self._loop.remove_reader(found.fileno())
@@ -447,6 +459,9 @@ class Endpoint:
     def send(self, datagrams: Sequence[Datagram], *, urgent: bool) -> None:
         """They leave with all others of this turn of the loop."""
         for datagram in datagrams:
+            if self._tcp is not None and datagram.path.transport == "tcp":
+                self._tcp.send(datagram, urgent=urgent)
+                continue
             found = self._sockets.get(datagram.local)
             if found is None:
                 self._send_relayed(datagram)
@@ -469,9 +484,15 @@ class Endpoint:
     # Sockets
 
     def _readable(self, found: UdpSocket) -> None:
+        self._receive(found.receive())
+
+    def _receive_stream(self, datagrams: Sequence[bytes], path: Path) -> None:
+        self._receive((each, path) for each in datagrams)
+
+    def _receive(self, datagrams: Iterable[tuple[bytes, Path]]) -> None:
         now = self._loop.time()
         heard: dict[Connection, bool] = {}  # in order; whether more than plain packets came
-        for data, path in found.receive():
+        for data, path in datagrams:
             if self._probes and path in self._probes:
                 self._probes[path].receive(data, now)
                 self._probed.set()
@@ -492,11 +513,16 @@ class Endpoint:
                 connection.hand_out_plain()
 
     def _relayed(self, data: bytes, path: Path) -> None:
-        now = self._loop.time()
-        agent = self.port.route(data, path, now)
+        self._receive([(data, path)])
+
+    def _is_used(self, path: Path) -> bool:
+        return self.port.directory.owner(path) is not None
+
+    def _stream_closed(self, path: Path) -> None:
+        agent = self.port.directory.owner(path)
         connection = self._connections.get(agent) if agent is not None else None
         if connection is not None:
-            connection.peer.receive_datagram(data, path, now)
+            connection.peer.ice.path_closed(path, self._loop.time())
             connection.flush()
 
     def _flush(self) -> None:

@@ -9,6 +9,7 @@ from playwright.async_api import Page
 from bench.browsers.chromium import running_chromium
 from rtc.channels import ChannelMessage, ChannelOpened
 from rtc.endpoint import Connection, Endpoint
+from rtc.interfaces import own_addresses
 from rtc.peer import OfferedMedia
 from rtc.peer_events import Connected, MediaEvent, PacketReceived, PeerEnded, PeerEvent
 from rtc.rtp.extensions import ABS_SEND_TIME_URI
@@ -171,3 +172,25 @@ async def test_chromium_asks_for_a_keyframe_when_the_first_is_lost(endpoint: End
     for number, payloads in enumerate(list(packetise(20))[1:]):  # without the keyframe
         connection.send_frame("camera", payloads, number * 3000)
     await until(connection, tells(KeyframeRequested))
+
+
+async def test_chromium_connects_by_tcp_where_no_udp_gets_out(page: Page) -> None:
+    async with Endpoint(own_addresses()[:1], tcp=True) as endpoint:
+        connection = endpoint.connect(controlling=False)
+        offer = parse_description(
+            await page.evaluate("""async () => {
+                pc.addTransceiver(track, {direction: "sendrecv"});
+                listen(pc.createDataChannel("theirs"));
+                await pc.setLocalDescription();
+                return pc.localDescription.sdp;
+            }""")
+        )
+        media = {each.mid: LocalMedia((VP8, RTX), "sendrecv", URIS, msid="ours camera") for each in offer.sections}
+        answer = write_description(connection.answer(offer, media))
+        lines = [each for each in answer.splitlines() if not (each.startswith("a=candidate") and " udp " in each)]
+        await page.evaluate("sdp => pc.setRemoteDescription({type: 'answer', sdp})", "\r\n".join([*lines, ""]))
+        [_, opened] = await until(connection, is_a(Connected), is_a(ChannelOpened))
+        assert connection.peer.ice.path is not None
+        assert connection.peer.ice.path.transport == "tcp"
+        assert isinstance(opened, ChannelOpened)
+        await check_media_and_messages(connection, page, offer.sections[0].mid, opened.channel)
