@@ -5,7 +5,6 @@ The crowd comes directly, with TLS, or through a real Caddy with deploy/Caddyfil
 
 import asyncio
 import os
-import socket
 import sys
 import time
 from collections.abc import AsyncIterator, Callable
@@ -19,6 +18,7 @@ from urllib.parse import urlsplit
 
 import httpx
 
+from bench.free_port import free_port
 from bench.machine import busy_percent, machine_facts
 from bench.processes import Running, running_process
 from bench.stack import Stack, running_stack
@@ -96,7 +96,7 @@ async def _entry(stack: Stack, front: str) -> AsyncIterator[str]:
         yield stack.observer
         return
     with TemporaryDirectory(prefix="lockstep-caddy-") as folder:
-        port, http_port = _free_port(), _free_port()
+        port, http_port = free_port(), free_port()
         ports = {"LOCKSTEP_HTTPS_PORT": str(port), "LOCKSTEP_HTTP_PORT": str(http_port)}
         site = {"LOCKSTEP_SITE": "localhost", "LOCKSTEP_PORT": str(urlsplit(stack.url).port)}
         homes = dict.fromkeys(("HOME", "XDG_DATA_HOME", "XDG_CONFIG_HOME"), folder)
@@ -111,11 +111,6 @@ async def _entry(stack: Stack, front: str) -> AsyncIterator[str]:
         finally:
             process.terminate()
             await process.wait()
-
-
-def _free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        return int(free.getsockname()[1])
 
 
 async def _until_open(port: int) -> None:

@@ -2,9 +2,7 @@
 
 import asyncio
 import os
-import socket
 from collections.abc import AsyncIterator
-from contextlib import closing
 from pathlib import Path
 
 import httpx
@@ -13,18 +11,13 @@ from playwright.async_api import Browser
 
 from bench.browsers.chromium import running_chromium
 from bench.browsers.console_page import ConsolePage
+from bench.free_port import free_port
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser
 
 CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
 READY_SECONDS = 20.0
-
-
-def _free_port() -> int:
-    with closing(socket.create_server(("127.0.0.1", 0))) as free:
-        port: int = free.getsockname()[1]
-        return port
 
 
 @pytest.fixture
@@ -42,9 +35,9 @@ async def chromium() -> AsyncIterator[Browser]:
 @pytest.fixture
 async def site(stack: Stack, tmp_path: Path) -> AsyncIterator[str]:
     """Caddy's address, as people type it."""
-    https, port = _free_port(), stack.console.rsplit(":", 1)[1]
+    https, port = free_port(), stack.console.rsplit(":", 1)[1]
     settings = {"LOCKSTEP_SITE": "localhost", "LOCKSTEP_PORT": port}
-    ports = {"LOCKSTEP_HTTPS_PORT": str(https), "LOCKSTEP_HTTP_PORT": str(_free_port())}
+    ports = {"LOCKSTEP_HTTPS_PORT": str(https), "LOCKSTEP_HTTP_PORT": str(free_port())}
     folders = {"HOME": str(tmp_path), "XDG_DATA_HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
     process = await asyncio.create_subprocess_exec(
         *("caddy", "run", "--config", str(CADDYFILE), "--adapter", "caddyfile"),

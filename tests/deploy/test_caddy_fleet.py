@@ -7,8 +7,8 @@ from pathlib import Path
 
 import httpx
 
+from bench.free_port import free_port
 from tests.support.fleet_entry import running_entry
-from tests.support.redis_server import free_port
 
 READY_SECONDS = 20.0
 

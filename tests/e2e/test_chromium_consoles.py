@@ -11,9 +11,10 @@ import pytest_asyncio
 from playwright.async_api import Browser, Response, expect
 
 from bench.browsers.chromium import open_page
+from bench.free_port import free_port
 from tests.e2e.overview import in_view, stats, until
 from tests.support.fleet_entry import running_entry
-from tests.support.redis_server import RedisServer, free_port
+from tests.support.redis_server import RedisServer
 from tests.support.stack import Stack, running_fleet
 
 pytestmark = pytest.mark.browser

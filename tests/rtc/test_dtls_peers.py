@@ -18,6 +18,7 @@ from aiortc.rtcdtlstransport import RTCDtlsFingerprint
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 
+from bench.free_port import free_port
 from rtc.certificate import Certificate
 from rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsEvent, DtlsRole, dtls_context
 from rtc.fingerprint import Fingerprint
@@ -83,12 +84,6 @@ async def test_aiortc_and_we_exchange_data_and_have_the_same_srtp_keys(role: Dtl
     sessions = cast(Any, aiortc)
     assert SrtpReceiver(connected.srtp).unprotect(sessions._tx_srtp.protect(packet)) == packet
     assert sessions._rx_srtp.unprotect(SrtpSender(connected.srtp).protect(packet)) == packet
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @contextmanager

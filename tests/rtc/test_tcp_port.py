@@ -2,10 +2,10 @@
 
 import asyncio
 import contextlib
-import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
+from bench.free_port import free_port
 from rtc.addresses import Datagram, Path
 from rtc.channels import ChannelMessage, ChannelOpened
 from rtc.endpoint import Connection, Endpoint, EndpointSettings
@@ -132,9 +132,7 @@ class Port:
             self.used.__contains__,
             TcpPortSettings(**settings),  # type: ignore[arg-type]
         )
-        with socket.socket() as found:
-            found.bind((HOST, 0))
-            self.number = int(found.getsockname()[1])
+        self.number = free_port()
         self.core.bind(HOST, self.number)
 
     def _receive(self, datagrams: object, path: Path) -> None:

@@ -13,9 +13,9 @@ from typing import Any
 import httpx
 import pytest
 
+from bench.free_port import free_port
 from server.tls import Certificate, self_signed
 from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console
-from tests.support.redis_server import free_port
 
 CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
 PLACES = 16  # connections that the console takes

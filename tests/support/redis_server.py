@@ -4,7 +4,6 @@ import asyncio
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import time
 from pathlib import Path
@@ -12,16 +11,11 @@ from types import TracebackType
 
 import redis.asyncio
 
-__all__ = ["RedisServer", "free_port"]
+from bench.free_port import free_port
+
+__all__ = ["RedisServer"]
 
 PATIENCE = 20.0  # s
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        found: int = probe.getsockname()[1]
-        return found
 
 
 class RedisServer:

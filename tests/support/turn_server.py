@@ -2,11 +2,12 @@
 
 import asyncio
 import shutil
-import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+from bench.free_port import free_port
 
 __all__ = ["TURN_SECRET", "TurnServer", "running_turn_server"]
 
@@ -31,7 +32,7 @@ async def running_turn_server(directory: Path, *further: str) -> AsyncIterator[T
     executable = shutil.which("turnserver")
     if executable is None:
         raise RuntimeError("coturn is not installed: make test installs Debian's coturn")
-    port, log = _free_port(), directory / "turn.log"
+    port, log = free_port(), directory / "turn.log"
     command = [
         *(executable, "-n", "--listening-ip=127.0.0.1", "--relay-ip=127.0.0.1", f"--listening-port={port}"),
         *("--use-auth-secret", f"--static-auth-secret={TURN_SECRET}", "--realm=lockstep.test", "--fingerprint"),
@@ -53,18 +54,6 @@ async def running_turn_server(directory: Path, *further: str) -> AsyncIterator[T
         except TimeoutError:
             process.kill()
             await process.wait()
-
-
-def _free_port() -> int:
-    """Free for UDP and TCP just now."""
-    with (
-        socket.socket(socket.AF_INET, socket.SOCK_STREAM) as tcp,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
-    ):
-        tcp.bind(("127.0.0.1", 0))
-        port: int = tcp.getsockname()[1]
-        udp.bind(("127.0.0.1", port))
-        return port
 
 
 async def _answers(port: int, process: asyncio.subprocess.Process) -> None:

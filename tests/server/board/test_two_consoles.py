@@ -13,6 +13,7 @@ import pytest_asyncio
 from pydantic import SecretStr
 
 from bench.driving import drive_on
+from bench.free_port import free_port
 from client import Console
 from client.errors import ConsoleLost
 from robot_bridge.protocol.console import Notice, Role, SilenceStops, Welcome
@@ -20,7 +21,7 @@ from robot_bridge.protocol.messages import Feedback
 from server.settings import Settings
 from server.state import open_state
 from tests.server.rig import Rig, TestPeer
-from tests.support.redis_server import RedisServer, free_port
+from tests.support.redis_server import RedisServer
 from tests.support.stack import Stack, running_fleet
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")

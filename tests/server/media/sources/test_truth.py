@@ -1,10 +1,10 @@
 """No picture of an attached camera is ever stamped with a newer event than held when it was captured."""
 
-import socket
 from pathlib import Path
 
 import pytest
 
+from bench.free_port import free_port
 from client import Console
 from tests.server.media.numbered_pictures import OF_USE, events_behind, shown_while_driving
 from tests.server.media.sources.live_sender import LiveSender
@@ -12,13 +12,6 @@ from tests.support.stack import running_stack
 
 SHOWN = 45  # pictures to be looked at
 LATENCY = 0.15  # s; the sender encodes in some milliseconds, and a demuxer holds one picture back
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @pytest.mark.parametrize("codec", ["H264", "VP8"])
