@@ -1,7 +1,7 @@
 """Whether the next test may use a console that others have used: HTTP alone tells, which costs next to nothing."""
 
 import asyncio
-from math import hypot
+from math import hypot, remainder, tau
 from typing import Any
 
 import httpx
@@ -11,6 +11,7 @@ from tests.support.stack import Stack
 __all__ = ["as_new"]
 
 NEAR = 1.5  # m from where the robot starts; a test drives no further than the 2 m to the wall that are left
+AHEAD = 0.3  # rad, and m to either side: else a zone that it keeps out of may be before it, and no wall
 PATIENCE = 10.0  # s for pages that were closed to be gone, and for a new stop to be old enough for its reset
 AGAIN = 0.1  # s
 
@@ -31,8 +32,8 @@ async def as_new(stack: Stack) -> bool:
                 await asyncio.sleep(AGAIN)
     except (TimeoutError, httpx.TransportError):
         return False
-    x, y, _ = session["feedback"]["joints"]
-    return hypot(x, y) < NEAR
+    x, y, heading = session["feedback"]["joints"]
+    return hypot(x, y) < NEAR and max(abs(y), abs(remainder(heading, tau))) < AHEAD
 
 
 def _is_left(session: dict[str, Any]) -> bool:

@@ -138,8 +138,8 @@ async def test_the_keyboard_drives_while_the_space_bar_is_held(stack: Stack, chr
         await console.until("!s.driving && s.at_rest === true")
 
 
-async def test_contact_is_felt_as_rumble(stack: Stack, chromium: Browser) -> None:
-    async with open_console(chromium, stack.operator) as console:
+async def test_contact_is_felt_as_rumble(own_stack: Stack, chromium: Browser) -> None:
+    async with open_console(chromium, own_stack.operator) as console:
         await console.until_live()
         async with console.driving(FORWARD):
             await console.until("window.testPad.rumbles.length > 0")
