@@ -17,9 +17,10 @@ import socket
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
 from rtc.addresses import Address, Datagram, Path
 from rtc.certificate import Certificate
@@ -37,8 +38,7 @@ from rtc.tcp_port import TcpPort, TcpPortSettings
 from rtc.turn.servers import IceServer, MappedAddress, ServerUri, server_uris
 from rtc.udp_socket import UdpSocket
 
-__all__ = ["Connection", "Endpoint", "EndpointSettings", "TooManyPeers"]
-
+__all__ = ["Connection", "Endpoint", "EndpointSettings", "TooManyPeers", "Turns"]
 
 Listener = Callable[[PeerEvent], None]
 CLOCK_RESOLUTION = 0.001  # s, by which a loop may call too early
@@ -50,6 +50,16 @@ class TooManyPeers(RuntimeError):
     """The endpoint has as many peers as its settings allow."""
 
 
+class Turns(Protocol):
+    """Gives connections their turns: what their peers send is handled then, and keeps nobody else waiting."""
+
+    def may_go_at_once(self) -> bool:
+        """Whether one datagram more need not wait. Asked only where none waits."""
+
+    def add(self, connection: "Connection") -> None:
+        """Call its `handle_next` until that returns False. It may be among those that wait already."""
+
+
 @dataclass(frozen=True, slots=True)
 class EndpointSettings:
     peer: PeerSettings = field(default_factory=PeerSettings)
@@ -59,6 +69,7 @@ class EndpointSettings:
     waiting_packets: int = 4096  # media packets that an application has not read; more are dropped and counted
     ask_seconds: float = 3.0  # for which STUN and TURN servers are waited for
     ask_margin: float = 0.2  # s, at least, that the slower servers have when the first has answered
+    waiting_datagrams: int = 1024  # of a connection that has turns; more are dropped and counted
     waiting_events: int = 16_384  # of all kinds; an application that lets more wait does not live: the peer is closed
 
 
@@ -69,7 +80,12 @@ class Connection:
     """
 
     def __init__(
-        self, endpoint: "Endpoint", peer: Peer, settings: EndpointSettings, listener: Listener | None = None
+        self,
+        endpoint: "Endpoint",
+        peer: Peer,
+        settings: EndpointSettings,
+        listener: Listener | None = None,
+        turns: Turns | None = None,
     ) -> None:
         self.peer = peer
         self.urgent = False  # whether its datagrams leave before those of others
@@ -81,6 +97,9 @@ class Connection:
         self._timer_at = 0.0
         self._listener = listener
         self._telling = False  # the listener, which may use this connection meanwhile
+        self._turns = turns
+        self._later: deque[tuple[bytes, Path]] = deque()  # datagrams that wait for their turn
+        self._has_failed = False
         self._waiting: deque[PeerEvent] = deque()
         self._arrived = asyncio.Event()
         self._ended = False  # PeerEnded is among those that wait, or was read
@@ -102,6 +121,12 @@ class Connection:
     def add_candidate(self, line: str) -> None:
         self.peer.add_candidate(line)
         self.flush()
+
+    def answer_restart(self, fragment: Fragment) -> Fragment:
+        """With the endpoint's candidates of now."""
+        answer = self.peer.answer_restart(fragment, self._loop.time(), self._endpoint.candidates)
+        self.flush()
+        return answer
 
     def restart(self, candidates: Sequence[LocalCandidate] | None = None) -> Fragment:
         """`candidates`: None: those of the endpoint now."""
@@ -154,10 +179,14 @@ class Connection:
         self.peer.request_keyframe(mid, self._loop.time())
         self.flush()
 
+    def limit(self, mid: str, bitrate: int) -> None:
+        self.peer.limit(mid, bitrate)
+
     def close(self) -> None:
         """Say goodbye. The events end with PeerEnded("closed")."""
-        self.peer.close(self._loop.time())
-        self.flush()
+        if not self._has_failed:
+            self.peer.close(self._loop.time())
+            self.flush()
 
     # Events
 
@@ -172,14 +201,79 @@ class Connection:
             await self._arrived.wait()
         return self._waiting.popleft()
 
+    # Turns
+
+    def handle_next(self) -> bool:
+        """One of the datagrams that wait. Whether more do."""
+        if self._later:
+            data, path = self._later.popleft()
+            if self.receive(data, path, self._loop.time()):
+                self.settle()
+            else:
+                self.hand_out_plain()
+        return bool(self._later)
+
     # Inside
+
+    def put_off(self, data: bytes, path: Path) -> bool:
+        """Whether this datagram waits for its turn, or was dropped because too many do."""
+        if self._turns is None or (not self._later and self._turns.may_go_at_once()):
+            return False
+        if len(self._later) < self._settings.waiting_datagrams:
+            self._later.append((data, path))
+            self._turns.add(self)
+        else:
+            self.counts["receive_overflow"] += 1
+        return True
+
+    def receive(self, data: bytes, path: Path, now: float) -> bool:
+        """Call `settle` then, or `hand_out_plain` if this returns False: it was a plain packet."""
+        try:
+            if self.peer.receive_plain(data):
+                return False
+            self.peer.receive_datagram(data, path, now)
+        except Exception as error:
+            self._fail(error)
+        return True
+
+    def path_closed(self, path: Path) -> None:
+        """The TCP connection of this path has ended."""
+        try:
+            self.peer.ice.path_closed(path, self._loop.time())
+        except Exception as error:
+            self._fail(error)
+        self.settle()
+
+    def settle(self) -> None:
+        """As `flush`; what it raises ends this connection and nothing else."""
+        try:
+            self.flush()
+        except Exception as error:
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        """A peer has sent what nothing here expects: a fault of ours, which others shall not feel."""
+        if self._has_failed:
+            return
+        self._has_failed = True
+        self._loop.call_exception_handler({"message": "serving a WebRTC peer failed", "exception": error})
+        with suppress(Exception):
+            self.peer.ice.close()
+        self._later.clear()
+        if self._timer is not None:
+            self._timer.cancel()
+        self._hand_out([PeerEnded("failed", str(error))])
+        self._endpoint.forget(self)
 
     def flush(self) -> None:
         """Send what is due, hand out what happened, and set the timer anew. Call it after you used `peer` itself."""
+        if self._has_failed:
+            return
         self._hand_out(self.peer.events())
         self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
         self._set_timer()
         if self._ended:
+            self._later.clear()
             self._endpoint.forget(self)
 
     def hand_out_plain(self) -> None:
@@ -241,8 +335,11 @@ class Connection:
         if due is None or due > now + CLOCK_RESOLUTION:
             self._set_timer()
             return
-        self.peer.handle_timer(max(now, due))
-        self.flush()
+        try:
+            self.peer.handle_timer(max(now, due))
+        except Exception as error:
+            self._fail(error)
+        self.settle()
 
 
 class Endpoint:
@@ -279,6 +376,7 @@ class Endpoint:
         self._sockets: dict[Address, UdpSocket] = {}
         self._tcp: TcpPort | None = None
         self._flush_is_due = False
+        self._dropped_before: Counter[str] = Counter()  # by connections that have ended
         self._connections: dict[Agent, Connection] = {}
         self._hosts = list(hosts)
         self._number = port
@@ -310,6 +408,14 @@ class Endpoint:
         self._loop.add_reader(found.fileno(), self._readable, found)
         if self._tcp is not None:
             self._tcp.bind(host, self._number)
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """What came and was not used, by reason, since the start: here, and of every connection."""
+        found = Counter(self.counts) + self._dropped_before
+        for connection in self._connections.values():
+            found += connection.peer.dropped + connection.counts
+        return found
 
     # Where peers reach us
 
@@ -403,17 +509,29 @@ class Endpoint:
         self.send([Datagram(data, path) for data in self._probes[path].data_to_send()], urgent=False)
 
     def _give_back_unused(self) -> None:
-        in_use = {path.local for each in self._connections.values() if (path := each.peer.ice.path) is not None}
+        in_use = set[Address]()
+        for each in self._connections.values():
+            path = each.peer.ice.path
+            # One that looks for its path may find it through any of them.
+            in_use.update([path.local] if path is not None else [x.base for x in each.peer.ice.local_candidates])
         for link in [each for each in self._relays if each.relayed not in in_use]:
             link.close()
             self._relays.remove(link)
 
     def connect(
-        self, *, controlling: bool, settings: PeerSettings | None = None, listener: Listener | None = None
+        self,
+        *,
+        controlling: bool,
+        settings: PeerSettings | None = None,
+        listener: Listener | None = None,
+        turns: Turns | None = None,
     ) -> Connection:
-        """A connection that is to be negotiated; `controlling` is as of `Peer`. Raises TooManyPeers.
+        """A connection that is to be negotiated. Raises TooManyPeers.
 
-        `listener`: hears its events as they happen; it may use the connection, and closes nothing else.
+        Args:
+            controlling: as of `Peer`
+            listener: hears its events as they happen; it may use the connection, and closes nothing else
+            turns: when to handle what its peer sends; None: at once
         """
         if len(self._connections) >= self.settings.peers:
             raise TooManyPeers(f"{len(self._connections)} peers")
@@ -426,7 +544,7 @@ class Endpoint:
             settings=replace(settings or self.settings.peer, epoch=epoch),
             directory=self.port.directory,
         )
-        connection = Connection(self, peer, self.settings, listener)
+        connection = Connection(self, peer, self.settings, listener, turns)
         self._connections[peer.ice] = connection
         return connection
 
@@ -479,7 +597,8 @@ class Endpoint:
             link.send(datagram.data, datagram.remote)
 
     def forget(self, connection: Connection) -> None:
-        self._connections.pop(connection.peer.ice, None)
+        if self._connections.pop(connection.peer.ice, None) is not None:
+            self._dropped_before += connection.peer.dropped + connection.counts
 
     # Sockets
 
@@ -499,16 +618,15 @@ class Endpoint:
                 continue
             agent = self.port.route(data, path, now)
             connection = self._connections.get(agent) if agent is not None else None
-            if connection is None:
+            if connection is None or connection.put_off(data, path):
                 continue
-            if connection.peer.receive_plain(data):
-                heard.setdefault(connection, False)
-            else:
-                connection.peer.receive_datagram(data, path, now)
+            if connection.receive(data, path, now):
                 heard[connection] = True
+            else:
+                heard.setdefault(connection, False)
         for connection, more in heard.items():
             if more:
-                connection.flush()
+                connection.settle()
             else:
                 connection.hand_out_plain()
 
@@ -522,8 +640,7 @@ class Endpoint:
         agent = self.port.directory.owner(path)
         connection = self._connections.get(agent) if agent is not None else None
         if connection is not None:
-            connection.peer.ice.path_closed(path, self._loop.time())
-            connection.flush()
+            connection.path_closed(path)
 
     def _flush(self) -> None:
         self._flush_is_due = False

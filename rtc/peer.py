@@ -25,7 +25,7 @@ from rtc.ice.candidates import CandidateError, parse_candidate
 from rtc.ice.check_list import LocalCandidate
 from rtc.ice.credentials import Credentials
 from rtc.ice.directory import Directory
-from rtc.ice.events import Ended, PathChanged, Restarted, RestartFailed
+from rtc.ice.events import Answered, Ended, PathChanged, Restarted, RestartFailed
 from rtc.ice.settings import IceSettings
 from rtc.peer_events import (
     Connected,
@@ -37,6 +37,7 @@ from rtc.peer_events import (
     PlainRtcp,
     PlainRtp,
 )
+from rtc.rtp.incoming import IncomingStream
 from rtc.rtp.outgoing import PathShare
 from rtc.rtp.stage import earliest
 from rtc.rtp.streams import Identity, NegotiatedMedia, Streams
@@ -397,11 +398,28 @@ class Peer:
 
     def request_keyframe(self, mid: str, now: float) -> None:
         """Raises PeerNotReady: we do not receive in section `mid`."""
+        self._now = now
+        self._need_incoming(mid).request_keyframe(now)
+
+    def limit(self, mid: str, bitrate: int) -> None:
+        """Ask the peer to send at most so many bit/s in this section (REMB). Raises PeerNotReady likewise."""
+        self._need_incoming(mid).limit = bitrate
+
+    def _need_incoming(self, mid: str) -> IncomingStream:
         stream = self.streams.incoming.get(mid) if self.streams is not None else None
         if stream is None:
             raise PeerNotReady(f"nothing is received in section {mid!r}")
-        self._now = now
-        stream.request_keyframe(now)
+        return stream
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """What came and was not used, by reason, of all its parts."""
+        parts = [self.counts, self.ice.counts]
+        if self.streams is not None:
+            parts.append(self.streams.counts)
+        if self._unprotect is not None:
+            parts.append(Counter({f"srtp_{name}": count for name, count in self._unprotect.counts.items()}))
+        return sum(parts, Counter())
 
     def close(self, now: float) -> None:
         """Say goodbye in every protocol that has a word for it. Idempotent; drain `datagrams_to_send` once more."""
@@ -502,7 +520,7 @@ class Peer:
             if isinstance(event, PathChanged):
                 self._events.append(PathFound(event.path))
                 self._start_dtls(now)
-            elif isinstance(event, Restarted | RestartFailed):
+            elif isinstance(event, Answered | Restarted | RestartFailed):
                 self._events.append(event)
             elif isinstance(event, Ended):
                 self._end(event.reason)

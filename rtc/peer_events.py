@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 from rtc.addresses import Path
 from rtc.channels import ChannelEvent
-from rtc.ice.events import Restarted, RestartFailed
+from rtc.ice.events import Answered, Restarted, RestartFailed
 from rtc.rtp.packet import RtpPacket
 from rtc.rtp.stage import StreamEvent
 
 __all__ = [
+    "Answered",
     "Connected",
     "MediaEvent",
     "PacketReceived",
@@ -70,7 +71,7 @@ class PeerEnded:
     """Nothing may be sent any more; the last event.
 
     `reason` is a stable name: "closed" by us, "peer_closed", "no_path" and "consent_expired" of ICE, "dtls_protocol",
-    "dtls_fingerprint", "dtls_timeout", "dtls_too_much_handshake".
+    "dtls_fingerprint", "dtls_timeout", "dtls_too_much_handshake", "failed": serving it has raised what nothing expects.
     """
 
     reason: str
@@ -79,6 +80,7 @@ class PeerEnded:
 
 PeerEvent = (
     PathFound
+    | Answered
     | Restarted
     | RestartFailed
     | Connected

@@ -10,14 +10,16 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 from rtc.addresses import Address, Datagram, Path
 from rtc.ice.tcp import TcpFraming, frame
+from rtc.ice.token_bucket import TokenBuckets
 
 __all__ = ["TcpPort", "TcpPortSettings"]
 
 BACKLOG = 128
-PAUSE = 0.1  # s, when the system has no descriptor left
+PAUSE = 0.1  # s, when the system has no descriptor left, or too many connect
 TCP_NOTSENT_LOWAT = getattr(socket, "TCP_NOTSENT_LOWAT", 25)  # linux/tcp.h; Python does not name it everywhere
 KERNEL_UNSENT = 32 * 1024  # bytes; what waits longer waits here, where it is counted and bounded
 
@@ -25,6 +27,8 @@ KERNEL_UNSENT = 32 * 1024  # bytes; what waits longer waits here, where it is co
 @dataclass(frozen=True, slots=True)
 class TcpPortSettings:
     connections: int = 1024  # of peers and strangers; each has a descriptor
+    accept_rate: float = 200.0  # connections a second in the long run; more wait in the system's queue, or are refused
+    accept_burst: float = 100.0  # connections at once
     strangers: int = 64  # connections on which no check has been authentic
     patience: float = 10.0  # s until a stranger is closed, or a connection that no session uses any more
     unsent: int = 128 * 1024  # bytes that wait for the network; what comes then is lost, as UDP would lose it
@@ -55,7 +59,9 @@ class TcpPort:
         self._loop = asyncio.get_running_loop()
         self._listeners: dict[Address, socket.socket] = {}
         self._accepting: set[asyncio.Task[object]] = set()
-        self._connections: dict[Path, _TcpPath] = {}  # the oldest first
+        self._accepts = TokenBuckets(self.settings.accept_rate, self.settings.accept_burst)
+        self._connections: dict[Path, _TcpPath] = {}
+        self._strangers: dict[Path, _TcpPath] = {}  # the oldest first; some may be used by now
 
     def bind(self, host: str, port: int) -> None:
         """Listen at this address. Raises OSError."""
@@ -92,26 +98,32 @@ class TcpPort:
             self.counts["too_many_connections"] += 1
             connection.abort()
             return
-        strangers = [each for each in self._connections.values() if not self.is_used(each.path)]
-        if len(strangers) > self.settings.strangers:
+        self._strangers[connection.path] = connection
+        if len(self._strangers) > self.settings.strangers:
+            self._strangers = {path: each for path, each in self._strangers.items() if not self.is_used(path)}
+        if len(self._strangers) > self.settings.strangers:
             self.counts["too_many_strangers"] += 1
-            strangers[0].abort()
+            self._strangers.pop(next(iter(self._strangers))).abort()
 
     def ended(self, connection: "_TcpPath") -> None:
+        self._strangers.pop(connection.path, None)
         if self._connections.pop(connection.path, None) is not None:
             self.closed(connection.path)
 
     # Inside
 
     def _accept(self, listener: socket.socket) -> None:
+        if not self._accepts.take(self._loop.time()):
+            self.counts["put_off"] += 1
+            self._pause(listener)
+            return
         try:
             connection, _ = listener.accept()
         except (BlockingIOError, ConnectionAbortedError):
             return
         except OSError:  # no descriptor, or no memory
             self.counts["not_accepted"] += 1
-            self._loop.remove_reader(listener)
-            self._loop.call_later(PAUSE, self._listen_again, listener)
+            self._pause(listener)
             return
         connection.setblocking(False)
         with suppress(OSError):  # a system that has no such option
@@ -119,6 +131,11 @@ class TcpPort:
         task: asyncio.Task[object] = self._loop.create_task(self._open(connection), name="ice-tcp")
         self._accepting.add(task)
         task.add_done_callback(self._accepting.discard)
+        task.add_done_callback(partial(_close_if_cancelled, connection))
+
+    def _pause(self, listener: socket.socket) -> None:
+        self._loop.remove_reader(listener)
+        self._loop.call_later(PAUSE, self._listen_again, listener)
 
     def _listen_again(self, listener: socket.socket) -> None:
         if listener in self._listeners.values():
@@ -129,6 +146,12 @@ class TcpPort:
             await self._loop.connect_accepted_socket(lambda: _TcpPath(self), connection)
         except OSError:  # the peer has gone
             connection.close()
+
+
+def _close_if_cancelled(connection: socket.socket, task: asyncio.Task[object]) -> None:
+    """Also where the task was cancelled before its first step."""
+    if task.cancelled():
+        connection.close()
 
 
 class _TcpPath(asyncio.Protocol):

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from functools import cache
 
 import msgspec
@@ -31,23 +31,25 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         metrics = Metrics()
-        house = open_house(app, settings, state, metrics)
-        async with running_session(settings, house, metrics, house.state.directory) as made:
-            attach_session(app, made)
-            peers, clock = made.console.peers, made.console.clock
-            async with asyncio.TaskGroup() as tasks:
-                running = [
-                    tasks.create_task(house.run(), name="links"),
-                    tasks.create_task(
-                        run_on(
-                            "sweeper", lambda: sweep_forever(lambda: peers.ended, lambda: clock.moving), metrics.faults
+        with closing(open_house(app, settings, state, metrics)) as house:
+            async with running_session(settings, house, metrics, house.state.directory) as made:
+                attach_session(app, made)
+                peers, clock = made.console.peers, made.console.clock
+                async with asyncio.TaskGroup() as tasks:
+                    running = [
+                        tasks.create_task(house.run(), name="links"),
+                        tasks.create_task(
+                            run_on(
+                                "sweeper",
+                                lambda: sweep_forever(lambda: peers.ended, lambda: clock.moving),
+                                metrics.faults,
+                            ),
+                            name="sweeper",
                         ),
-                        name="sweeper",
-                    ),
-                ]
-                yield
-                for task in running:
-                    task.cancel()
+                    ]
+                    yield
+                    for task in running:
+                        task.cancel()
 
     app = session_app(settings, lifespan)
     app.add_api_route("/openapi.json", _describe, include_in_schema=False)

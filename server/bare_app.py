@@ -19,7 +19,9 @@ from server.front_door import FrontDoor, HostNames
 from server.guard import Guard
 from server.house import House, HouseMetrics
 from server.known_tokens import KnownTokens
-from server.media.aiortc_private import own_addresses, restrict_ice_hosts
+from server.media.aiortc_private import restrict_ice_hosts
+from server.media_addresses import media_hosts
+from server.media_endpoint import MediaEndpoint
 from server.rate_limits import RateLimits
 from server.security import SAFE_METHODS, SecurityHeaders, check_origin
 from server.settings import Settings
@@ -28,8 +30,6 @@ from server.state import ConsoleState, open_state
 __all__ = ["bare_app", "guard_app", "open_house"]
 
 log = structlog.get_logger(__name__)
-
-LOOPBACK = "127.0.0.1"
 
 
 def bare_app(title: str, settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
@@ -75,8 +75,9 @@ def open_house(
     """To be called when the lifespan of `app` begins; `state` stands in for what the settings name."""
     asyncio.get_running_loop().set_exception_handler(metrics.faults.uncaught)
     opened = state or open_state(settings)
-    _restrict_ice(settings)
-    house = House(opened, Guard(settings), metrics, max_peers, reserved)
+    if settings.ice_hosts or settings.bound_to_loopback:
+        restrict_ice_hosts(media_hosts(settings))
+    house = House(opened, Guard(settings), metrics, MediaEndpoint(settings), max_peers, reserved)
     app.state.house = house
     log.info("audit and recordings are signed", public_key=opened.signer.public_key)
     return house
@@ -107,18 +108,6 @@ def guard_app(app: FastAPI, settings: Settings) -> None:
         caught=_caught,
     )
     app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None, relays=settings.relay_origins)
-
-
-def _restrict_ice(settings: Settings) -> None:
-    """A console bound to loopback offers loopback, which aioice never gathers, and this machine's own addresses.
-
-    Firefox pairs loopback with nothing unless a hidden preference says so; it reaches the console by an own address.
-    Only who got ICE credentials over the loopback-bound signalling can use either.
-    """
-    if settings.ice_hosts:
-        restrict_ice_hosts(settings.ice_hosts)
-    elif settings.bound_to_loopback:
-        restrict_ice_hosts([settings.host if settings.host != "localhost" else LOOPBACK, *own_addresses()])
 
 
 def _link_of(scope: Scope, known: KnownTokens) -> str:

@@ -15,6 +15,7 @@ from server.faults import Faults
 from server.guard import Guard
 from server.invitations import Invitation
 from server.link_warden import LinkWarden
+from server.media_endpoint import MediaEndpoint
 from server.places import check_place
 from server.silenced_links import SilencedLinks
 from server.state import ConsoleState
@@ -54,9 +55,12 @@ class House:
         state: ConsoleState,
         guard: Guard,
         metrics: HouseMetrics,
+        endpoint: MediaEndpoint,
         max_peers: int | None = None,
         reserved: int = 0,
     ) -> None:
+        self.endpoint = endpoint
+        self._dropped: Counter[str] = Counter()  # datagrams, as far as the metrics know
         self.state = state
         self.guard = guard
         self.metrics = metrics
@@ -71,6 +75,17 @@ class House:
             tasks.create_task(self._look_on(), name="links end")
             tasks.create_task(self._keep_time(), name="newest time")  # a disk that hangs holds up no end of a link
             tasks.create_task(self._keep_ended(), name="revocations")
+
+    def close(self) -> None:
+        """After all sessions have ended."""
+        self.endpoint.close()
+
+    def collect(self) -> None:
+        """Bring into the metrics what is counted elsewhere."""
+        dropped = self.endpoint.dropped
+        for name, count in (dropped - self._dropped).items():
+            self.metrics.bad_input.labels("transport", name).inc(count)
+        self._dropped = dropped
 
     async def _look_on(self) -> None:
         while True:

@@ -77,9 +77,8 @@ class IceSession:
         gatherer: Callable[[], RTCIceGatherer],
         connect_timeout: float,
         on_refused: Callable[[str], None],
-        on_round_trip: Callable[[float], None] | None = None,
     ) -> None:
-        """`on_refused` gets the name of what a peer had too much of, `on_round_trip` each that was measured, in s."""
+        """`on_refused` gets the name of what a peer had too much of."""
         self.tag = _new_tag()
         self.username = username  # the peer's, of the newest session
         self._dtls = _dtls_of(pc)
@@ -87,7 +86,6 @@ class IceSession:
         self._gatherer = gatherer
         self._connect_timeout = connect_timeout
         self._on_refused = on_refused
-        self._on_round_trip = on_round_trip
         self._candidates = 0
         self._closed = False
         self._restarting = asyncio.Lock()
@@ -159,7 +157,7 @@ class IceSession:
 
     def _prepare(self, connection: Any) -> None:
         guard_ice(connection, self._on_refused, self._is_secured)
-        keep_consent(connection, lambda: self._expired(connection), self._on_round_trip)
+        keep_consent(connection, lambda: self._expired(connection))
 
     def _is_secured(self) -> bool:
         return self._dtls is not None and self._dtls._state is State.CONNECTED

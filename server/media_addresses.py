@@ -1,9 +1,25 @@
-"""Whether media can use the addresses that were set."""
+"""The addresses at which the console is reached for media."""
 
 import socket
 from collections.abc import Iterable
+from typing import Protocol
 
-__all__ = ["NoSuchAddress", "check_media_addresses"]
+from rtc.interfaces import own_addresses
+
+__all__ = ["MediaHostSettings", "NoSuchAddress", "check_media_addresses", "media_hosts"]
+
+LOOPBACK = "127.0.0.1"
+
+
+class MediaHostSettings(Protocol):
+    """The settings that say which they are."""
+
+    @property
+    def host(self) -> str: ...
+    @property
+    def ice_hosts(self) -> tuple[str, ...]: ...
+    @property
+    def bound_to_loopback(self) -> bool: ...
 
 
 class NoSuchAddress(Exception):
@@ -28,3 +44,17 @@ def check_media_addresses(addresses: Iterable[str]) -> None:
                 probe.bind((address, 0))
         except OSError as error:
             raise NoSuchAddress(address, error.strerror or str(error)) from error
+
+
+def media_hosts(settings: MediaHostSettings) -> list[str]:
+    """Those that were set, or all that this machine has now; those to prefer first.
+
+    A console bound to loopback offers loopback, and this machine's own addresses: Firefox pairs loopback with nothing
+    unless a hidden preference says so, and reaches the console by an own address. Only who got ICE credentials over the
+    loopback-bound signalling can use either.
+    """
+    if settings.ice_hosts:
+        return list(settings.ice_hosts)
+    if settings.bound_to_loopback:
+        return [settings.host if settings.host != "localhost" else LOOPBACK, *own_addresses()]
+    return own_addresses()

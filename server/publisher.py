@@ -5,23 +5,26 @@ import secrets
 import sys
 import time
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Literal, Protocol
 
 import msgspec
 import structlog
-from aiortc import RTCPeerConnection
 
+from rtc.endpoint import Connection
+from rtc.peer import PeerNotReady
+from rtc.peer_events import Answered, Connected, PacketReceived, PeerEnded, PeerEvent
+from rtc.rtp.packet import RtpPacket
 from server.access import Identity
 from server.audit import Actor
 from server.channels import MessageBudget
 from server.errors import Flood, TooManyRequests
-from server.ice_restart_private import IceSession
-from server.media.aiortc_private import close_or_force
+from server.ice_session import IceSession
+from server.media.published.depacketise import PictureCodec
 from server.media.published.encoded_wire import Encoded, encode_picture
 from server.media.published.incoming_pictures import IncomingPictures
 from server.media.published.picture_assembly import MediaPacket
 from server.media.published.published_camera import PublishedCamera
-from server.media.published.receiver_private import PictureSection
 from server.media.sources.reader_process import ReaderProcess
 from server.media.sources.source_wire import Captured, Said, Trouble
 from server.names import clean_name
@@ -33,11 +36,10 @@ log = structlog.get_logger(__name__)
 COMMAND = (sys.executable, "-m", "server.media.published.decoder_process")
 MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
 LOOK_SECONDS = 0.05  # between two looks at what is missing
-REPORT_SECONDS = 1.0
 STALLED_SECONDS = 3.0  # without a picture; then the page says so
 MOST_BPS = 6_000_000  # that a publisher is asked not to exceed
 MOST_FLOODED = 10_000  # packets beyond every budget, then it ends
-CLOSE_TIMEOUT = 5.0  # s
+ENDS = {"consent_expired": "consent expired", "no_path": "connection failed"}  # why a connection ends
 
 PacketOutcome = Literal["lost", "malformed", "foreign", "flooded", "not_decoded"]
 
@@ -59,17 +61,14 @@ class Publisher:
     Attributes:
         resource: secret: the path of the WHIP session
         ended: why; "" while it lives
-        ice: its ICE session; set before `run`
+        ice: its ICE session; set by `receives`
     """
 
     ice: IceSession
 
-    def __init__(
-        self, pc: RTCPeerConnection, camera: PublishedCamera, identity: Identity, limits: PublisherLimits
-    ) -> None:
+    def __init__(self, camera: PublishedCamera, identity: Identity, limits: PublisherLimits) -> None:
         self.id = secrets.token_hex(4)
         self.resource = secrets.token_urlsafe(16)
-        self.pc = pc
         self.camera = camera
         self.identity = identity
         self.name = clean_name(identity.name, identity.role)
@@ -79,12 +78,15 @@ class Publisher:
         self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
         self._end = asyncio.Event()
         self._connected = asyncio.Event()
-        self._section: PictureSection | None = None  # None before the answer
+        self._connection: Connection | None = None  # None before the answer
         self._incoming: IncomingPictures | None = None  # likewise
+        self._mid = ""  # of the section in which its pictures come
+        self._ssrc: int | None = None  # of its pictures; None before the first packet
+        self._foreign = 0  # packets of another source
+        self._fault: Exception | None = None  # what handling its packets has raised
         self._decoder = ReaderProcess(camera.spec.name, COMMAND, self._decoded, None)
         self._shown_at = time.monotonic()  # when the last picture came, or the publication began
         self._not_decoded = 0
-        pc.on("connectionstatechange", self._connection_changed)
 
     @property
     def actor(self) -> Actor:
@@ -107,8 +109,8 @@ class Publisher:
         return {
             "lost": 0 if incoming is None else incoming.lost,
             "malformed": 0 if incoming is None else incoming.malformed,
-            "foreign": 0 if self._section is None else self._section.foreign,
-            "flooded": 0 if incoming is None else incoming.flooded,
+            "foreign": self._all_foreign(),
+            "flooded": self._all_flooded(),
             "not_decoded": self._not_decoded,
         }
 
@@ -125,20 +127,58 @@ class Publisher:
             self.ended = why
             self._end.set()
 
-    def receives(self, section: PictureSection) -> None:
-        """Its pictures come in this section. Call once, before the answer."""
-        self._section = section
-        self._incoming = IncomingPictures(section.codec, self.camera.spec.latency, time.monotonic())
+    def receives(self, connection: Connection, username: str, mid: str, codec: PictureCodec) -> None:
+        """Its pictures come in this section. Call once, with the answer; `username` is of the offer."""
+        self._connection, self._mid = connection, mid
+        self._incoming = IncomingPictures(codec, self.camera.spec.latency, time.monotonic())
+        self.ice = IceSession(connection, username)
+        connection.limit(mid, MOST_BPS)
 
-    def packet(self, packet: MediaPacket) -> None:
-        """One packet of its pictures."""
-        if self._incoming is not None and not self.ended:
-            self._pass_on(self._incoming.take(packet, time.monotonic()))
+    def heard(self, event: PeerEvent) -> None:
+        """An event of its connection."""
+        try:
+            self._take(event)
+        except Exception as error:
+            self._fault = self._fault or error
+            self.end("internal error")
 
-    def round_trip(self, seconds: float) -> None:
+    def _take(self, event: PeerEvent) -> None:
+        if isinstance(event, PacketReceived):
+            self._packet(event.packet)
+        elif isinstance(event, Answered):
+            self._round_trip(event.seconds)
+        elif isinstance(event, Connected):
+            self._connected.set()
+        elif isinstance(event, PeerEnded):
+            self.end(ENDS.get(event.reason, "connection closed"))
+
+    def _packet(self, packet: RtpPacket) -> None:
+        if self._incoming is None or self.ended:
+            return
+        self._ssrc = packet.ssrc if self._ssrc is None else self._ssrc
+        if packet.ssrc != self._ssrc:
+            self._foreign += 1
+            return
+        taken = MediaPacket(packet.sequence_number, packet.timestamp, packet.marker, packet.payload)
+        self._pass_on(self._incoming.take(taken, time.monotonic()))
+
+    def _round_trip(self, seconds: float) -> None:
         """One was measured on its path."""
-        if self._incoming is not None:
+        if self._incoming is not None and self._connection is not None:
             self._incoming.path.observe(seconds, time.monotonic())
+            self._connection.peer.note_round_trip(seconds)
+
+    def _all_foreign(self) -> int:
+        streams = None if self._connection is None else self._connection.peer.streams
+        if streams is None:
+            return self._foreign
+        return self._foreign + streams.counts["rtp_unknown"] + streams.incoming[self._mid].ignored
+
+    def _all_flooded(self) -> int:
+        incoming, connection = self._incoming, self._connection
+        if incoming is None or connection is None:
+            return 0
+        return incoming.flooded + connection.counts["receive_overflow"]
 
     async def run(self, link_ended: Callable[[], Awaitable[None]]) -> None:
         """`link_ended` returns when its link is good no more."""
@@ -158,16 +198,14 @@ class Publisher:
                         task.cancel()
         finally:
             self.end("closed")
-            await self.close()
+            self.close()
+        if self._fault is not None:
+            raise self._fault
 
-    async def close(self) -> None:
+    def close(self) -> None:
         """Its connection. Instead of `run` where it was never admitted."""
-        try:
-            async with asyncio.timeout(CLOSE_TIMEOUT):
-                await self.ice.close()
-                await close_or_force(self.pc)
-        except TimeoutError:
-            log.warning("publisher did not close in time", peer=self.id)
+        if self._connection is not None:
+            self._connection.close()
 
     async def _decode(self) -> None:
         await self._connected.wait()  # who never connects costs no process
@@ -186,28 +224,23 @@ class Publisher:
             self.end("never connected")
 
     async def _look(self) -> None:
-        """Ask for what is missing, report, and see whether anything still comes."""
+        """Give up what does not come, ask for keyframes, and see whether anything still comes."""
         await self._connected.wait()
         self._shown_at = time.monotonic()
-        reported = 0.0
-        while self._incoming is not None and self._section is not None:
+        while self._incoming is not None and self._connection is not None:
             now = time.monotonic()
-            self._ask(self._incoming, self._section, now)
-            if now - reported >= REPORT_SECONDS:
-                reported = now
-                self._section.report(MOST_BPS, now)
+            self._ask(self._incoming, self._connection, now)
             self._check_silence(self._incoming, now)
             await asyncio.sleep(LOOK_SECONDS)
 
-    def _ask(self, incoming: IncomingPictures, section: PictureSection, now: float) -> None:
+    def _ask(self, incoming: IncomingPictures, connection: Connection, now: float) -> None:
         self._pass_on(incoming.look(now))
-        requests = incoming.requests(now)
-        section.request_packets(requests.packets)
-        if requests.keyframe:
-            section.request_keyframe()
+        if incoming.wants_keyframe(now):
+            with suppress(PeerNotReady):  # it has ended
+                connection.request_keyframe(self._mid)
         if incoming.late:
             self.end("late")
-        elif max(incoming.flooded, section.foreign) > MOST_FLOODED:
+        elif max(self._all_flooded(), self._all_foreign()) > MOST_FLOODED:
             self.end("too much")
 
     def _check_silence(self, incoming: IncomingPictures, now: float) -> None:
@@ -229,10 +262,3 @@ class Publisher:
             self._not_decoded += 1
             if self._incoming is not None:
                 self._incoming.lost_picture()
-
-    def _connection_changed(self) -> None:
-        state = self.pc.connectionState
-        if state == "connected":
-            self._connected.set()
-        elif state in ("failed", "closed"):
-            self.end(f"connection {state}")

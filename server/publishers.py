@@ -166,7 +166,7 @@ class Publishers:
             # A fault with one publisher must not end anything else.
             self._faults.caught("publisher", error, peer=publisher.id)
             with suppress(Exception):
-                await publisher.close()
+                publisher.close()
         finally:
             self._released(publisher)
             del self._here[publisher]

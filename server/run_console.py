@@ -13,6 +13,7 @@ from pathlib import Path
 import typer
 from fastapi import FastAPI
 
+from rtc.interfaces import own_addresses
 from server.app import create_app
 from server.bridge_process import BridgeProcess
 from server.console_address import write_address
@@ -21,7 +22,6 @@ from server.fleet.fleet_app import create_fleet_app
 from server.fleet.robots import robot_settings
 from server.guarded_http import guarded_by
 from server.links import ConsoleLinks, console_links, listening_url
-from server.media.aiortc_private import own_addresses
 from server.robot_connection import RobotConnection
 from server.serve import running, wait_for_signal
 from server.settings import Settings

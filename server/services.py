@@ -81,6 +81,7 @@ class Services:
         self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
         self.metrics.links_unreadable.set(bool(self.state.invitations.trouble))
         self.metrics.collect_audit(self.audit.lost, self.audit.failures)
+        self.house.collect()
         self.publishers.collect()
         self.metrics.recording_failed.set(self.recorder.state().state == "failed")
         self.metrics.free_bytes.set(free_bytes(self.recorder.shelf.directory))

@@ -33,6 +33,7 @@ from server.errors import (
 )
 from server.ice_restart_private import IceSession
 from server.ice_servers import IceServers, link_headers
+from server.ice_session import LocalSession, PatchedSession
 from server.media.aiortc_private import close_or_force, create_peer_connection
 from server.offer import (
     MAX_SECTIONS,
@@ -53,10 +54,7 @@ __all__ = [
     "FRAGMENT",
     "NEGOTIATION_TIMEOUT",
     "SDP",
-    "candidates_of",
-    "discard",
-    "offered_username",
-    "offers_fault",
+    "candidate_of",
     "patched",
     "router",
 ]
@@ -137,23 +135,57 @@ async def patch(resource: str, request: Request, caller: Annotated[Right, Depend
     here = services(request)
     peer = _own(here, resource, caller)
     peer.take_request()
-    return await patched(request, here, peer.pc, peer.ice, lambda: _own(here, resource, caller))
+    session = _AiortcSession(peer.pc, peer.ice, here.settings.advertise)
+    return await patched(request, here, session, lambda: _own(here, resource, caller))
 
 
-async def patched(
-    request: Request, here: Services, pc: RTCPeerConnection, ice: IceSession, still_there: Callable[[], object]
-) -> Response:
+class _AiortcSession:
+    """As `PatchedSession`, of a peer on aiortc."""
+
+    def __init__(self, pc: RTCPeerConnection, ice: IceSession, advertise: Sequence[str]) -> None:
+        self._pc = pc
+        self._ice = ice
+        self._advertise = advertise
+
+    @property
+    def tag(self) -> str:
+        return self._ice.tag
+
+    @property
+    def username(self) -> str:
+        return self._ice.username
+
+    @property
+    def connected(self) -> bool:
+        return self._ice.connected
+
+    @property
+    def section(self) -> tuple[str, str]:
+        first = SessionDescription.parse(self._pc.remoteDescription.sdp).media[0]
+        return first.kind, first.rtp.muxId
+
+    async def add(self, candidates: Sequence[FragmentCandidate]) -> None:
+        for candidate in [candidate_of(each) for each in candidates]:
+            if not await self._ice.add_candidate(candidate):
+                raise BadSdpFragment("too many candidates for one session")
+
+    async def restart(self, fragment: Fragment) -> LocalSession:
+        candidates = [candidate_of(each) for each in fragment.candidates]
+        local = await self._ice.restart(fragment.username, fragment.password, candidates)
+        lines = [f"candidate:{candidate_to_sdp(each)}" for each in local.candidates]
+        lines += [more for line in lines for more in advertised_candidates(line, self._advertise)]
+        return LocalSession(local.username, local.password, lines)
+
+
+async def patched(request: Request, here: Services, ice: PatchedSession, still_there: Callable[[], object]) -> Response:
     """What a PATCH does, of WHEP and of WHIP. `still_there` raises when the session has ended."""
     expected = _precondition(request, ice.tag)
     text = await read_text(request, FRAGMENT, here.settings.max_sdp_bytes)
-    first = SessionDescription.parse(pc.remoteDescription.sdp).media[0]
-    fragment = parse_fragment(text, first.rtp.muxId)
-    candidates = candidates_of(fragment)
     still_there()  # it may have ended while the body came
+    kind, mid = ice.section
+    fragment = parse_fragment(text, mid)
     if fragment.username in ("", ice.username):
-        for candidate in candidates:
-            if not await ice.add_candidate(candidate):
-                raise BadSdpFragment("too many candidates for one session")
+        await ice.add(fragment.candidates)
         return Response(status_code=204)
     if expected != "*" or not fragment.password:
         raise BadSdpFragment("another ice-ufrag: a restart says If-Match: * and has an ice-pwd")
@@ -161,12 +193,10 @@ async def patched(
         raise NotConnected("there is no ICE session that could be restarted")
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            local = await ice.restart(fragment.username, fragment.password, candidates)
+            local = await ice.restart(fragment)
     except (TimeoutError, ConnectionError) as error:
         raise NotConnected("the ICE session ended, or gathered nothing in time") from error
-    lines = [f"candidate:{candidate_to_sdp(each)}" for each in local.candidates]
-    lines += [more for line in lines for more in advertised_candidates(line, here.settings.advertise)]
-    body = format_fragment(local.username, local.password, first.kind, first.rtp.muxId, lines)
+    body = format_fragment(local.username, local.password, kind, mid, local.candidates)
     headers = {"ETag": ice.tag, "Cache-Control": "no-store"}
     return Response(body, status_code=200, media_type=FRAGMENT, headers=headers)
 
@@ -181,12 +211,8 @@ def _precondition(request: Request, tag: str) -> str:
     return expected
 
 
-def candidates_of(fragment: Fragment) -> list[RTCIceCandidate]:
-    """Raises BadSdpFragment when one cannot be used."""
-    return [_candidate(each) for each in fragment.candidates]
-
-
-def _candidate(each: FragmentCandidate) -> RTCIceCandidate:
+def candidate_of(each: FragmentCandidate) -> RTCIceCandidate:
+    """Raises BadSdpFragment when it cannot be used."""
     try:
         candidate = candidate_from_sdp(each.line.removeprefix("candidate:"))
         ipaddress.ip_address(candidate.ip)

@@ -1,15 +1,24 @@
 """WHIP signalling (RFC 9725): somebody with an operator's link publishes a camera of the console's own."""
 
 import asyncio
-import time
-from typing import Annotated
+from dataclasses import replace
+from typing import Annotated, cast
 
-from aiortc import RTCIceGatherer, RTCIceServer, RTCPeerConnection, RTCSessionDescription
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
+from rtc.endpoint import TooManyPeers
+from rtc.sdp import (
+    MID_URI,
+    Codec,
+    LocalMedia,
+    MediaSection,
+    SdpError,
+    SessionDescription,
+    parse_description,
+    write_description,
+)
+from rtc.sdp.codecs import common_codecs, is_same_format
 from server.access import Right
-from server.advertised import with_advertised
-from server.aiortc_servers import for_aiortc
 from server.api_ice import servers_for
 from server.body import read_text
 from server.errors import (
@@ -20,20 +29,28 @@ from server.errors import (
     NotAllowed,
     NotFound,
     RobotUnreachable,
+    TooManyRequests,
 )
-from server.ice_restart_private import IceSession
 from server.ice_servers import link_headers
-from server.media.aiortc_private import create_peer_connection, offered_direction
+from server.media.published.depacketise import PictureCodec
 from server.media.published.published_camera import PublishedCamera
-from server.media.published.receiver_private import take_pictures
 from server.offer import MAX_SECTIONS, prepare_offer
-from server.offer_sections import AnswerableOffer, answerable
 from server.publisher import Publisher
 from server.services import Services, authorized, services
-from server.to_the_end import to_the_end
-from server.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, discard, offered_username, offers_fault, patched
+from server.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, patched
 
 __all__ = ["router"]
+
+FEEDBACK = ("nack", "nack pli", "goog-remb")
+H264 = {"packetization-mode": "1", "level-asymmetry-allowed": "1"}
+# Of H.264 the baseline profile, plain and constrained: no picture of it is shown before one that was captured earlier.
+PICTURES = (
+    Codec(96, "VP8", 90_000, feedback=FEEDBACK),
+    Codec(98, "H264", 90_000, parameters=H264 | {"profile-level-id": "42001f"}, feedback=FEEDBACK),
+    Codec(100, "H264", 90_000, parameters=H264 | {"profile-level-id": "42e01f"}, feedback=FEEDBACK),
+    Codec(97, "rtx", 90_000, parameters={"apt": "96"}),
+)
+SOUND = (Codec(111, "opus", 48_000, 2), Codec(0, "PCMU", 8000), Codec(8, "PCMA", 8000))
 
 ENDPOINT_METHODS, SESSION_METHODS = "OPTIONS, POST", "DELETE, OPTIONS, PATCH"
 
@@ -57,10 +74,11 @@ async def create(
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(caller.token_id)  # before it costs anything
     text = await read_text(request, SDP, here.settings.max_sdp_bytes)
-    offer = _answerable(prepare_offer(text, MAX_SECTIONS))
+    offer = _parsed(prepare_offer(text, MAX_SECTIONS))
+    section = _pictures(offer)
     ice = servers_for(here.settings, caller.identity)
     with here.publishers.place(caller.identity, camera) as wanted:
-        publisher, answer = await _negotiate(here, caller, offer.text, wanted)
+        publisher, answer = await _negotiate(here, caller, offer, section, wanted)
         here.publishers.admit(publisher)
     headers = {
         "Location": f"{request.scope.get('root_path', '')}/whip/{publisher.resource}",
@@ -70,7 +88,7 @@ async def create(
     }
     if ice.ice_servers:
         headers["Link"] = ", ".join(link_headers(ice))
-    return Response(offer.answer(answer), status_code=201, media_type=SDP, headers=headers)
+    return Response(answer, status_code=201, media_type=SDP, headers=headers)
 
 
 @router.options("/whip", include_in_schema=False)
@@ -105,7 +123,7 @@ async def patch(resource: str, request: Request, caller: Annotated[Right, Depend
     here = _enabled(request)
     publisher = _own(here, resource, caller)
     publisher.take_request()
-    return await patched(request, here, publisher.pc, publisher.ice, lambda: _own(here, resource, caller))
+    return await patched(request, here, publisher.ice, lambda: _own(here, resource, caller))
 
 
 @router.delete("/whip/{resource}")
@@ -115,13 +133,26 @@ async def delete(resource: str, request: Request, caller: Annotated[Right, Depen
     return Response(status_code=200)
 
 
-def _answerable(text: str) -> AnswerableOffer:
-    if "\nm=application" in text:
-        raise BadSdp("a publisher has no data channels")
+def _parsed(text: str) -> SessionDescription:
     try:
-        return answerable(text)
-    except BadSdp as error:
-        raise NotAcceptable(error.detail) from error
+        offer = parse_description(text)
+    except SdpError as error:
+        raise BadSdp(str(error)) from error
+    if any(section.sctp_port is not None for section in offer.sections):
+        raise BadSdp("a publisher has no data channels")
+    return offer
+
+
+def _pictures(offer: SessionDescription) -> MediaSection:
+    """The first section that sends pictures that can be taken, with its best-liked codec and what repairs that."""
+    for section in offer.sections:
+        if section.kind == "video" and section.direction in ("sendonly", "sendrecv"):
+            common = {each.payload_type for each in common_codecs(section.codecs, PICTURES)}
+            best = next((each for each in section.codecs if each.payload_type in common and each.repairs is None), None)
+            if best is not None:
+                repair = section.repair_of(best)
+                return replace(section, codecs=(best,) if repair is None else (best, repair))
+    raise NotAcceptable("no section that sends pictures in H.264 or VP8")
 
 
 def _enabled(request: Request) -> Services:
@@ -140,56 +171,37 @@ def _own(here: Services, resource: str, caller: Right) -> Publisher:
     return publisher
 
 
-async def _negotiate(here: Services, caller: Right, offer: str, camera: PublishedCamera) -> tuple[Publisher, str]:
-    own_servers = for_aiortc(servers_for(here.settings, caller.identity)) if here.settings.relay_console else []
-    pc = create_peer_connection(own_servers)
+async def _negotiate(
+    here: Services, caller: Right, offer: SessionDescription, section: MediaSection, camera: PublishedCamera
+) -> tuple[Publisher, str]:
+    """`section`: the one whose pictures are taken; others are answered inactive."""
+    servers = servers_for(here.settings, caller.identity).ice_servers if here.settings.relay_console else []
+    publisher = Publisher(camera, caller.identity, here.settings)
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            with offers_fault():
-                await pc.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-            publisher = _publisher(here, caller, offer, pc, own_servers, camera)
-            with offers_fault():
-                await to_the_end(pc.setLocalDescription(await pc.createAnswer()))
+            connection = await here.house.endpoint.connect(publisher.heard, turns=here.media.turns, servers=servers)
+    except TimeoutError as error:
+        raise BadSdp("the offer cannot be answered in time") from error
+    except TooManyPeers as error:
+        raise TooManyRequests("too many connections at this console") from error
+    try:
+        answer = connection.answer(offer, {each.mid: _answered(each, section) for each in offer.sections})
+        codec = "VP8" if section.codecs[0].name.lower() == "vp8" else "H264"
+        publisher.receives(connection, offer.transport.ufrag, section.mid, cast(PictureCodec, codec))
         caller.identity  # noqa: B018  raises when the link has ended meanwhile
     except BaseException as error:
-        await discard(here, pc)
-        if isinstance(error, TimeoutError):
-            raise BadSdp("the offer cannot be answered in time") from error
+        connection.close()
+        if isinstance(error, SdpError):
+            raise BadSdp(str(error)) from error
         if isinstance(error, Exception) and not isinstance(error, ConsoleError):
             here.metrics.faults.caught("publisher offer", error)
             raise InternalFault("the console could not answer; it has written down why") from error
         raise
-    return publisher, with_advertised(pc.localDescription.sdp, here.settings.advertise)
+    return publisher, write_description(answer)
 
 
-def _publisher(
-    here: Services,
-    caller: Right,
-    offer: str,
-    pc: RTCPeerConnection,
-    own_servers: list[RTCIceServer],
-    camera: PublishedCamera,
-) -> Publisher:
-    """The publisher behind `pc`: its first section of pictures is taken, all others are answered inactive."""
-    here.media.guard_publisher(pc)
-    publisher = Publisher(pc, camera, caller.identity, here.settings)
-    section = None
-    for transceiver in pc.getTransceivers():
-        transceiver.direction = "inactive"
-        sends = offered_direction(transceiver) in ("recvonly", "sendrecv")  # as seen from here
-        if section is None and transceiver.kind == "video" and sends:
-            section = take_pictures(transceiver, publisher.packet, time.monotonic)
-    if section is None:
-        raise NotAcceptable("no section that sends pictures in H.264 or VP8")
-    publisher.receives(section)
-    refused = here.metrics.bad_input.labels
-    publisher.ice = IceSession(
-        pc,
-        offered_username(offer),
-        lambda: RTCIceGatherer(own_servers),
-        here.settings.peer_connect_timeout,
-        lambda name: refused("transport", name).inc(),
-        publisher.round_trip,
-    )
-    publisher.ice.on_expired = lambda: publisher.end("consent expired")
-    return publisher
+def _answered(offered: MediaSection, taken: MediaSection) -> LocalMedia:
+    if offered.mid != taken.mid:
+        return LocalMedia(PICTURES if offered.kind == "video" else SOUND, "inactive")
+    known = [each for each in PICTURES if each.repairs is not None or is_same_format(each, taken.codecs[0])]
+    return LocalMedia(known, "recvonly", (MID_URI,))

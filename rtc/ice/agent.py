@@ -9,7 +9,7 @@ from rtc.ice.candidates import Candidate
 from rtc.ice.check_list import LocalCandidate
 from rtc.ice.credentials import Credentials, new_credentials
 from rtc.ice.directory import Directory
-from rtc.ice.events import Ended, Event, PathChanged, Restarted, RestartFailed
+from rtc.ice.events import Answered, Ended, Event, PathChanged, Restarted, RestartFailed
 from rtc.ice.role import Role
 from rtc.ice.session import Session
 from rtc.ice.settings import IceSettings
@@ -58,6 +58,7 @@ class Agent:
         self._retired: tuple[Session, float] | None = None  # the one before the last restart, and until when
         self._told: tuple[Path | None, bool] = (None, False)  # by the last PathChanged
         self._events: list[Event] = []
+        self._answered: list[Event] = []  # those that follow the news of a path
         self._out: list[Datagram] = []
         self.ended = False
 
@@ -195,6 +196,11 @@ class Agent:
         if not any(session.has_heard(path) for session in self._sessions()):
             self._directory.release(path, self)
 
+    def answered(self, session: Session, seconds: float) -> None:
+        """For sessions: a check on the path in use was answered after so long."""
+        if session is self._current:
+            self._answered.append(Answered(seconds))
+
     # Inside
 
     def _set_candidates(self, candidates: Iterable[LocalCandidate]) -> None:
@@ -269,3 +275,5 @@ class Agent:
         if (path, nominated) != self._told:
             self._told = (path, nominated)
             self._events.append(PathChanged(path, nominated))
+        self._events += self._answered
+        self._answered.clear()

@@ -5,7 +5,7 @@ from typing import Literal
 
 from rtc.addresses import Path
 
-__all__ = ["Ended", "Event", "PathChanged", "RestartFailed", "Restarted"]
+__all__ = ["Answered", "Ended", "Event", "PathChanged", "RestartFailed", "Restarted"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +14,13 @@ class PathChanged:
 
     path: Path | None
     nominated: bool  # false: it works, and the controlling agent has not decided yet (RFC 8445 12.1)
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """The peer has answered a check on the path in use: its round trip is at most this."""
+
+    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,4 +40,4 @@ class Ended:
     reason: Literal["no_path", "consent_expired"]
 
 
-Event = PathChanged | Restarted | RestartFailed | Ended
+Event = PathChanged | Answered | Restarted | RestartFailed | Ended

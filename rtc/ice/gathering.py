@@ -20,7 +20,7 @@ class Advertised:
     """An address at which a NAT forwards every port to ours, as cloud machines and container networks have it."""
 
     outer: str
-    inner: str | None = None  # the address of ours that it forwards to; None: the first of the same IP version
+    inner: str | None = None  # the address of ours that it forwards to; None: the first of its IP version, but loopback
 
 
 def parse_advertised(text: str) -> Advertised:
@@ -101,4 +101,5 @@ def _local(
 
 def _first_of_version(hosts: Sequence[str], outer: str) -> str | None:
     version = ipaddress.ip_address(outer).version
-    return next((host for host in hosts if ipaddress.ip_address(host).version == version), None)
+    addresses = [ipaddress.ip_address(host) for host in hosts]
+    return next((str(each) for each in addresses if each.version == version and not each.is_loopback), None)

@@ -410,6 +410,8 @@ class Session:
         if not self.is_nominated:
             self._select(self._best(now) or pair, now)
             self._plan_nomination(now)
+        if pair is self.selected:
+            self._agent.answered(self, took)
 
     def _repeat_checks_with_new_role(self) -> None:
         """What is under way states the old role."""

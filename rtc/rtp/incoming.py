@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rtc.rtp.extensions import ExtensionReader
-from rtc.rtp.feedback import PictureLoss
+from rtc.rtp.feedback import PictureLoss, Remb
 from rtc.rtp.losses import Losses
 from rtc.rtp.packet import RtpPacket
 from rtc.rtp.receiver_reports import ReceiverReports
 from rtc.rtp.repairs import Repairs
-from rtc.rtp.rtcp import RtcpPacket
+from rtc.rtp.rtcp import ReceiverReport, RtcpPacket
 from rtc.rtp.stage import RoundTrip, Sink, StreamEvent
 
 __all__ = ["IncomingParameters", "IncomingStream"]
@@ -43,6 +43,7 @@ class IncomingStream:
 
     def __init__(self, parameters: IncomingParameters, round_trip: RoundTrip) -> None:
         self.ignored = 0
+        self.limit: int | None = None  # bit/s that the peer is asked not to exceed, with each report; None: it is not
         self._parameters = parameters
         self._round_trip = round_trip
         self._sink = Sink()
@@ -94,7 +95,10 @@ class IncomingStream:
         return self._sink.drain_packets()
 
     def controls_to_send(self) -> list[RtcpPacket]:
-        return self._sink.drain_controls()
+        controls = self._sink.drain_controls()
+        if self.limit is not None and self.ssrc is not None and any(isinstance(x, ReceiverReport) for x in controls):
+            controls.append(Remb(self._parameters.own_ssrc, self.limit, (self.ssrc,)))
+        return controls
 
     def events(self) -> list[StreamEvent]:
         return self._sink.drain_events()

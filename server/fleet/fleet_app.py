@@ -1,7 +1,7 @@
 """The app of a console with several robots: the overview in front, and each robot's routes below /robots/NAME/."""
 
 from collections.abc import AsyncIterator, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from functools import cache
 
 import msgspec
@@ -29,17 +29,18 @@ def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: 
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        house = open_house(app, settings, state, fleet.metrics, settings.max_total_peers, settings.reserved_places)
-        board = make_board(
-            settings,
-            house.state.signing_key(settings),
-            fleet,
-            house.state.invitations,
-            settings.public_url,
-            fleet.metrics.registry,
-        )
-        async with fleet.running(house, board):
-            yield
+        opened = open_house(app, settings, state, fleet.metrics, settings.max_total_peers, settings.reserved_places)
+        with closing(opened) as house:
+            board = make_board(
+                settings,
+                house.state.signing_key(settings),
+                fleet,
+                house.state.invitations,
+                settings.public_url,
+                fleet.metrics.registry,
+            )
+            async with fleet.running(house, board):
+                yield
 
     app = bare_app("Lockstep fleet", settings, lifespan)
     app.state.fleet = fleet

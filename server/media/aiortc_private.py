@@ -61,15 +61,12 @@ __all__ = [
     "keep_extensions",
     "offered_direction",
     "offered_extensions",
-    "own_addresses",
     "restrict_ice_hosts",
 ]
 
 SOCKET_BACKLOG_BYTES = 64 * 1024  # a peer with more unsent bytes than this gets no more frames for now
 MOST_PATIENCE = 1.0  # s that a keyframe request waits for retransmissions
 MOST_EXPECTED = 100_000  # packets between two reports of a peer
-
-_gather_host_addresses = aioice.ice.get_host_addresses  # aioice's own, before `restrict_ice_hosts`
 
 
 def restrict_ice_hosts(addresses: Sequence[str]) -> None:
@@ -80,11 +77,6 @@ def restrict_ice_hosts(addresses: Sequence[str]) -> None:
         return [address for address in chosen if (use_ipv6 if ":" in address else use_ipv4)]
 
     aioice.ice.get_host_addresses = get_host_addresses
-
-
-def own_addresses() -> list[str]:
-    """The addresses of this machine's interfaces that ICE would gather by itself: all but loopback and link-local."""
-    return list(_gather_host_addresses(use_ipv4=True, use_ipv6=True))
 
 
 def create_peer_connection(ice_servers: Sequence[RTCIceServer] = ()) -> RTCPeerConnection:

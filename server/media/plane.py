@@ -304,9 +304,10 @@ class MediaPlane:
         spec = attached.get(stream.name)
         return spec is not None and spec.passing and spec.size is None
 
-    def guard_publisher(self, pc: RTCPeerConnection) -> None:
-        """What a publisher sends waits for its turn among observers. Call after setRemoteDescription(offer)."""
-        self._guard(pc)
+    @property
+    def turns(self) -> ReceiveTurns:
+        """Those of observers, in which publishers have theirs too."""
+        return self._turns
 
     def _guard(self, pc: RTCPeerConnection, at_once: Callable[[], bool] | None = None) -> None:
         """Without `at_once` everything that this peer sends waits for its turn."""

@@ -24,6 +24,10 @@ class ReceiveTurns:
         self._waiting: set[Waiting] = set()
         self._is_scheduled = False
 
+    def may_go_at_once(self) -> bool:
+        """Never."""
+        return False
+
     def add(self, waiting: Waiting) -> None:
         """It has something to handle. Adding it again changes nothing."""
         if waiting not in self._waiting:

@@ -17,7 +17,7 @@ import pytest
 from aioice import stun, turn
 
 from bench.free_port import free_port
-from server.media.aiortc_private import own_addresses
+from rtc.interfaces import own_addresses
 
 START_TURN = Path(__file__).resolve().parents[2] / "deploy" / "start-turn"
 SECRET, REALM = "only for tests, only on this machine", "lockstep.test"

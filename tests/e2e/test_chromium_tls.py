@@ -7,7 +7,7 @@ from playwright.async_api import Browser
 
 from bench.browsers.chromium import PAD
 from bench.browsers.console_page import RB, ConsolePage
-from server.media.aiortc_private import own_addresses
+from rtc.interfaces import own_addresses
 from tests.support.stack import running_stack
 
 pytestmark = pytest.mark.browser

@@ -15,7 +15,7 @@ from server.data_transport_private import tune_data_transport
 from server.errors import BadSdp, BadSdpFragment
 from server.media.aiortc_private import create_peer_connection, offered_extensions, restrict_ice_hosts
 from server.offer import MAX_CANDIDATES, MAX_SECTIONS, format_fragment, parse_fragment, prepare_offer
-from server.whep import candidates_of
+from server.whep import candidate_of
 
 __all__ = ["try_input"]
 
@@ -40,7 +40,8 @@ def offer(text: str) -> str | None:
 def fragment(text: str) -> None:
     try:
         found = parse_fragment(text, "0")
-        candidates_of(found)
+        for each in found.candidates:
+            candidate_of(each)
     except BadSdpFragment:
         return
     if len(found.candidates) > MAX_CANDIDATES:

@@ -13,7 +13,7 @@ from av.frame import Frame
 from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
 from rtc.endpoint import Connection, Endpoint, EndpointSettings, TooManyPeers
 from rtc.peer import OfferedMedia
-from rtc.peer_events import Connected, PacketReceived, PeerEnded, PeerEvent, PlainRtp
+from rtc.peer_events import Answered, Connected, PacketReceived, PeerEnded, PeerEvent, PlainRtp
 from rtc.rtp.packet import RtpPacket
 from rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
 from tests.rtc.vp8 import packetise
@@ -279,3 +279,88 @@ async def test_plain_packets_come_by_a_short_way_and_everything_else_by_its_own(
         assert watcher.peer.plain_packets() == []
         watcher.close()
         assert not watcher.peer.receive_plain(b"\x80\x60" + bytes(20))
+
+
+async def test_what_nothing_expected_of_one_peer_ends_its_connection_and_no_other(
+    endpoint: Endpoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    asyncio.get_running_loop().set_exception_handler(lambda loop, context: told.append(context["message"]))
+    async with Endpoint([HOST]) as one, Endpoint([HOST]) as another:
+        pairs = []
+        for other in (one, another):
+            offerer, answerer = endpoint.connect(controlling=True), other.connect(controlling=False)
+            offerer.accept(answerer.answer(offerer.offer(), {}))
+            pairs.append((offerer, answerer))
+        for offerer, answerer in pairs:
+            await until(offerer, of(Connected))
+            await until(answerer, of(Connected))
+        (bad, of_bad), (good, of_good) = pairs
+
+        def fails(*_: object) -> None:
+            raise ZeroDivisionError("a fault of ours")
+
+        monkeypatch.setattr(bad.peer, "receive_datagram", fails)
+        of_bad.open_channel("x")
+        assert await until_ended(bad) == PeerEnded("failed", "a fault of ours")
+        assert told == ["serving a WebRTC peer failed"]
+        for harmless in (bad.close, bad.flush):
+            harmless()
+        channel = of_good.open_channel("x")
+        of_good.send(channel, "goes on")
+        assert await until(good, of(ChannelMessage)) == ChannelMessage(channel, "goes on")
+
+
+class FewTurns:
+    """Turns that come when the test says so."""
+
+    def __init__(self) -> None:
+        self.at_once = True
+        self.waiting: set[Connection] = set()
+
+    def may_go_at_once(self) -> bool:
+        return self.at_once
+
+    def add(self, connection: Connection) -> None:
+        self.waiting.add(connection)
+
+
+async def test_what_a_peer_sends_waits_for_its_turn_and_no_more_than_the_bound_does() -> None:
+    turns = FewTurns()
+    settings = EndpointSettings(waiting_datagrams=5)
+    async with Endpoint([HOST], settings=settings) as endpoint, Endpoint([HOST]) as other:
+        offerer, answerer = other.connect(controlling=True), endpoint.connect(controlling=False, turns=turns)
+        offerer.accept(answerer.answer(offerer.offer(), {}))
+        await until(offerer, of(Connected))
+        await until(answerer, of(Connected))
+        channel = offerer.open_channel("x")
+        await until(answerer, of(ChannelOpened))
+        turns.at_once = False
+        offerer.send(channel, "waits")
+        while not turns.waiting:  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+        assert turns.waiting == {answerer}
+        turns.at_once = True  # of no use while others wait: datagrams keep their order
+        for number in range(20):
+            offerer.send(channel, f"{number}")
+            await asyncio.sleep(0.001)
+        while not answerer.counts["receive_overflow"]:  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+        while answerer.handle_next():
+            pass
+        heard = [await until(answerer, of(ChannelMessage)) for _ in range(3)]
+        assert heard[0] == ChannelMessage(channel, "waits")
+        assert heard[1] == ChannelMessage(channel, "0")
+        assert endpoint.dropped["receive_overflow"] == answerer.counts["receive_overflow"]
+        answerer.close()
+        assert endpoint.dropped["receive_overflow"] > 0, "of connections that have ended too"
+
+
+async def test_each_answered_check_tells_its_round_trip(endpoint: Endpoint) -> None:
+    async with Endpoint([HOST]) as other:
+        offerer, answerer = endpoint.connect(controlling=True), other.connect(controlling=False)
+        offerer.accept(answerer.answer(offerer.offer(), {}))
+        for each in (offerer, answerer):
+            found = await until(each, of(Answered))
+            assert isinstance(found, Answered)
+            assert 0 <= found.seconds < 1

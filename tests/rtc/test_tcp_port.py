@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
@@ -215,6 +216,37 @@ async def test_connections_are_bounded_and_those_that_are_there_stay() -> None:
         assert not first.at_eof()
         for each in (writer, other):
             each.close()
+
+
+async def test_whoever_connects_too_often_waits_and_comes_in_later() -> None:
+    async with running(accept_rate=10.0, accept_burst=2.0) as port:
+        opened = [await connected(port, frame(b"check")) for _ in range(4)]
+        await port.until(lambda: len(port.used) == 4)
+        assert port.core.counts["put_off"] > 0
+        for _, writer in opened:
+            writer.close()
+
+
+async def test_strangers_that_have_become_peers_make_room_for_others() -> None:
+    async with running(strangers=2, patience=60.0) as port:
+        opened = []
+        for number in range(5):
+            opened.append(await connected(port, frame(b"check")))
+            await port.until(lambda: len(port.used) > number)  # noqa: B023
+        assert not port.core.counts
+        for _, writer in opened:
+            writer.close()
+
+
+async def test_what_was_accepted_in_the_moment_of_the_end_is_closed() -> None:
+    async with running() as port:
+        with socket.create_connection((HOST, port.number)) as client:
+            [listener] = port.core._listeners.values()
+            port.core._accept(listener)
+            port.core.close()
+            reader, writer = await asyncio.open_connection(sock=client)
+            await ended(reader)
+            writer.close()
 
 
 async def test_a_frame_that_nobody_sends_ends_the_connection() -> None:

@@ -15,7 +15,7 @@ OWN = "127.0.0.3"  # stands for an address of this machine's network
 
 @pytest.fixture(autouse=True)
 def _own_addresses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.bare_app.own_addresses", lambda: [OWN])
+    monkeypatch.setattr("server.media_addresses.own_addresses", lambda: [OWN])
     monkeypatch.setattr(aioice.ice, "get_host_addresses", lambda use_ipv4, use_ipv6: ["127.0.0.4"])
 
 

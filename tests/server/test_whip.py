@@ -1,6 +1,7 @@
 """WHIP on a whole console: its signalling, and who may publish what for how long."""
 
 import asyncio
+import socket
 import time
 from contextlib import AsyncExitStack
 from typing import Any
@@ -9,6 +10,7 @@ import httpx
 import pytest
 
 from robot_bridge.protocol.console import Sources
+from rtc.interfaces import own_addresses
 from server.offer import parse_fragment
 from server.publisher import Publisher
 from server.publishers import MOST_CLOSING
@@ -48,6 +50,11 @@ async def state(peer: TestPeer, state: str, detail: str, stream: str = "phone") 
 def told(peer: TestPeer) -> list[Sources]:
     """All that the peer was told of cameras."""
     return [each for each in peer.heard if isinstance(each, Sources)]
+
+
+def own() -> str:
+    """An address of this machine that is not loopback."""
+    return next(each for each in own_addresses() if ":" not in each)
 
 
 def publishers(rig: Rig) -> list[Publisher]:
@@ -343,3 +350,46 @@ async def test_a_console_that_ends_takes_its_publishers_along() -> None:
             await publisher.post(rig.http, rig.token("operator"))
             await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="phone") > 2)
         assert rig.count("lockstep_whip_ended_total", why="shutdown") == 1
+
+
+async def test_an_offer_for_which_servers_are_asked_too_long_leaves_nothing_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        stun = f"stun:127.0.0.1:{silent.getsockname()[1]}"
+        async with running_rig(whip="phone", relay_console=True, stun=stun) as rig:
+            monkeypatch.setattr("server.whip.NEGOTIATION_TIMEOUT", 0.2)
+            assert name(await post(rig, rig.token("operator"))) == (400, "bad_sdp")
+            endpoint: Any = rig.services.house.endpoint
+            assert endpoint._endpoint._connections == {}
+            assert publishers(rig) == []
+
+
+async def test_the_answer_names_the_outer_address_of_a_console_behind_a_nat_after_its_own() -> None:
+    async with running_rig(whip="phone", ice_hosts=("127.0.0.3", own()), advertise="203.0.113.7") as rig:
+        answer = await post(rig, rig.token("operator"))
+        lines = [line.split() for line in answer.text.splitlines() if line.startswith("a=candidate")]
+        assert {line[4] for line in lines} == {"127.0.0.3", own(), "203.0.113.7"}
+        assert len({line[5] for line in lines}) == 1, "one port, which a NAT forwards"
+        [outer] = [line for line in lines if line[4] == "203.0.113.7"]
+        assert outer[outer.index("raddr") + 1] == own(), "no NAT leads to loopback"
+
+
+async def test_datagrams_of_strangers_are_dropped_and_counted() -> None:
+    async with running_rig(whip="phone") as rig, TestPublisher() as publisher:
+        answer = await publisher.post(rig.http, rig.token("operator"))
+        line = next(line.split() for line in answer.text.splitlines() if line.startswith("a=candidate"))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            for datagram in (b"", b"\x80" * 100, b"\x16\xfe\xff" + bytes(50), b"\x00\x01" + bytes(18), bytes(2000)):
+                stranger.sendto(datagram, (line[4], int(line[5])))
+
+        async def counted() -> bool:
+            await rig.http.get("/metrics", headers=rig.token("operator"))
+            return rig.count("lockstep_bad_input_total", where="transport", reason="unknown_source") >= 2
+
+        async with asyncio.timeout(20):
+            while not await counted():  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+        assert rig.count("lockstep_internal_errors_total", where="loop") == 0
+        await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="phone") > 2)

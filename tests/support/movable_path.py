@@ -13,7 +13,7 @@ from bench.emulator.deliveries import Deliveries
 from bench.emulator.outages import Outages
 from bench.emulator.profile import load_profile
 from bench.emulator.udp_relay import LOOPBACK, UdpRelay
-from server.media.aiortc_private import own_addresses
+from rtc.interfaces import own_addresses
 
 __all__ = ["MovablePath", "movable_path"]
 

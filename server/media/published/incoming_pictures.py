@@ -1,7 +1,5 @@
 """What one publisher sends, from packets to encoded pictures with the time of capture. No I/O, no clock is read."""
 
-from typing import NamedTuple
-
 from server.media.published.depacketise import PictureCodec
 from server.media.published.encoded_wire import Encoded
 from server.media.published.path_bound import PathBound
@@ -9,18 +7,11 @@ from server.media.published.picture_assembly import AssembledPicture, MediaPacke
 from server.media.sources.capture_timeline import CaptureTimeline
 from server.token_bucket import TokenBucket
 
-__all__ = ["IncomingPictures", "Requests"]
+__all__ = ["IncomingPictures"]
 
 MAX_RATE, MAX_BURST = 2000.0, 4000.0  # Hz, of packets: 20 Mbit/s of full ones
 FIRST_ROUND_TRIP = 0.1  # s, while it is not known
 MOST_LAG = 5.0  # s behind the quickest; then what waits is given up by publishing anew
-
-
-class Requests(NamedTuple):
-    """What to ask the publisher for."""
-
-    packets: list[int]  # sequence numbers
-    keyframe: bool
 
 
 class IncomingPictures:
@@ -69,9 +60,9 @@ class IncomingPictures:
         """What is whole since too much was missing for too long."""
         return self._timed(self._assembly.look(now, self._round_trip), now)
 
-    def requests(self, now: float) -> Requests:
-        """What to ask for now; it counts as asked for."""
-        return Requests(self._assembly.to_request(now, self._round_trip), self._assembly.wants_keyframe(now))
+    def wants_keyframe(self, now: float) -> bool:
+        """Whether to ask for one now; then it counts as asked for."""
+        return self._assembly.wants_keyframe(now)
 
     def lost_picture(self) -> None:
         """One could not be decoded."""

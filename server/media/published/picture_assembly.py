@@ -14,9 +14,8 @@ __all__ = ["AssembledPicture", "MediaPacket", "PictureAssembly"]
 
 CAPACITY = 1024  # packets that wait for others
 MOST_BYTES = 2_000_000  # of one picture
-MOST_REQUESTED = 100  # packets asked for at once
 LEAST_PATIENCE, MOST_PATIENCE = 0.1, 0.6  # s that a missing packet is waited for
-REPEAT = 0.05  # s, at least, until it is asked for again
+MARGIN = 0.05  # s beyond one and a half round trips
 KEYFRAME_AGAIN = 0.5  # s until a keyframe is asked for again
 HALF = 1 << 15
 
@@ -43,7 +42,7 @@ class _Kept(NamedTuple):
 
 
 class PictureAssembly:
-    """Call `take` for each packet and `look` now and then; then ask what to request of the sender.
+    """Call `take` for each packet and `look` now and then; then ask whether it wants a keyframe.
 
     Attributes:
         lost: packets that never came, or came too late
@@ -58,7 +57,7 @@ class PictureAssembly:
         self._next: int | None = None  # the first that no picture was made of
         self._scanned = 0  # from the former up to this one, all are here and of one picture
         self._newest = 0
-        self._missing: dict[int, tuple[float, float]] = {}  # since when, and when it was asked for last
+        self._missing: dict[int, float] = {}  # since when
         self._broken = True  # until a keyframe
         self._tainted: int | None = None  # timestamp of a picture whose beginning may be missing
         self._asked_keyframe = float("-inf")
@@ -78,26 +77,18 @@ class PictureAssembly:
         self._kept[number] = _Kept(packet, now)
         self._missing.pop(number, None)
         for absent in range(self._newest + 1, number):
-            self._missing[absent] = (now, float("-inf"))
+            self._missing[absent] = now
         self._newest = max(self._newest, number)
         return self.look(now, round_trip)
 
     def look(self, now: float, round_trip: float = 0.1) -> list[AssembledPicture]:
         """The pictures that are whole now; what was missing for too long is given up."""
         found = [*self._whole_pictures()]
-        patience = min(MOST_PATIENCE, max(LEAST_PATIENCE, 1.5 * round_trip + REPEAT))
-        while (hole := self._missing.get(self._scanned)) is not None and now - hole[0] > patience:
+        patience = min(MOST_PATIENCE, max(LEAST_PATIENCE, 1.5 * round_trip + MARGIN))
+        while (hole := self._missing.get(self._scanned)) is not None and now - hole > patience:
             self._give_up()
             found += self._whole_pictures()
         return found
-
-    def to_request(self, now: float, round_trip: float = 0.1) -> list[int]:
-        """Sequence numbers of packets to ask for now (RFC 4585 6.2.1); they count as asked for."""
-        again = max(REPEAT, round_trip)
-        due = [number for number, (_, asked) in self._missing.items() if now - asked >= again][:MOST_REQUESTED]
-        for number in due:
-            self._missing[number] = (self._missing[number][0], now)
-        return [number & 0xFFFF for number in due]
 
     def wants_keyframe(self, now: float) -> bool:
         """Whether to ask for a keyframe now (RFC 4585 6.3.1); then it counts as asked for."""

@@ -10,7 +10,7 @@ from rtc.rtp.incoming import IncomingParameters, IncomingStream
 from rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
 from rtc.rtp.packet import RtpPacket
 from rtc.rtp.rtcp import ReceiverReport, SenderReport, SourceDescription, pack_rtcp, parse_rtcp
-from rtc.rtp.stage import KeyframeRequested, PacketsGone, RoundTrip
+from rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsGone, RoundTrip
 from rtc.rtp.streams import Identity, NegotiatedMedia, Streams
 from rtc.sdp import Codec, MediaSection
 
@@ -187,3 +187,15 @@ def test_feedback_alone_goes_behind_an_empty_report_and_a_name() -> None:
     [compound] = streams.rtcp_to_send()
     assert parse_rtcp(compound) == [ReceiverReport(1), SourceDescription(((1, "name"),)), PictureLoss(1, 7)]
     assert [mid for mid, _ in streams.packets()] == ["m"]
+
+
+def test_with_each_report_the_sender_is_told_how_much_it_may_send_at_most() -> None:
+    path = Path()
+    path.receiver.limit = 1_000_000
+    path.sender.send([b"x" * 100], 0, path.now)
+    path.run_until(path.now + 3 * DELAY)
+    assert path.sender.events() == [], "there was no report yet"
+    path.run_until(path.now + 1.5)
+    told = [each for each in path.sender.events() if isinstance(each, BandwidthEstimate)]
+    assert told
+    assert all(each.bitrate <= 1_000_000 < 1.01 * each.bitrate and each.ssrcs == {7} for each in told)
