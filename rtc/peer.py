@@ -413,13 +413,13 @@ class Peer:
 
     @property
     def dropped(self) -> Counter[str]:
-        """What came and was not used, by reason, of all its parts."""
-        parts = [self.counts, self.ice.counts]
+        """What came and was not used, by reason; not what ICE passes over as a matter of course."""
+        dropped = self.counts - Counter(dtls_early=self.counts["dtls_early"])  # those were kept
         if self.streams is not None:
-            parts.append(self.streams.counts)
+            dropped += self.streams.counts
         if self._unprotect is not None:
-            parts.append(Counter({f"srtp_{name}": count for name, count in self._unprotect.counts.items()}))
-        return sum(parts, Counter())
+            dropped += Counter({f"srtp_{name}": count for name, count in self._unprotect.counts.items()})
+        return dropped
 
     def close(self, now: float) -> None:
         """Say goodbye in every protocol that has a word for it. Idempotent; drain `datagrams_to_send` once more."""

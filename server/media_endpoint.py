@@ -64,7 +64,12 @@ class MediaEndpoint:
             self._endpoint.close()
 
     def _open(self) -> Endpoint:
+        hosts = media_hosts(self._settings)
         if self._endpoint is None:
-            self._endpoint = Endpoint([], advertised=[Advertised(each) for each in self._settings.advertise])
-        self._endpoint.use_hosts(media_hosts(self._settings))
+            advertised = [Advertised(each) for each in self._settings.advertise]
+            try:
+                self._endpoint = Endpoint(hosts, advertised=advertised)
+            except OSError:  # an address that has just come may not be ready yet: without it
+                self._endpoint = Endpoint([], advertised=advertised)
+        self._endpoint.use_hosts(hosts)
         return self._endpoint

@@ -43,12 +43,14 @@ __all__ = ["router"]
 
 FEEDBACK = ("nack", "nack pli", "goog-remb")
 H264 = {"packetization-mode": "1", "level-asymmetry-allowed": "1"}
-# Of H.264 the baseline profile, plain and constrained: no picture of it is shown before one that was captured earlier.
+PROFILES = ("42001f", "42e01f", "4d001f", "64001f", "640c1f")  # baseline, main and high; all of them can be decoded
 PICTURES = (
     Codec(96, "VP8", 90_000, feedback=FEEDBACK),
-    Codec(98, "H264", 90_000, parameters=H264 | {"profile-level-id": "42001f"}, feedback=FEEDBACK),
-    Codec(100, "H264", 90_000, parameters=H264 | {"profile-level-id": "42e01f"}, feedback=FEEDBACK),
     Codec(97, "rtx", 90_000, parameters={"apt": "96"}),
+    *(
+        Codec(number, "H264", 90_000, parameters=H264 | {"profile-level-id": profile}, feedback=FEEDBACK)
+        for number, profile in enumerate(PROFILES, 98)
+    ),
 )
 SOUND = (Codec(111, "opus", 48_000, 2), Codec(0, "PCMU", 8000), Codec(8, "PCMA", 8000))
 

@@ -254,6 +254,35 @@ async def test_sound_is_answered_inactive_and_pictures_come_all_the_same() -> No
         await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="phone") > 5)
 
 
+@pytest.mark.parametrize("profile", ["42c015", "4d0028", "640c1f", "64001f"])
+async def test_pictures_of_all_profiles_that_encoders_make_are_taken(profile: str) -> None:
+    coded = "a=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1;profile-level-id=" + profile
+    async with running_rig(whip="phone") as rig:
+        answer = await post(rig, rig.token("operator"), offer(PICTURES.replace("a=rtpmap:96 VP8/90000", coded)))
+        assert answer.status_code == 201
+        assert f"profile-level-id={profile}" in answer.text
+        assert "a=recvonly" in answer.text
+
+
+async def test_packets_of_another_source_are_left_out_and_counted() -> None:
+    async with running_rig(whip="phone") as rig, TestPublisher() as publisher:
+        sender: Any = publisher.pc.getTransceivers()[0].sender
+        assert (await publisher.post(rig.http, rig.token("operator"))).status_code == 201
+        await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="phone") > 2)
+        transmit = sender.transport._send_rtp
+
+        async def and_another(data: bytes) -> None:
+            await transmit(data)
+            if 96 <= data[1] & 0x7F < 127:
+                await transmit(data[:8] + b"\x00\x00\x00\x09" + data[12:])
+
+        sender.transport._send_rtp = and_another
+        [here] = publishers(rig)
+        await eventually(lambda: here.counts()["foreign"] > 5)
+        before = rig.count("lockstep_media_frames_in_total", stream="phone")
+        await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="phone") > before + 5)
+
+
 async def test_a_revoked_link_publishes_nothing_a_moment_later() -> None:
     async with running_rig(whip="phone") as rig, rig.peer("observer", "session") as peer, TestPublisher() as publisher:
         made = await rig.http.post(
