@@ -5,13 +5,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from client.frame_assembler import MediaPacket
-from client.payloads import UNPACK, PayloadError
+from client.payloads import UNPACK
 from client.sdp import Section
 from robot_bridge.protocol.carriers import unpack_capture_moment
 from rtc.endpoint import Connection
 from rtc.peer import PeerNotReady
 from rtc.peer_events import PacketReceived, PeerEvent, PlainRtcp, PlainRtp
 from rtc.rtp.packet import RtpPacket
+from rtc.rtp.payloads import PayloadError
 
 __all__ = ["PacketSink", "Packets"]
 

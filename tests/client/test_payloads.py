@@ -8,7 +8,8 @@ from aiortc.rtcrtpparameters import RTCRtpCodecParameters
 from hypothesis import given
 from hypothesis import strategies as st
 
-from client.payloads import UNPACK, PayloadError
+from client.payloads import UNPACK
+from rtc.rtp.payloads import PayloadError
 
 VP8 = RTCRtpCodecParameters(mimeType="video/VP8", clockRate=90_000, payloadType=96)
 H264 = RTCRtpCodecParameters(mimeType="video/H264", clockRate=90_000, payloadType=98)

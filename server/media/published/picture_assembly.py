@@ -7,8 +7,8 @@ in time costs pictures until the next keyframe, and never shows a broken one.
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from rtc.rtp.payloads import PayloadError
 from server.media.published.depacketise import PictureCodec, begins_picture, is_keyframe, join_payloads
-from server.media.published.errors import BadPayload
 
 __all__ = ["AssembledPicture", "MediaPacket", "PictureAssembly"]
 
@@ -159,11 +159,8 @@ class PictureAssembly:
         payloads = [each.packet.payload for each in packets if each.packet.payload]
         if not payloads:
             return None  # padding, to probe the path
-        try:
-            if sum(map(len, payloads)) > MOST_BYTES:
-                raise BadPayload("too large")
-            data = join_payloads(self._codec, payloads)
-        except BadPayload:
+        data = self._joined(payloads)
+        if data is None:
             self.malformed += 1
             self._broken = True
             return None
@@ -172,6 +169,15 @@ class PictureAssembly:
             return None
         self._broken, self._tainted = False, None
         return AssembledPicture(data, keyframe, media_time, min(each.arrival for each in packets))
+
+    def _joined(self, payloads: list[bytes]) -> bytes | None:
+        """None where they are none of this codec, or too much."""
+        if sum(map(len, payloads)) > MOST_BYTES:
+            return None
+        try:
+            return join_payloads(self._codec, payloads)
+        except PayloadError:
+            return None
 
 
 class _MediaTime:
