@@ -12,12 +12,16 @@ export interface Segment {
  * of the last seconds came. One that comes too late to keep the rhythm plays at once, and what follows waits that much
  * longer; while more waits than that, sound plays a little faster. More waits when the path has become quiet, and when
  * the sound device lost time: that of a busy machine may lose a tenth.
+ *
+ * Where that much is more than the tolerance allows, `hurry`: for a while nothing waits for what may come late, and
+ * sound plays faster by a half. It is better heard so, and with holes, than not at all.
  */
 export interface SoundPlayout {
   readonly clockRate: number; // Hz, of the RTP timestamps
   segments: Segment[]; // what plays and what waits, in order
   line: { readonly time: number; at: number } | null; // the rhythm: `time` plays at `at`
   latest: Latest | null; // null before the first packet
+  hurriesUntilS: number; // on the clock of `arrivedS`
 }
 
 /** How late packets came at most, in s after `time` came, less what lies between the two by their timestamps. */
@@ -43,6 +47,10 @@ const SPAN_S = 1; // of `Latest`
 /** Of what waits too long, so much is caught up in a second, ... */
 const CATCH_UP = 0.5;
 const MOST_FASTER = 0.15; // ... but no more: it is heard
+/** How much faster it plays in a hurry, ... */
+const HURRY = 0.5;
+/** ... and for how long, in s. */
+const HURRY_S = 1;
 /** More is never of use, whether it passes the gate or not. */
 const MOST_LEAD_S = 1;
 /** RTP timestamps that jump by more begin anew. */
@@ -53,7 +61,12 @@ const SEAM_S = 0.003;
 const REPEAT_S = 0.065;
 
 export function createSoundPlayout(clockRate: number): SoundPlayout {
-  return { clockRate, segments: [], line: null, latest: null };
+  return { clockRate, segments: [], line: null, latest: null, hurriesUntilS: -Infinity };
+}
+
+/** What plays is as old as it may be, at `nowS` of a clock that loses no time. */
+export function hurry(playout: SoundPlayout, nowS: number): void {
+  playout.hurriesUntilS = nowS + HURRY_S;
 }
 
 /**
@@ -75,7 +88,9 @@ export function placeSegment(
     line.at -= duration;
     return null;
   }
-  const rate = rateFor(due - now - LEAD_S - earlyBy(playout, time, arrivedS));
+  const early = earlyBy(playout, time, arrivedS);
+  const waits = due - now - LEAD_S;
+  const rate = arrivedS < playout.hurriesUntilS ? hurriedRate(waits) : rateFor(waits - early);
   line.at -= duration - duration / rate;
   const start = last !== null && due < last.end + SEAM_S ? last.end : due;
   const segment = { time, start, end: start + duration / rate };
@@ -146,6 +161,10 @@ function earlyBy(playout: SoundPlayout, time: number, arrivedS: number): number 
 /** `spare`: s that sound waits longer than it must. */
 function rateFor(spare: number): number {
   return spare > SPARE_S ? 1 + Math.min(MOST_FASTER, spare * CATCH_UP) : 1;
+}
+
+function hurriedRate(waits: number): number {
+  return waits > SPARE_S ? 1 + HURRY : 1;
 }
 
 function holeBetween(last: Segment, start: number): Segment | null {

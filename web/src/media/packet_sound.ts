@@ -1,6 +1,13 @@
 import { rtpGap } from "../core/sound_backlog";
 import { decodeMuLaw, opusChannels } from "../core/sound_packets";
-import { createSoundPlayout, goOn, placeSegment, playingAt, type Segment } from "../core/sound_playout";
+import {
+  createSoundPlayout,
+  goOn,
+  hurry,
+  placeSegment,
+  playingAt,
+  type Segment,
+} from "../core/sound_playout";
 import type { ReceiverStamps } from "../rtc/stamp_reader";
 import type { SoundSource } from "./sound_source";
 
@@ -59,6 +66,10 @@ export class PacketSound implements SoundSource {
       player.disconnect();
       if (this.playout.segments.includes(segment)) this.start(segment, decoded);
     }
+  }
+
+  hurry(): void {
+    hurry(this.playout, performance.now() / 1000);
   }
 
   leavesOut(): boolean {

@@ -7,6 +7,8 @@ export interface SoundSource {
   waiting(playing: number): number;
   /** Works off what waits too long. `isTooOld`: what plays does not pass; `passes`: whether another packet would. */
   catchUp(playing: number, isTooOld: boolean, passes: (rtpTimestamp: number) => boolean): void;
+  /** What plays is as old as the tolerance allows. */
+  hurry(): void;
   /** Whether sound is being left out so that it catches up. */
   leavesOut(): boolean;
   close(): void;

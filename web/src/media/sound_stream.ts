@@ -54,6 +54,8 @@ export class SoundStream {
   ): boolean {
     const waiting = this.source.waiting(playing);
     const passes = observeSound(this.gate, playing, mark, context, audible, now, waiting);
+    const { gap } = this.gate.counts;
+    if (context.gate === "event" && gap !== null && gap >= context.tolerance) this.source.hurry();
     this.source.catchUp(playing, this.gate.isTooOld, (time) => this.wouldPass(time, context));
     const isEarly = now - (this.gate.playsSinceMs ?? now) < START_MS;
     if (this.isStarting() || (isEarly && this.source.leavesOut()))

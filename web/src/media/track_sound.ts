@@ -41,6 +41,10 @@ export class TrackSound implements SoundSource {
     if (before !== null) this.reader.skip(stamps, before);
   }
 
+  hurry(): void {
+    // the browser has its own rules for how long sound waits
+  }
+
   leavesOut(): boolean {
     return this.backlog.skipTo !== null;
   }

@@ -2,6 +2,7 @@ import { beforeEach, describe, expect, it } from "vitest";
 import {
   createSoundPlayout,
   goOn,
+  hurry,
   placeSegment,
   playingAt,
   type Place,
@@ -31,6 +32,22 @@ function waits(first: number, end: number, late: (index: number) => number): num
     if (place !== null) found.push(place.segment.start - now);
   }
   return found;
+}
+
+/** What share of sound is older than 240 ms when it plays, on a path whose delay wanders: 40 ms, now and then 250. */
+function leftOut(hurries: boolean): number {
+  const delayAt = (index: number): number => 0.04 + 0.21 * Math.max(0, Math.sin(index / 9)) ** 12;
+  playout = createSoundPlayout(RATE);
+  let [tooOld, last] = [0, 0];
+  for (let index = 0; index < 2000; index++) {
+    const now = Math.max(last, index * LENGTH + delayAt(index));
+    last = now;
+    const place = arrive(index, now);
+    if (place === null || place.segment.start - index * LENGTH > 0.24) tooOld++;
+    const playing = playingAt(playout, now);
+    if (hurries && playing !== undefined && now - playing / RATE > 0.18) hurry(playout, 100 + now);
+  }
+  return tooOld / 2000;
 }
 
 describe("the playout of sound", () => {
@@ -66,6 +83,22 @@ describe("the playout of sound", () => {
     waits(0, 50, (index) => (index === 25 ? 0.2 : 0));
     expect(waits(50, 55, () => 0)[0]).toBeGreaterThan(0.15);
     expect(waits(55, 1500, () => 0).at(-1)).toBeLessThan(0.05);
+  });
+
+  it("waits for nothing that may come late while it hurries, and for a second only", () => {
+    const late = (index: number): number => (index % 50 === 49 ? 0.2 : 0);
+    const usual = waits(0, 200, late).slice(150, 199);
+    expect(Math.min(...usual)).toBeGreaterThan(0.1);
+    hurry(playout, 100 + 200 * LENGTH);
+    expect(waits(200, 249, late).at(-1)).toBeLessThan(0.04);
+    const after = waits(249, 400, late).slice(101, 150);
+    expect(Math.min(...after)).toBeGreaterThan(0.1);
+  });
+
+  it("leaves out much less of a path that varies by more than the tolerance when it hurries", () => {
+    const [usual, hurried] = [leftOut(false), leftOut(true)];
+    expect(usual).toBeGreaterThan(0.1);
+    expect(hurried).toBeLessThan(usual / 2);
   });
 
   it("plays on without a growing wait though the sound device loses a tenth of the time", () => {
