@@ -70,13 +70,10 @@ class _Check:
 class _ConsentKeeper:
     """The checks of one connection, on the pair that was nominated last."""
 
-    def __init__(
-        self, connection: Any, on_expired: Callable[[], bool | None], on_round_trip: Callable[[float], None] | None
-    ) -> None:
+    def __init__(self, connection: Any, on_expired: Callable[[], bool | None]) -> None:
         self._connection = connection
         self._complete = connection.check_complete
         self._on_expired = on_expired
-        self._on_round_trip = on_round_trip
         self._pair: Any = None
         self._consent: Consent | None = None
         self._open: list[tuple[float, Any, bytes]] = []  # (sent at, socket, transaction) of checks without an answer
@@ -95,8 +92,6 @@ class _ConsentKeeper:
         loop = asyncio.get_running_loop()
         consent = self._consent = Consent(loop.time())
         try:
-            if self._on_round_trip is not None:
-                self._send_check(loop.time())  # to be measured; who only wants consent waits for the first that is due
             while True:
                 await asyncio.sleep(consent.wait(loop.time()))
                 await asyncio.sleep(0)  # after a pause of the whole process: what has come counts first
@@ -120,16 +115,13 @@ class _ConsentKeeper:
         request = connection.build_request(pair, nominate=False)
         request.add_message_integrity(key)
         transaction = request.transaction_id
-        pair.protocol.transactions[transaction] = _Check(pair.remote_addr, key, lambda: self._answered(pair, now))
+        pair.protocol.transactions[transaction] = _Check(pair.remote_addr, key, lambda: self._answered(pair))
         self._open.append((now, pair.protocol, transaction))
         pair.protocol.send_stun(request, pair.remote_addr)
 
-    def _answered(self, pair: Any, sent: float) -> None:
+    def _answered(self, pair: Any) -> None:
         if pair is self._pair and self._consent is not None:
-            now = asyncio.get_running_loop().time()
-            self._consent.answered(now)
-            if self._on_round_trip is not None:
-                self._on_round_trip(now - sent)
+            self._consent.answered(asyncio.get_running_loop().time())
 
     def _forget(self, sent_before: float) -> None:
         for sent, protocol, transaction in self._open:
@@ -138,22 +130,17 @@ class _ConsentKeeper:
         self._open = [each for each in self._open if each[0] >= sent_before]
 
 
-def keep_consent(
-    connection: Any,
-    on_expired: Callable[[], bool | None] = lambda: None,
-    on_round_trip: Callable[[float], None] | None = None,
-) -> None:
+def keep_consent(connection: Any, on_expired: Callable[[], bool | None] = lambda: None) -> None:
     """Let `connection`, one of aioice with one component, end after 30 s without a valid answer and no sooner.
 
     Call before its `connect`. `on_expired` is called once, before the connection closes because of it. True: it does
-    not close by itself, and whoever was asked sends nothing more by it. `on_round_trip` gets what each answer shows,
-    in seconds; for it a check is sent at once.
+    not close by itself, and whoever was asked sends nothing more by it.
 
     Raises:
         RuntimeError: as `require_consent_hooks`.
     """
     _require(connection, CONNECTION_HOOKS)
-    keeper = _ConsentKeeper(connection, on_expired, on_round_trip)
+    keeper = _ConsentKeeper(connection, on_expired)
     connection.check_complete = keeper.check_complete
     connection.query_consent = keeper.query_consent
 
