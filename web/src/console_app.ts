@@ -14,7 +14,7 @@ import {
 import { capHolds, cappedShare, viewDelay } from "./core/speed_cap";
 import { STALE_MS } from "./core/freshness";
 import { notePicture } from "./core/latency";
-import { noteShown } from "./core/command_gate";
+import { noteHeard, noteShown, setPacing } from "./core/command_gate";
 import { interlock, standingOf } from "./core/interlock";
 import { createRateMeter, noteHappening } from "./core/samples";
 import { parseServerMessage } from "./core/wire_parser";
@@ -205,10 +205,8 @@ export class ConsoleApp {
 
   /** A setting changed: the gates take it at once. */
   settingsChanged(): void {
-    if (this.driver !== null) {
-      this.driver.gate.pacing = this.state.settings.pacing;
-      this.driver.gate.tolerance = this.state.settings.tolerance.video;
-    }
+    const { pacing, tolerance } = this.state.settings;
+    if (this.driver !== null) setPacing(this.driver.gate, pacing, tolerance.video);
     this.room.changed();
   }
 
@@ -380,6 +378,7 @@ export class ConsoleApp {
 
   private drive(now: number): void {
     if (this.driver === null || this.state.welcome === null) return;
+    noteHeard(this.driver.gate, this.room.heard());
     const intention = { armed: this.isArmed(), values: this.values };
     const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
     for (const message of messages) this.tell("control", message);

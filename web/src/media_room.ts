@@ -1,3 +1,4 @@
+import { farthestBehind, type HeardSound } from "./core/command_gate";
 import type { GateContext } from "./core/medium_counts";
 import type { ConsoleState } from "./core/console_state";
 import { NewestLog } from "./core/newest_log";
@@ -75,6 +76,14 @@ export class MediaRoom {
     this.openSounds();
     const context = this.context("audio");
     for (const sound of this.sounds.values()) sound.observe(context, this.isAudible());
+  }
+
+  /** What commands paced by media wait for; null: no microphone is heard. */
+  heard(): HeardSound | null {
+    const { feedback, tolerance } = this.context("audio");
+    const stamps = [...this.sounds.values()].map(({ playing }) => playing).filter((stamp) => stamp !== null);
+    const stamp = feedback === null ? null : farthestBehind(feedback, stamps);
+    return stamp === null ? null : { stamp, tolerance };
   }
 
   /** Timers are slow on a hidden page, too slow to gate sound. */

@@ -3,7 +3,7 @@ import { eventAfter, eventGap, isNewer } from "./serial";
 export type Pacing = "feedback" | "media";
 
 /** Why no new command may be sent now, or that it may. */
-export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture";
+export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture" | "sound";
 
 export interface CommandGate {
   pacing: Pacing;
@@ -15,6 +15,13 @@ export interface CommandGate {
   inFlight: number | null; // the event sent and not yet answered
   lastSentMs: number; // -Infinity before the first
   shown: number | null; // stamp of the picture on screen
+  heard: HeardSound | null; // null: nothing is heard, and nothing is waited for
+}
+
+/** The sound that plays now; of several the one that is farthest behind. */
+export interface HeardSound {
+  readonly stamp: number;
+  readonly tolerance: number; // events
 }
 
 /** The next event and the issue of the feedback that it answers. */
@@ -35,7 +42,14 @@ export function createCommandGate(pacing: Pacing, tolerance: number, minInterval
     inFlight: null,
     lastSentMs: -Infinity,
     shown: null,
+    heard: null,
   };
+}
+
+/** The operator chose otherwise. */
+export function setPacing(gate: CommandGate, pacing: Pacing, tolerance: number): void {
+  gate.pacing = pacing;
+  gate.tolerance = tolerance;
 }
 
 /** Takes a feedback; says whether it was news. */
@@ -73,11 +87,27 @@ export function noteShown(gate: CommandGate, stamp: number): void {
   gate.shown = stamp;
 }
 
+/** What is heard now; null: nothing. */
+export function noteHeard(gate: CommandGate, heard: HeardSound | null): void {
+  gate.heard = heard;
+}
+
+/** Of several stamps the one that lags `event` most; null of none. */
+export function farthestBehind(event: number, stamps: readonly number[]): number | null {
+  if (stamps.length === 0) return null;
+  return stamps.reduce((farthest, stamp) =>
+    eventGap(event, stamp) > eventGap(event, farthest) ? stamp : farthest,
+  );
+}
+
 export function gateState(gate: CommandGate, now: number): GateState {
   if (gate.event === null) return "no_feedback";
   if (gate.inFlight !== null) return "in_flight";
   if (now - gate.lastSentMs < gate.minIntervalMs) return "rate";
-  return gate.pacing === "media" && !pictureIsNear(gate, gate.event) ? "picture" : "open";
+  if (gate.pacing !== "media") return "open";
+  if (!isNear(gate.event, gate.shown, gate.tolerance)) return "picture";
+  const { heard } = gate;
+  return heard === null || isNear(gate.event, heard.stamp, heard.tolerance) ? "open" : "sound";
 }
 
 export function nextCommand(gate: CommandGate): NextCommand | null {
@@ -86,10 +116,10 @@ export function nextCommand(gate: CommandGate): NextCommand | null {
 
 /**
  * Near enough to stay within tolerance when the next feedback comes, one event on. At tolerance 0 none is: there the
- * picture of the newest event must do.
+ * medium of the newest event must do.
  */
-function pictureIsNear(gate: CommandGate, event: number): boolean {
-  if (gate.shown === null) return false;
-  const gap = eventGap(event, gate.shown);
-  return -gate.tolerance <= gap && gap <= Math.max(gate.tolerance - 1, 0);
+function isNear(event: number, stamp: number | null, tolerance: number): boolean {
+  if (stamp === null) return false;
+  const gap = eventGap(event, stamp);
+  return -tolerance <= gap && gap <= Math.max(tolerance - 1, 0);
 }

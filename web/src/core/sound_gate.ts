@@ -85,5 +85,10 @@ export function observeSound(
     else if (verdict === "hold") counts.held += 1;
     else counts.discarded += 1;
   }
-  return verdict === "render" && now - gate.playingSinceMs < CONCEALED_MS;
+  return verdict === "render" && !isConcealed(gate, now);
+}
+
+/** Whether the segment last observed has played for longer than any lasts. */
+export function isConcealed(gate: SoundGate, now: number): boolean {
+  return now - gate.playingSinceMs >= CONCEALED_MS;
 }

@@ -39,6 +39,8 @@ export interface Place {
   readonly repeat: Segment | null; // where the sound before is played again: a lost packet's place
 }
 
+/** The clock of a sound device that a browser opens runs for a buffer, and then stands still for a second or two. */
+const OPENED_S = 0.1;
 /** A packet waits at least this long: those after it may come as much later. */
 const LEAD_S = 0.02;
 /** What waits this much longer than it must is worth catching up. */
@@ -59,6 +61,11 @@ const JUMP_S = 3;
 const SEAM_S = 0.003;
 /** A hole as long as the longest packet, 60 ms, is filled with what came before it. */
 const REPEAT_S = 0.065;
+
+/** Whether the sound device plays: what waits before would be as late as the opening takes. `now`: s on its clock. */
+export function isOpened(now: number): boolean {
+  return now >= OPENED_S;
+}
 
 export function createSoundPlayout(clockRate: number): SoundPlayout {
   return { clockRate, segments: [], line: null, latest: null, hurriesUntilS: -Infinity };

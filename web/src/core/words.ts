@@ -36,6 +36,7 @@ export const GATE_WORDS: Readonly<Record<GateState, string>> = {
   in_flight: "Waiting for the robot's answer",
   rate: "Keeping to the robot's event rate",
   picture: "Waiting for a fresh picture",
+  sound: "Waiting for fresh sound",
 };
 
 export const GATE_BLOCK_WORDS: Readonly<Record<GateBlock, string>> = {

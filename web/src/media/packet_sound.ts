@@ -4,6 +4,7 @@ import {
   createSoundPlayout,
   goOn,
   hurry,
+  isOpened,
   placeSegment,
   playingAt,
   type Segment,
@@ -87,7 +88,7 @@ export class PacketSound implements SoundSource {
   private take(time: number, packet: Uint8Array): void {
     if (this.newest !== null && rtpGap(time, this.newest) <= 0) return;
     this.newest = time;
-    if (this.context.state !== "running") return;
+    if (this.context.state !== "running" || !isOpened(this.context.currentTime)) return;
     if (this.codec === "PCMU") this.play(decodeMuLaw(packet), MU_LAW_RATE, time);
     else this.decode(packet, time);
   }

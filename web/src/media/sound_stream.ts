@@ -1,6 +1,6 @@
 import { judge } from "../core/media_gate";
 import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../core/medium_counts";
-import { START_MS, createSoundGate, observeSound } from "../core/sound_gate";
+import { START_MS, createSoundGate, isConcealed, observeSound } from "../core/sound_gate";
 import { findMark } from "../core/stamp_book";
 import type { Section } from "../rtc/section";
 import type { StreamInfo } from "../wire";
@@ -16,6 +16,7 @@ export class SoundStream {
   readonly gate = createSoundGate();
   readonly log = new RenderLog();
   isOpen = false;
+  playing: number | null = null; // stamp of the sound that plays, heard or too old to be; null: none does
   private readonly source: SoundSource;
   private readonly output: SoundOutput;
   private droppedAtStart: number; // before decoding, to begin with the newest
@@ -43,6 +44,8 @@ export class SoundStream {
     if (this.gate.counts.rendered > before) this.note(mark ?? UNMARKED, context);
     this.isOpen = passes && audible;
     this.output.open(this.isOpen);
+    const isReal = playing !== undefined && !this.isStarting() && !isConcealed(this.gate, performance.now());
+    this.playing = isReal && audible ? (mark?.stamp ?? null) : null;
   }
 
   private judge(

@@ -59,7 +59,8 @@ function createPacing(app: ConsoleApp): Part {
   const feedback = button("segment", "Feedback", choose("feedback"));
   const media = button("segment", "Media", choose("media"));
   feedback.title = "The next command waits for the robot's answer";
-  media.title = "The next command also waits for a fresh picture";
+  media.title =
+    "The next command also waits for a fresh picture and, while you hear the robot, for fresh sound";
   const control = h("span", "segments", { role: "group", "aria-label": "Pacing" }, feedback, media);
   return {
     element: h("div", "setting", {}, h("span", "setting-label", {}, "Pace commands by"), control),

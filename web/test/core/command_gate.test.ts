@@ -1,8 +1,10 @@
 import { describe, expect, it } from "vitest";
 import {
   createCommandGate,
+  farthestBehind,
   gateState,
   nextCommand,
+  noteHeard,
   noteSent,
   noteShown,
   takeFeedback,
@@ -10,6 +12,7 @@ import {
   type CommandGate,
   type Pacing,
 } from "../../src/core/command_gate";
+import { MAX_EVENT } from "../../src/core/serial";
 import { readVectors } from "../vectors";
 
 interface Step {
@@ -36,6 +39,14 @@ function act(gate: CommandGate, { at, do: { feedback, sent, refused, shown } }: 
   if (shown !== undefined) noteShown(gate, shown);
 }
 
+/** The newest feedback and the picture on screen are of event 20. */
+function openGate(pacing: Pacing): CommandGate {
+  const gate = createCommandGate(pacing, 4, 0);
+  takeFeedback(gate, 20, 1);
+  noteShown(gate, 20);
+  return gate;
+}
+
 describe("the command gate", () => {
   it("has a table of cases", () => expect(cases.length).toBeGreaterThan(15));
 
@@ -53,5 +64,52 @@ describe("the command gate", () => {
     noteSent(gate, 0);
     expect(gate.inFlight).toBeNull();
     expect(nextCommand(gate)).toBeNull();
+  });
+
+  describe("with sound that is heard", () => {
+    const heard = (stamp: number, tolerance = 6) => ({ stamp, tolerance });
+
+    it("paced by media waits until the sound stays within tolerance when the next feedback comes", () => {
+      const gate = openGate("media");
+      noteHeard(gate, heard(14));
+      expect(gateState(gate, 0)).toBe("sound");
+      noteHeard(gate, heard(15));
+      expect(gateState(gate, 0)).toBe("open");
+    });
+
+    it("waits for sound only while some is heard", () => {
+      const gate = openGate("media");
+      noteHeard(gate, heard(1));
+      expect(gateState(gate, 0)).toBe("sound");
+      noteHeard(gate, null);
+      expect(gateState(gate, 0)).toBe("open");
+    });
+
+    it("paced by media with tolerance 0 waits for the sound of the newest event", () => {
+      const gate = openGate("media");
+      noteHeard(gate, heard(19, 0));
+      expect(gateState(gate, 0)).toBe("sound");
+      noteHeard(gate, heard(20, 0));
+      expect(gateState(gate, 0)).toBe("open");
+    });
+
+    it("says the picture before the sound", () => {
+      const gate = openGate("media");
+      takeFeedback(gate, 30, 1);
+      noteHeard(gate, heard(1));
+      expect(gateState(gate, 0)).toBe("picture");
+    });
+
+    it("paced by feedback does not wait for it", () => {
+      const gate = openGate("feedback");
+      noteHeard(gate, heard(1));
+      expect(gateState(gate, 0)).toBe("open");
+    });
+
+    it("goes by the microphone that is farthest behind, across the wrap too", () => {
+      expect(farthestBehind(20, [])).toBeNull();
+      expect(farthestBehind(20, [18, 15, 19])).toBe(15);
+      expect(farthestBehind(2, [1, MAX_EVENT - 1, MAX_EVENT])).toBe(MAX_EVENT - 1);
+    });
   });
 });

@@ -3,6 +3,7 @@ import {
   createSoundPlayout,
   goOn,
   hurry,
+  isOpened,
   placeSegment,
   playingAt,
   type Place,
@@ -178,4 +179,10 @@ describe("going on with newer sound", () => {
     expect(goOn(playout, passes(9), 0.025)).toEqual([]);
     expect(playout.segments).toEqual(before);
   });
+});
+
+it("does not take a device for opened whose clock ran for one buffer", () => {
+  expect(isOpened(0)).toBe(false);
+  expect(isOpened(0.026)).toBe(false);
+  expect(isOpened(2)).toBe(true);
 });
