@@ -9,6 +9,9 @@ GSTREAMER_PACKAGES := python3-gi gir1.2-gst-plugins-bad-1.0 gstreamer1.0-plugins
 TEST_PACKAGES := $(RUN_PACKAGES) gcc libc6-dev chromium firefox-esr pulseaudio pulseaudio-utils caddy coturn prometheus docker-compose systemd janus redis-server $(GSTREAMER_PACKAGES)
 WEB_SOURCES := $(shell find web -path web/node_modules -prune -o -type f -print 2>/dev/null)
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
+# A lock file names every package, so pip need not resolve: it would look past the lock where a package is asked for
+# with an extra, and fail on the day of that package's next release. `pip check` says whether one is missing.
+INSTALL_LOCK := $(PIP) install --no-deps --require-hashes -r
 ARGS ?=
 # A file's tests share what they start. Most wait more than they compute, so that there are more workers than cores.
 # Browsers take what there is: their tests run after the others.
@@ -97,13 +100,15 @@ $(BIN)/python:
 
 $(VENV)/.runtime: requirements.lock pyproject.toml | $(BIN)/python
 	@echo "Installing the Python packages"
-	@$(PIP) install --require-hashes -r requirements.lock
+	@$(INSTALL_LOCK) requirements.lock
 	@$(PIP) install --no-build-isolation --no-deps -e .
+	@$(PIP) check
 	@touch $@
 
 $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
 	@echo "Installing the Python packages for development"
-	@$(PIP) install --require-hashes -r requirements-dev.lock
+	@$(INSTALL_LOCK) requirements-dev.lock
+	@$(PIP) check
 	@touch $@
 
 # Apart from the rest: the wheels change how every Python of their environment finds its libraries.
@@ -111,7 +116,7 @@ $(ROS2)/.installed: requirements-ros2.lock | $(BIN)/python
 	@echo "Installing ROS 2 for the tests"
 	@$(PYTHON) -m venv $(ROS2)
 	@if [ "$$(uname -sm)" = "Linux x86_64" ]; then \
-	  $(ROS2)/bin/python -m pip --disable-pip-version-check -q install --require-hashes -r requirements-ros2.lock; \
+	  $(ROS2)/bin/python -m pip --disable-pip-version-check -q install --no-deps --require-hashes -r requirements-ros2.lock; \
 	else echo "There are no wheels of ROS 2 for this machine: its tests are left out"; fi
 	@touch $@
 
