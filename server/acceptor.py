@@ -16,6 +16,7 @@ __all__ = ["PROXIES", "Acceptor", "PlacedProtocol"]
 PROXIES = frozenset({"127.0.0.1", "::1", "::ffff:127.0.0.1"})
 HANDSHAKE_SECONDS = 5.0  # for TLS
 PAUSE = 0.1  # s, when there is no descriptor left
+LOOK_AGAIN = 0.02  # s, when all places are taken by who has just come
 
 
 class PlacedProtocol(asyncio.Protocol):
@@ -46,7 +47,7 @@ class Acceptor:
         """Until cancelled; connections that have begun by then go on.
 
         Each has its turn before the next one is accepted: the others wait in the kernel, where they cost nothing and
-        where the newest cannot push out one that has not begun. However many strangers' requests wait, it has its
+        where the newest cannot push out one that has not begun, or has had no time to speak. However many strangers' requests wait, it has its
         turn: somebody who comes to say STOP is a stranger until the connection has begun.
         """
         loop = asyncio.get_running_loop()
@@ -63,10 +64,20 @@ class Acceptor:
                     continue
                 try:
                     await self._turns.begin()
+                    await self._until_there_is_room()
                 except BaseException:
                     connection.close()
                     raise
                 _Beginning(self, connection, str(address[0]), tasks)
+
+    async def _until_there_is_room(self) -> None:
+        """Or until whoever has to go has had the time to speak."""
+        loop = asyncio.get_running_loop()
+        while True:
+            wait = self._places.wait(loop.time())
+            if wait <= 0:
+                return
+            await asyncio.sleep(min(wait, LOOK_AGAIN))
 
     def protocol_at(self, place: Place) -> PlacedProtocol:
         protocol = self._make_protocol()
@@ -93,7 +104,8 @@ class _Beginning:
     def __init__(self, acceptor: Acceptor, connection: socket.socket, address: str, tasks: asyncio.TaskGroup) -> None:
         self._acceptor = acceptor
         self._connection = connection
-        self._place = acceptor.places.enter(counted_address(address), self._close, proxy=address in PROXIES)
+        now, proxy = asyncio.get_running_loop().time(), address in PROXIES
+        self._place = acceptor.places.enter(counted_address(address), self._close, now, proxy=proxy)
         self._task: asyncio.Task[None] | None = None
         if self._place.group is None:
             connection.close()

@@ -1,23 +1,28 @@
 """Which connections there may be. When there is no place it is never the newcomer who goes: a stranger does. No I/O.
 
 A connection is a stranger's until a request on it has brought a good token. Every connection begins as one, so where
-strangers were refused at the door, somebody who comes to say STOP would be refused with them.
+strangers were refused at the door, somebody who comes to say STOP would be refused with them. For the same reason who
+has just come keeps his place for a moment, in which he can say what he comes for: newcomers wait outside meanwhile.
 """
 
 from collections.abc import Callable
 
 from server.limit_settings import LimitSettings
 
-__all__ = ["ConnectionPlaces", "Place"]
+__all__ = ["GRACE", "ConnectionPlaces", "Place"]
+
+GRACE = 0.25  # s; a busy proxy has opened a connection well before it writes the request to it
 
 
 class Place:
     """One connection's. It may be given back, or be taken away: then `close` is called."""
 
-    __slots__ = ("address", "close", "group", "link", "refused")
+    __slots__ = ("address", "asked", "close", "group", "link", "refused", "since")
 
-    def __init__(self, address: str, close: Callable[[], None]) -> None:
+    def __init__(self, address: str, close: Callable[[], None], since: float) -> None:
         self.address = address  # as it is counted
+        self.since = since
+        self.asked = False  # whether a request came on it
         self.link = ""  # of the good token that the newest request on it brought; "": a stranger's
         self.refused = 0  # requests in a row that were turned away
         self.close = close
@@ -48,9 +53,17 @@ class ConnectionPlaces:
         """Connections whose newest request brought a good token."""
         return sum(map(len, self._known.values()))
 
-    def enter(self, address: str, close: Callable[[], None], *, proxy: bool = False) -> Place:
+    def wait(self, now: float) -> float:
+        """For how long (s) a newcomer waits outside: its place is that of somebody who has had no time to speak yet.
+
+        0 when there is room, and when who would have to go has asked something or kept silent for `GRACE`.
+        """
+        oldest = self._oldest() if self._count >= self._total else None
+        return 0.0 if oldest is None or oldest.asked else max(0.0, oldest.since + GRACE - now)
+
+    def enter(self, address: str, close: Callable[[], None], now: float, *, proxy: bool = False) -> Place:
         """A new connection of a stranger. `proxy`: many clients come from this address; it tells them apart later."""
-        place = Place(address, close)
+        place = Place(address, close, now)
         self._count += 1
         self._join(place, bounded=not proxy)
         if self._count > self._total:
@@ -64,6 +77,7 @@ class ConnectionPlaces:
         """
         if place.group is None:
             return False
+        place.asked = True
         if (place.address, place.link) != (address, link):
             self._drop(place)
             place.address, place.link = address, link
@@ -94,14 +108,16 @@ class ConnectionPlaces:
                 groups.pop(key, None)
 
     def _make_room(self, newcomer: Place) -> None:
-        """The oldest of who has most: of strangers first, then of the links."""
+        self._take_away(self._oldest(newcomer) or newcomer)
+
+    def _oldest(self, newcomer: Place | None = None) -> Place | None:
+        """The oldest of who has most: of strangers first, then of the links. None: there is the newcomer alone."""
         for groups in (self._strangers, self._known):
             most = max(groups.values(), key=len, default={})
             oldest = next(iter(most), newcomer)
             if oldest is not newcomer:
-                self._take_away(oldest)
-                return
-        self._take_away(newcomer)
+                return oldest
+        return None
 
     def _take_away(self, place: Place) -> None:
         self.leave(place)

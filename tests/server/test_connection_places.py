@@ -1,6 +1,8 @@
 from collections import Counter
 
-from server.connection_places import ConnectionPlaces, Place
+import pytest
+
+from server.connection_places import GRACE, ConnectionPlaces, Place
 
 
 class Rig:
@@ -9,9 +11,9 @@ class Rig:
         self.closed: list[str] = []
         self.places = ConnectionPlaces(total, per_client, self.refused.append)
 
-    def enter(self, name: str, *, proxy: bool = False) -> Place:
+    def enter(self, name: str, now: float = 0.0, *, proxy: bool = False) -> Place:
         """`name`: "a1" comes from the address "a"."""
-        return self.places.enter(name[0], lambda: self.closed.append(name), proxy=proxy)
+        return self.places.enter(name[0], lambda: self.closed.append(name), now, proxy=proxy)
 
 
 def test_there_are_never_more_than_fit_and_every_newcomer_gets_in() -> None:
@@ -77,3 +79,31 @@ def test_the_next_request_on_a_connection_has_to_prove_itself_anew() -> None:
     rig.places.leave(place)
     rig.places.leave(place)
     assert len(rig.places) == 0
+
+
+def test_a_newcomer_waits_while_who_would_have_to_go_may_still_say_what_he_comes_for() -> None:
+    rig = Rig(total=2)
+    assert rig.places.wait(5.0) == 0
+    rig.enter("a1", 5.0)
+    assert rig.places.wait(5.0) == 0
+    rig.enter("a2", 5.1)
+    assert rig.places.wait(5.1) == pytest.approx(GRACE - 0.1)
+    assert rig.places.wait(5.0 + GRACE) == 0
+
+
+def test_nobody_waits_for_a_stranger_who_has_asked_something() -> None:
+    rig = Rig(total=2)
+    first = rig.enter("a1", 5.0)
+    rig.enter("a2", 5.0)
+    rig.places.serve(first, "a", "")
+    assert rig.places.wait(5.0) == 0
+    rig.enter("a3", 5.0)
+    assert rig.closed == ["a1"]
+    assert rig.places.wait(5.0) == GRACE
+
+
+def test_nobody_waits_where_all_have_brought_a_good_token() -> None:
+    rig = Rig(total=2)
+    for name in ("a1", "a2"):
+        rig.places.serve(rig.enter(name, 5.0), "a", f"link {name}")
+    assert rig.places.wait(5.0) == 0
