@@ -47,8 +47,8 @@ class Acceptor:
         """Until cancelled; connections that have begun by then go on.
 
         Each has its turn before the next one is accepted: the others wait in the kernel, where they cost nothing and
-        where the newest cannot push out one that has not begun, or has had no time to speak. However many strangers' requests wait, it has its
-        turn: somebody who comes to say STOP is a stranger until the connection has begun.
+        where the newest cannot push out one that has not begun, or has had no time to speak. However many strangers'
+        requests wait, it has its turn: somebody who comes to say STOP is a stranger until the connection has begun.
         """
         loop = asyncio.get_running_loop()
         async with asyncio.TaskGroup() as tasks:
