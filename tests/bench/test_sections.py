@@ -22,7 +22,8 @@ async def test_every_trip_through_a_console_is_one_event_that_the_robot_executed
             trips = await console_trips(console, 20)
         robot = robot_times(stack.bridge.event_log)
     events = [trip.event for trip in trips]
-    assert events == list(range(events[0], events[0] + 20))
+    assert len(events) == 20
+    assert events == sorted(set(events))  # a busy machine may need a neutral command between two, which is no trip
     assert all(0 < robot[trip.event] < trip.seconds for trip in trips)
 
 
