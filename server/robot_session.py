@@ -116,7 +116,7 @@ async def _session(
         signing,
         lambda what, detail: console.audit.record("recording", what=what, detail=detail),
     )
-    engines = relay_engines(settings, media, house.state.signing_key(settings) + robot)
+    engines = relay_engines(settings, house.endpoint, media, house.state.signing_key(settings) + robot)
     relays = RelayDesk(settings, engines, lambda: console.peers, house.state.invitations.has_ended)
     console = Console(
         settings,

@@ -22,7 +22,7 @@ from server.relay.publication import Engine, Publication, Watched
 from server.relay.relay_settings import RelaySettings
 from server.relay.relay_url import EngineName
 from server.relay.station import Station
-from server.relay.tickets import JanusTicket, LiveKitTicket
+from server.relay.tickets import JanusTicket
 
 __all__ = ["RelayDesk", "RelayedMedia", "RelayedPeer"]
 
@@ -106,7 +106,7 @@ class RelayDesk:
 
     # What observers ask
 
-    async def ticket(self, peer: RelayedPeer | None, lost: str) -> JanusTicket | LiveKitTicket | None:
+    async def ticket(self, peer: RelayedPeer | None, lost: str) -> JanusTicket | None:
         """Where one more observer watches; None: directly. It holds a key, see `key`.
 
         Args:
@@ -129,7 +129,7 @@ class RelayDesk:
         station = next((each for each in usable if each.name == choice), None)
         return None if station is None else self._engine(station).ticket(station)
 
-    def key(self, peer: RelayedPeer) -> JanusTicket | LiveKitTicket | None:
+    def key(self, peer: RelayedPeer) -> JanusTicket | None:
         """What lets `peer` into the relay that it was admitted for; None: that does not carry the session now.
 
         Its link is remembered: when that ends, the key is good no more.

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 
 from server.relay.errors import RelayError
-from server.relay.janus_publishing import PublishedMedia, publish
+from server.relay.janus_publishing import Connect, PublishedMedia, publish
 from server.relay.janus_room import JanusRoom, RoomKeys
 from server.relay.janus_session import JanusSession, open_janus
 from server.relay.publication import Publication
@@ -22,9 +22,10 @@ __all__ = ["JanusEngine"]
 class JanusEngine:
     """Its keys are made from the console's own, so that a console that was restarted can go on with its room."""
 
-    def __init__(self, settings: RelaySettings, media: PublishedMedia, key: str) -> None:
+    def __init__(self, settings: RelaySettings, endpoint: Connect, media: PublishedMedia, key: str) -> None:
         self._codec = settings.relay_codec
         self._admin_key = settings.relay_admin_key.get_secret_value()
+        self._endpoint = endpoint
         self._media = media
         self._key = key.encode()
         self._pin = ""  # of the present publication; another one with each
@@ -34,7 +35,7 @@ class JanusEngine:
         self._pin = secrets.token_urlsafe(12)
         async with (
             open_janus(station.url.address) as session,
-            publish(session, self._room_of(station), self._media, feed, self._codec) as publication,
+            publish(session, self._room_of(station), self._endpoint, self._media, feed, self._codec) as publication,
         ):
             watching = asyncio.get_running_loop().create_task(_end_with(session, publication))
             try:

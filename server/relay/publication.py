@@ -1,4 +1,4 @@
-"""The session in one relay, and what an engine has to be able to do: Janus and LiveKit are two of them."""
+"""The session in one relay, and what an engine has to be able to do: Janus is the one that there is."""
 
 import asyncio
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import structlog
 
 from robot_bridge.protocol.console import StreamInfo
 from server.relay.station import Station
-from server.relay.tickets import JanusTicket, LiveKitTicket
+from server.relay.tickets import JanusTicket
 
 __all__ = ["Engine", "Publication", "Watched"]
 
@@ -66,5 +66,5 @@ class Engine(Protocol):
     ) -> AbstractAsyncContextManager[Watched] | None:
         """While entered, the first relay feeds another one. None: relays of this kind are not fed that way."""
 
-    def ticket(self, station: Station) -> JanusTicket | LiveKitTicket:
+    def ticket(self, station: Station) -> JanusTicket:
         """For one observer, of a station that carries the session."""

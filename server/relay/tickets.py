@@ -4,7 +4,7 @@ import msgspec
 
 from robot_bridge.protocol.console import StreamInfo
 
-__all__ = ["JanusTicket", "LiveKitTicket", "RelayAnswer", "RelayTicket", "without_key"]
+__all__ = ["JanusTicket", "RelayAnswer", "RelayTicket", "without_key"]
 
 
 class RelayTicket(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine"):
@@ -23,21 +23,12 @@ class JanusTicket(RelayTicket, frozen=True, kw_only=True, tag="janus"):
     pin: str  # lets in; "" for who takes no part in the session yet
 
 
-class LiveKitTicket(RelayTicket, frozen=True, kw_only=True, tag="livekit"):
-    """Every track has the name of its stream."""
-
-    token: str  # lets in for a minute, and to nothing but watching; "" for who takes no part in the session yet
-    publisher: str  # whose tracks and messages count; nobody else's
-
-
 class RelayAnswer(msgspec.Struct, frozen=True):
     """Answer of GET /api/relay."""
 
-    relay: JanusTicket | LiveKitTicket | None  # None: connect to the console for media too
+    relay: JanusTicket | None  # None: connect to the console for media too
 
 
-def without_key(ticket: JanusTicket | LiveKitTicket) -> JanusTicket | LiveKitTicket:
+def without_key(ticket: JanusTicket) -> JanusTicket:
     """Where the relay is, and nothing that lets anybody in."""
-    if isinstance(ticket, JanusTicket):
-        return msgspec.structs.replace(ticket, pin="")
-    return msgspec.structs.replace(ticket, token="")
+    return msgspec.structs.replace(ticket, pin="")

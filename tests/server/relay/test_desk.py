@@ -10,7 +10,7 @@ from server.relay.errors import RelayError
 from server.relay.publication import Publication, Watched
 from server.relay.relay_settings import RelaySettings
 from server.relay.station import Station
-from server.relay.tickets import JanusTicket, LiveKitTicket
+from server.relay.tickets import JanusTicket
 
 
 class Relays:
@@ -39,7 +39,7 @@ class Relays:
     ) -> AbstractAsyncContextManager[Watched] | None:
         return None
 
-    def ticket(self, station: Station) -> JanusTicket | LiveKitTicket:
+    def ticket(self, station: Station) -> JanusTicket:
         raise NotImplementedError
 
     async def until_carried_by(self, name: str) -> None:
