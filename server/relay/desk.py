@@ -178,7 +178,7 @@ class RelayDesk:
             except (RelayError, MediaError, OSError, ConnectionError) as error:
                 self._lost(origin, str(error))
             except Exception as error:
-                # What aiortc raises here has no common base; a relay never ends the console.
+                # A fault of the console's own; a relay never ends the console.
                 log.exception("publishing failed", relay=origin.url.address)
                 self._lost(origin, type(error).__name__)
             if self._clock() - began > HEALTHY_SECONDS:
