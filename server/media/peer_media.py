@@ -100,12 +100,6 @@ class PeerMedia:
         """Call `tell` when something else was decided for this peer's pictures."""
         self.quality.on_quality = tell
 
-    def request_keyframe(self, mid: str) -> None:
-        """Somebody behind this peer cannot decode."""
-        for delivery in self._deliveries:
-            if delivery.info.mid == mid:
-                delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
-
     def on_failed(self, tell: Callable[[str, Exception], None]) -> None:
         """Call `tell` with the stage and what was raised once this peer cannot be served; it raises nothing."""
         self._tell_failed = tell

@@ -25,14 +25,12 @@ from server.media.audio_stream import AudioStream
 from server.media.capture_clock import CaptureClock
 from server.media.codec_choice_private import keep_codec, negotiated_h264
 from server.media.fanout import FanOut
-from server.media.h264 import profile_of_fmtp
-from server.media.handover import FrameSink, HandedOverStream, HandoverSender
 from server.media.header_extensions import choose_carrier, wanted_uris
 from server.media.metrics import MediaMetrics
 from server.media.outbox import Outbox
 from server.media.peer_media import Delivery, PeerMedia
 from server.media.peer_stream import PeerStream
-from server.media.publishing_private import H264_PROFILE, offer_section
+from server.media.publishing_private import offer_section
 from server.media.quality.desk import QualityDesk
 from server.media.quality.metrics import QualityMetrics
 from server.media.quality.path import RateLimits
@@ -258,26 +256,6 @@ class MediaPlane:
             deliveries.append(self._deliver(peer, transceiver, stream, codec, "trailer", priority=False))
         return self._joined(peer, deliveries)
 
-    def hand_over(self, sink_of: Callable[[HandedOverStream], FrameSink], camera_codec: str = "") -> PeerMedia:
-        """Give every stream, each in one codec, to what sends it by its own means; `camera_codec` as for `publish`."""
-        deliveries: list[Delivery] = []
-        cameras = sum(isinstance(stream, VideoStream) for stream in self._streams.values())
-        peer = PeerMedia(deliveries, self._quality_of(cameras, priority=False), self._detached)
-        peer.quality.relays = True
-        for index, stream in enumerate(self._streams.values()):
-            video = isinstance(stream, VideoStream)
-            codec = stream.codec_in_use(camera_codec if video else "")
-            size, rate = (stream.size, stream.frame_rate) if isinstance(stream, VideoStream) else ((0, 0), 0.0)
-            bitrate = self._settings.video_bitrate_bps if video else 0
-            sink = sink_of(HandedOverStream(stream.name, stream.kind, codec, size, rate, bitrate))
-            target = self._target(peer, stream, codec, "trailer", priority=False)
-            target.h264 = profile_of_fmtp(H264_PROFILE) if codec == "H264" else None
-            sender = HandoverSender(sink)
-            deliveries.append(Delivery(_info(stream, str(index), codec, "trailer"), stream, target, sender))
-            target.sender = sender
-            stream.join(codec, target, peer.quality.encoded_as if video else "operator")
-        return self._joined(peer, deliveries)
-
     def _joined(self, peer: PeerMedia, deliveries: list[Delivery]) -> PeerMedia:
         self._peers[peer] = None
         peer.quality.cameras = [
@@ -324,9 +302,6 @@ class MediaPlane:
             sum(transceiver.kind == "video" for transceiver in pc.getTransceivers()),
             sum(isinstance(stream, VideoStream) for stream in self._streams.values()),
         )
-        return self._quality_of(cameras, priority)
-
-    def _quality_of(self, cameras: int, priority: bool) -> PeerQuality:
         settings = self._settings
         maximum = float(max(1, cameras) * settings.video_bitrate_bps)
         start = min(maximum, settings.quality_start_bps) if priority else maximum
@@ -349,7 +324,15 @@ class MediaPlane:
     ) -> Delivery:
         video = stream.kind == "video"
         quality = peer.quality
-        target = self._target(peer, stream, codec, carrier, priority)
+        target = PeerStream(
+            Outbox(self._settings.video_queue_frames if video else self._settings.audio_queue_frames, video=video),
+            priority=priority,
+            stream=stream.name,
+            carrier=carrier,
+            metrics=self._metrics,
+            on_dropped=lambda: stream.request_keyframe(codec, target, "drop"),
+            on_failed=lambda error: peer.failed("media", error),
+        )
         target.h264 = negotiated_h264(transceiver)
 
         def ready() -> None:
@@ -372,19 +355,6 @@ class MediaPlane:
         )
         install_sender(transceiver, sender)
         return Delivery(_info(stream, transceiver.mid or "", codec, carrier), stream, target, sender)
-
-    def _target(self, peer: PeerMedia, stream: AnyStream, codec: str, carrier: Carrier, priority: bool) -> PeerStream:
-        video = stream.kind == "video"
-        target = PeerStream(
-            Outbox(self._settings.video_queue_frames if video else self._settings.audio_queue_frames, video=video),
-            priority=priority,
-            stream=stream.name,
-            carrier=carrier,
-            metrics=self._metrics,
-            on_dropped=lambda: stream.request_keyframe(codec, target, "drop"),
-            on_failed=lambda error: peer.failed("media", error),
-        )
-        return target
 
     def _end_streams(self) -> None:
         for peer in list(self._peers):

@@ -1,12 +1,11 @@
 """A crowd's pictures and sound, end to end: real peers on loopback. Three observers are a crowd here."""
 
-import asyncio
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from typing import Any, cast
 
 import numpy as np
 
-from robot_bridge.protocol.carriers import EVENT_REFERENCE_URI
+from robot_bridge.protocol.carriers import EVENT_REFERENCE_URI, split_trailer
 from robot_bridge.protocol.console import Quality
 from robot_bridge.protocol.messages import Media
 from server.media.frame import EncodedFrame
@@ -15,7 +14,16 @@ from server.media.quality.crowd import AFTER
 from tests.server.media.camera_h264 import camera_pictures
 from tests.server.media.feeding import read_stamp, value
 from tests.server.media.test_recorded_output import Taken
-from tests.server.media.viewer import TIMEOUT, Viewer, description, noise, picture, running_plane, sound, viewing
+from tests.server.media.viewer import (
+    Viewer,
+    description,
+    noise,
+    picture,
+    relaying,
+    running_plane,
+    sound,
+    viewing,
+)
 
 PICTURES = 12
 
@@ -48,23 +56,14 @@ async def came(viewer: Viewer, number: int) -> None:
     await viewer.until(lambda: stamps(viewer)[-1:] == [number])
 
 
-class Relay:
-    """Keeps what it is given."""
+async def came_to_relay(relay: Viewer, number: int) -> None:
+    await relay.until(lambda: number in relay_stamps(relay))
 
-    def __init__(self) -> None:
-        self.stamps: list[int] = []
-        self._news = asyncio.Event()
 
-    def __call__(self, frame: EncodedFrame) -> bool:
-        self.stamps.append(frame.stamp)
-        self._news.set()
-        return True
-
-    async def until(self, stamp: int) -> None:
-        async with asyncio.timeout(TIMEOUT):
-            while stamp not in self.stamps:
-                self._news.clear()
-                await self._news.wait()
+def relay_stamps(relay: Viewer) -> list[int]:
+    """Of the whole pictures that came."""
+    trailers = [split_trailer(received.packet.payload)[1] for received in relay.of("video") if received.packet.marker]
+    return [trailer.event for trailer in trailers if trailer is not None and trailer.event is not None]
 
 
 async def begin(plane: MediaPlane, everybody: list[Viewer], second: int) -> None:
@@ -76,13 +75,13 @@ async def begin(plane: MediaPlane, everybody: list[Viewer], second: int) -> None
 
 
 async def show(
-    plane: MediaPlane, whole: list[Viewer], crowd: list[Viewer], second: int, relay: Relay | None = None
+    plane: MediaPlane, whole: list[Viewer], crowd: list[Viewer], second: int, relay: Viewer | None = None
 ) -> None:
     """Feed pictures 30 times a second: `whole` and `relay` get all of them, and `crowd` the first of every two."""
     for number in range(30 * second, 30 * second + PICTURES):
         feed(plane, number)
         if relay is not None:
-            await relay.until(number)
+            await came_to_relay(relay, number)
         for viewer in whole if number % 2 else [*whole, *crowd]:
             await came(viewer, number)
     for viewer in crowd:
@@ -101,8 +100,7 @@ async def test_a_crowd_gets_every_second_picture_and_the_operator_and_a_relay_al
         plane = await stack.enter_async_context(running_plane(description(microphones=0), crowd_observers=2))
         (operator,) = await watching(stack, plane, 1, priority=True)
         crowd = await watching(stack, plane, 3)
-        relay = Relay()
-        relayed = plane.hand_over(lambda _: relay, "H264")
+        relay = await stack.enter_async_context(relaying(plane))
         assert [viewer.media.tier for viewer in (operator, *crowd)] == ["operator", "high", "high", "high"]
         await begin(plane, [operator, *crowd], 1)
         before = value(plane, "tier_frames_encoded_total", stream="camera0", tier="crowd")
@@ -113,7 +111,6 @@ async def test_a_crowd_gets_every_second_picture_and_the_operator_and_a_relay_al
         await begin(plane, [operator, *crowd], 20)
         await show(plane, [operator], crowd, 30, relay)
         assert len(cast(Any, plane)._streams["camera0"]._encoders) == 2
-        relayed.detach()
 
 
 async def test_when_a_crowd_has_dispersed_who_stays_gets_everything_and_has_missed_nothing() -> None:
@@ -191,7 +188,7 @@ async def test_operators_thumbnails_and_relays_are_no_crowd() -> None:
         first, second = await watching(stack, plane, 2, priority=True)
         others = [second, *await watching(stack, plane, 1, thumbnail=True), *await watching(stack, plane, 2)]
         first.media.drives(True)
-        relay = plane.hand_over(lambda _: lambda frame: True)
+        relay = (await stack.enter_async_context(relaying(plane))).media
         desk(plane).tick()
         assert desk(plane)._crowd.divisor == 1
         assert [viewer.media.quality.encoded_as for viewer in others] == ["high", "low", "high", "high"]

@@ -15,6 +15,7 @@ from robot_bridge.protocol.description import Axis, Camera, Microphone, RobotDes
 from robot_bridge.protocol.messages import Media
 from server.media.aiortc_private import MediaSender, create_peer_connection
 from server.media.plane import MediaPlane, MediaSettings, PeerMedia
+from server.media.publishing_private import keep_answered_extensions
 
 WIDTH, HEIGHT = 160, 120
 TIMEOUT = 10.0
@@ -185,6 +186,29 @@ async def viewing(
         _record(viewer, {identifier: uri for uri, identifier in _answered(answer).items()})
         _notify_of_server_input(viewer)
         await pc.setRemoteDescription(RTCSessionDescription(answer, "answer"))
+        await _connected(pc)
+        await _connected(server)
+        yield viewer
+    finally:
+        await server.close()
+        await pc.close()
+
+
+@asynccontextmanager
+async def relaying(plane: MediaPlane, camera_codec: str = "H264") -> AsyncIterator[Viewer]:
+    """A relay that the plane publishes to, and whose media are flowing when this returns: the console offers."""
+    pc, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
+    try:
+        media = plane.publish(server, camera_codec)
+        await server.setLocalDescription(await server.createOffer())
+        await pc.setRemoteDescription(server.localDescription)
+        await pc.setLocalDescription(await pc.createAnswer())
+        answer = pc.localDescription.sdp
+        viewer = Viewer(pc, server, media, answer)
+        await server.setRemoteDescription(RTCSessionDescription(answer, "answer"))
+        keep_answered_extensions(server, answer)
+        _record(viewer, {identifier: uri for uri, identifier in _answered(answer).items()})
+        _notify_of_server_input(viewer)
         await _connected(pc)
         await _connected(server)
         yield viewer
