@@ -15,7 +15,8 @@ __all__ = ["RelaySettings"]
 class RelaySettings(BaseSettings):
     """Part of `Settings`."""
 
-    relay: NameList = ()  # "janus:ws://host:8188/ROOM", of several, the first feeds the others
+    # "janus:ws://host:8188/ROOM", of several, the first feeds the others
+    relay: NameList = ()
     relay_public: NameList = ()  # the same relays as browsers reach them, "wss://relay.example.org"; empty: as above
     relay_admin_key: SecretStr = SecretStr("")  # that Janus' video room asks of who creates a room
     relay_codec: Literal["", "H264", "VP8"] = ""  # of cameras; "": what is being encoded already
@@ -57,5 +58,5 @@ class RelaySettings(BaseSettings):
     def relay_origins(self) -> tuple[str, ...]:
         """What a page may connect to besides its own server."""
         addresses = self.relay_public or tuple(each.address for each in self.relay_urls)
-        parts = [urlsplit(each) for each in addresses]
-        return tuple(dict.fromkeys(f"{each.scheme}://{each.netloc}" for each in parts))  # an ordered set
+        parts = [urlsplit(address) for address in addresses]
+        return tuple(dict.fromkeys(f"{part.scheme}://{part.netloc}" for part in parts))

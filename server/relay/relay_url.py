@@ -1,20 +1,17 @@
 """Where a relay is: `janus:ws://host:8188/ROOM`."""
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 from urllib.parse import urlsplit
 
-__all__ = ["EngineName", "RelayUrl", "parse_relay_url"]
-
-EngineName = Literal["janus"]
+__all__ = ["RelayUrl", "parse_relay_url"]
 
 WANTED = "janus:ws(s)://host[:port]/ROOM"
 MOST_ROOM = 2**53  # what a page can count to
 
 
 class RelayUrl(NamedTuple):
-    engine: EngineName
     address: str  # WebSocket URL without room and secrets: safe to log and to hand out
-    room: str  # a number
+    room: int
 
     @property
     def host(self) -> str:
@@ -25,7 +22,7 @@ def parse_relay_url(text: str) -> RelayUrl:
     """Raises ValueError, which says what is wrong and repeats nothing that could be a secret."""
     engine, _, rest = text.partition(":")
     if engine != "janus":
-        raise ValueError(f"a relay is {WANTED}")
+        raise ValueError(f"a relay is a Janus: {WANTED}")
     parts = urlsplit(rest)
     if parts.username or parts.password:
         raise ValueError(f"no name and password in {WANTED}: secrets have settings of their own")
@@ -34,4 +31,4 @@ def parse_relay_url(text: str) -> RelayUrl:
     path, _, room = parts.path.rpartition("/")
     if not room.isdecimal() or parts.query or int(room) >= MOST_ROOM:
         raise ValueError(f"a number for a room, and nothing behind it: {WANTED}")
-    return RelayUrl("janus", f"{parts.scheme}://{parts.netloc}{path}", str(int(room)))
+    return RelayUrl(f"{parts.scheme}://{parts.netloc}{path}", int(room))
