@@ -1,8 +1,8 @@
-"""What can go wrong at a client.
+"""Errors of the client.
 
 ConsoleError
 ├── LinkFormatError         the link given to Console is not one that `lockstep up` prints     (caller)
-├── CommandError            values that no robot could be asked for                             (caller)
+├── CommandError            values that no robot accepts (caller)
 ├── NoSuchStream            a camera or microphone that is not received                        (caller)
 ├── SignallingRefused       the console answered WHEP with an error
 ├── ConnectFailed           the console, or the way to it, did not work within the time allowed
@@ -86,7 +86,7 @@ class ConnectFailed(ConsoleError):
 
 
 class ConsoleLost(ConsoleError):
-    """The connection ended. The robot comes to rest by itself; a new Console connects again."""
+    """The connection ended. The bridge brings the robot to rest; a new Console connects again."""
 
 
 class Refused(ConsoleError):
@@ -117,10 +117,10 @@ class NotArmed(CommandRefused):
 
 
 class StopUnconfirmed(ConsoleError):
-    """A stop that the robot has not confirmed. The console keeps it, if it was reached; use the hardware stop.
+    """A stop that the robot has not confirmed. The console keeps it, if the stop reached it; use the hardware stop.
 
     Attributes:
-        press: its id; the same press may be said again
+        press: its id; the same press may be sent again
     """
 
     def __init__(self, press: str, detail: str) -> None:
