@@ -42,7 +42,7 @@ __all__ = ["main", "robot_app", "run"]
 SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
-# Wrong however often it is tried; the rest may go away by itself, as a robot that is not switched on.
+# Another try cannot mend these errors; the others may end, as a robot that is not switched on yet.
 CANNOT_BE_MEANT = (UnknownRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
 
 _logger = logging.getLogger(__name__)
@@ -196,9 +196,9 @@ def _announce(name: str, bridge: Bridge, scheme: str, as_json: bool) -> None:
     url = f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
     typer.echo(json.dumps({"robot": url}) if as_json else f"{name} at {url}")
     sys.stdout.flush()
-    if as_json:  # whoever reads that line may never read on, and a full pipe would hold up the ticks
+    if as_json:  # the reader of that line may never read on, and a full pipe would hold up the ticks
         with contextlib.suppress(OSError):
-            os.dup2(2, 1)  # what is printed from now on goes where the log goes
+            os.dup2(2, 1)  # later output goes to the log
 
 
 def main() -> None:

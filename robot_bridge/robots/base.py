@@ -59,7 +59,7 @@ class Robot(ABC):
     """One robot. All methods are called from the bridge's event loop and must return at once.
 
     Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`.
-    Values reach `apply` already clamped, slew-limited and, when there is nothing to execute, at rest.
+    Values reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
 
     A method that raises ends the bridge. Before it does, the rest values are applied at the axes' brake rates, again
     after each failure, then `stop` is called, then `close`; each call is made whatever the others raised.
@@ -121,7 +121,7 @@ class Robot(ABC):
         """Keep the robot standing by the strongest means that software has: engage brakes, cut power, hold the place.
 
         Called when a stop was latched and the axes are back at their rest values (stop category 1 of IEC 60204-1 where
-        power is cut), when the bridge ends for whatever reason, and after a failure of any other method. May be called
+        power is cut), when the bridge ends for any reason, and after a failure of any other method. May be called
         again. Until `reset`, whatever reaches `apply` must not move the robot. Raising makes the bridge try again,
         twice, and end.
         """
@@ -130,9 +130,8 @@ class Robot(ABC):
         """The stop was released: undo `stop`. Must not move anything."""
 
     def locked_out(self) -> str:
-        """Why somebody at the robot keeps it from being driven (key switch, teach pendant); "" when nobody does.
-
-        Asked in every tick. While it says so the robot is stopped, and nobody far away can release it.
+        """Why a person at the robot has locked it (key switch, teach pendant); "" while it is not locked. Asked in
+        every tick. While the robot is locked it is stopped, and no remote person can release it.
         """
         return ""
 
@@ -141,4 +140,4 @@ class Robot(ABC):
         return ()
 
     def close(self) -> None:
-        """Release what the robot holds."""
+        """Release the robot's resources."""

@@ -34,7 +34,7 @@ class Drive(ABC):
         self._stream = CommandStream(rate, [0.0] * size, tick_seconds)
         self._owes_zero = False  # the last word that got out was not zero
         self._stopped = False
-        self._heard = False  # whether somebody listens
+        self._heard = False  # whether a node listens
         self._looked = float("-inf")  # s, when that was looked up
 
     @property
