@@ -3,7 +3,7 @@
 Begin at `rtc.endpoint.Endpoint`, the shell, or at `rtc.peer.Peer`, which puts the cores together.
 
 Every protocol is a core that opens no socket, starts no task and reads no clock. `now` is seconds of one monotonic
-clock, and randomness is handed in, so that a test repeats exactly. All cores have one shape:
+clock, and the caller passes in randomness, so that a test repeats exactly. All cores have one shape:
 
     core.receive_datagram(data, path, now)  # what came in; bad input is dropped and counted, never raised
     core.handle_timer(now)                  # call when `timer()` is due
