@@ -1,9 +1,10 @@
-"""50, 100 and 200 observers besides one operator: does each get every picture, what does one cost, who is slowed?
+"""50, 100 and 200 observers besides one operator: does each get every picture, how much does one cost, is the operator
+slowed?
 
 The observers are headless clients in a process of their own; they receive all cameras and the sound, count RTP and
-decode nothing. Their processes run when nobody else wants to: real ones have machines of their own. The operator drives
-from a third process, before they come, while they are there and after they have left: the machine's own speed changes
-within a minute.
+decode nothing. Their processes run when no other process wants to: real observers have their own machines. The operator
+drives from a third process, before they come, while they are there and after they have left: the machine's own speed
+changes within a minute.
 
 Every picture: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while
 the pictures are counted, at the console's encoders and at each observer. Missed is what the console dropped because
@@ -37,9 +38,9 @@ EVENTS, QUICK_EVENTS = 400, 60
 BARE_PEERS = 8
 BARE_SECONDS, QUICK_BARE_SECONDS = 8, 3
 ANSWER_SECONDS = 10.0
-SETTLE = 3.0  # s after somebody came or left
+SETTLE = 3.0  # s after an observer came or left
 CALM, QUICK_CALM = 20, 2  # s until what hundreds of handshakes did to the crowd's pictures is over
-ENCODE = 0.03  # s until what the bridge has sent is encoded
+ENCODE = 0.03  # s until the bridge's pictures are encoded
 LOOK, SAME, LOOKS = 0.01, 3, 40  # s between two looks at the observers; looks alike that settle it; looks at most
 ROBOT = "planar"  # the lightest: the machine's cores are for the console and the observers
 CPU_TARGET = 0.5  # % of a core for each of a hundred
@@ -64,7 +65,7 @@ class Counts:
     """With the bridge held still."""
 
     taken: dict[str, int]  # pictures that were encoded, by camera, each once for however many tiers
-    tiers: dict[str, dict[str, int]]  # what was encoded for each tier, by camera
+    tiers: dict[str, dict[str, int]]  # encoded pictures of each tier, by camera
     dropped: int  # pictures that did not fit an observer's outbox
     received: list[Received]  # by observer
 
@@ -80,7 +81,7 @@ class Missed:
 
     @property
     def percent(self) -> float:
-        """Of the pictures that were meant for somebody."""
+        """Of the pictures that were meant for an observer."""
         missed = self.dropped + self.lost
         return 100 * missed / (self.received + missed)
 

@@ -1,4 +1,4 @@
-"""The thesis' figures of a recorded session, and what else an operator would ask: SVG text. Needs matplotlib."""
+"""The thesis' figures of a recorded session, and others for an operator: SVG text. Needs matplotlib."""
 
 from collections.abc import Callable
 from typing import NamedTuple
