@@ -32,7 +32,7 @@ __all__ = [
 ADVICE = {
     "unauthorized": "use a link of this console: one that it printed, or that `lockstep invite` made",
     "link_expired": "ask for a new link",
-    "link_revoked": "ask whoever invited you",
+    "link_revoked": "ask the person who invited you",
     "not_allowed": "this link's role does not permit it; use the operator's link",
     "robot_unreachable": "start the robot bridge, or give the console its address",
     "too_many_peers": "close another connection first",

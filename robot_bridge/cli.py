@@ -68,7 +68,7 @@ def run(
     ] = None,
     lockout_file: Annotated[
         Path | None,
-        typer.Option(help="While this file exists nobody drives; also while its folder cannot be read."),
+        typer.Option(help="While this file exists the robot is locked; also while its folder cannot be read."),
     ] = None,
     event_log: Annotated[
         Path | None, typer.Option(help="Append a JSON line for each event, refusal and medium.")
@@ -86,7 +86,7 @@ def run(
         Path | None, typer.Option(help="Ask clients for a certificate that this one signed.")
     ] = None,
     insecure_link: Annotated[
-        bool, typer.Option(help="Listen beyond loopback although anybody there could drive the robot.")
+        bool, typer.Option(help="Listen beyond loopback although any client there could drive the robot.")
     ] = False,
     event_strip: Annotated[
         bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")

@@ -334,7 +334,7 @@ class ClientSession(LinkSession):
             if message.description is not None:
                 check_description(message.description)
         except DescriptionError as error:
-            return self._reject("description", f"the bridge's description makes no sense: {error}")
+            return self._reject("description", f"the bridge's description is invalid: {error}")
         assert self.role is not None  # set by __init__
         self._measured(now - self._opened)
         self._open(self.role, FROM_ROBOT[self.role], now)

@@ -25,8 +25,8 @@ class LinkTransport(asyncio.Protocol):
     """Feeds the session, sends its messages, and drops a peer that does not read.
 
     While the socket is full, messages wait in outboxes: one per kind, media per stream, newest wins. At most
-    `HIGH_WATER` bytes and one further message are buffered. Messages beyond `rate` wait in the socket, so that whoever
-    sends it finds that full; nothing is lost.
+    `HIGH_WATER` bytes and one further message are buffered. Messages beyond `rate` wait in the socket, so that the
+    sender finds that full; no message is lost.
     """
 
     def __init__(

@@ -1,10 +1,10 @@
 """The latched stop: its numbers, the presses behind them, and which reset releases it. No I/O, no clock.
 
 Call `stop`, `reset`, `lock_out` and `let_in` in any order, `may_move` when the robot may move again, and `shown` with
-every stop state that was fed back, twice a second at least. Where the latch is kept on a disk, whatever changes it
-raises `version`: write `record` away from the loop, and call `written` with the version that was written, or could not
-be. Without a disk a reset takes effect at once and nothing is kept.
-Rules and reasons: docs/robot-link.md, "Stop and reset".
+every stop state that was fed back, twice a second at least. Where the latch is kept on a disk, each change raises
+`version`: write `record` away from the loop, and call `written` with the version that was written, or could not be.
+Without a disk a reset takes effect at once and no state is kept. Rules and reasons: docs/robot-link.md, "Stop and
+reset".
 """
 
 import math

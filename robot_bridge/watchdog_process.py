@@ -5,8 +5,8 @@
 The function is called at once. It returns the call that brings the robot to rest; that call returns False while no node
 listens. The process hears of every tick through a pipe. When no tick comes for SECONDS while the robot moves, it makes
 the call, and makes it again until a tick comes. When the pipe ends while the robot moves, the bridge was killed: the
-process goes on with the call for three seconds after the first that somebody could hear, or for half a minute in all.
-It needs nothing of the bridge's interpreter, so it also works while native code keeps that from running anything.
+process goes on with the call for three seconds after the first call that a listener could get, or for half a minute in
+all. It needs nothing of the bridge's interpreter, so it also works while native code keeps that from running anything.
 """
 
 import logging
@@ -151,7 +151,7 @@ def _act_for_good(act: Act, said: int, now: clock.Clock) -> None:
         heard += _act(act, said)
         time.sleep(LAST_INTERVAL)
     if heard == 0:
-        _logger.critical("nobody has heard that the robot has to rest")
+        _logger.critical("no listener got the message that the robot has to rest")
 
 
 def _act(act: Act, said: int) -> bool:

@@ -52,7 +52,7 @@ def network_command(
 
     While it runs, it obeys lines on standard input: "outage 5" lets nothing pass for 5 s, "hold 5" keeps packets
     meanwhile, "robot outage 5" and "robot hold 5" do so on the robot link, "cut" breaks its connections, "statistics"
-    prints what has happened so far as a JSON line.
+    prints the counts so far as a JSON line.
     """
     try:
         loaded = load_profile(profile)

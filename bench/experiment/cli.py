@@ -110,7 +110,7 @@ def experiment_command(
         else:
             _work(session, choices, seconds, robot, network)
     except KeyboardInterrupt:
-        _say("interrupted: this is what was found so far")
+        _say("interrupted: the results so far")
     session.publish(json_to)
 
 

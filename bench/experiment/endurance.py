@@ -61,7 +61,7 @@ class Endurance:
     reconnections: int = 0  # the client was live again after it had not been
     seat_losses: int = 0
     longest_silence: float = 0.0  # s in which the client was not live
-    refused: Mapping[str, float] = field(default_factory=dict)  # what the console took from no peer, by why
+    refused: Mapping[str, float] = field(default_factory=dict)  # refused messages at the console, by reason
     driven_seconds: float = 0.0  # the client was armed and had the seat
     _ended: Counter[str] = field(default_factory=Counter)
     _at: float | None = None

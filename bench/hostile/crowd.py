@@ -1,10 +1,8 @@
 """The crowd, in a separate process: `python -m bench.hostile.crowd LINK OPERATOR BRIDGE COUNT SEED [KIND]`.
 
 LINK is an observer's, OPERATOR the link of a peer that publishes a camera and speaks, BRIDGE is tls://host:port.
-It runs with the processor time that no other process wants (SCHED_IDLE): attackers have machines of their own.
-
-It says in a JSON line that it has begun, answers each line on standard input with what it has seen, and ends at the end
-of its input.
+It runs with the processor time that no other process wants (SCHED_IDLE): attackers have their own machines. It prints a
+JSON line when it has begun, answers each line on standard input with its counts, and ends at the end of its input.
 """
 
 import asyncio

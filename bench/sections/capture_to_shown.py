@@ -7,7 +7,7 @@ the time of each drawing on the main camera's canvas; `bench/media_join.py` find
 "Drawn" is when the page has drawn the picture on its canvas. "Shown" is when the browser then begins to compose a
 frame, the same moment at which requestVideoFrameCallback tells a bare page about a picture of its <video>. The
 baselines are that bare page on `bench/baseline_server.py`, and pictures over WebSockets (`bench/rivals/`), one after
-the other in the same run, at the same bridge, with nobody driving.
+the other in the same run, at the same bridge, without an operator.
 """
 
 import asyncio

@@ -1,19 +1,19 @@
 """50, 100 and 200 observers besides one operator: does each get every picture, how much does one cost, is the operator
 slowed?
 
-The observers are headless clients in a process of their own; they receive all cameras and the sound, count RTP and
+The observers are headless clients in a separate process; they receive all cameras and the sound, count RTP and
 decode nothing. Their processes run when no other process wants to: real observers have their own machines. The operator
 drives from a third process, before they come, while they are there and after they have left: the machine's own speed
 changes within a minute.
 
 Every picture: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while
-the pictures are counted, at the console's encoders and at each observer. Missed is what the console dropped because
-somebody's outbox was full, and what was lost on the way, as the gaps in RTP's numbers tell. That nothing else is
-missing is shown by those who were in one tier (docs/quality.md) all the time: they have exactly as many pictures as
-its encoder made. How many have a number that is no tier's is told: their path looked full for a part of the spell, so
-that they got other pictures meanwhile, or they missed some.
-Cost: processor time of the console's process (proc(5)) with the observers less that without, shared out among them.
-The baseline is the main camera alone on `bench/baseline_server.py`: aiortc encodes it for each peer.
+the pictures are counted, at the console's encoders and at each observer. Missed are the pictures that the console
+dropped because an outbox was full, and those lost on the way, by the gaps in RTP's numbers. That nothing else is
+missing is shown by those who were in one tier (docs/quality.md) all the time: they have exactly as many pictures as its
+encoder made. How many have a number that is no tier's is told: their path looked full for a part of the spell, so that
+they got other pictures meanwhile, or they missed some. Cost: processor time of the console's process (proc(5)) with the
+observers less that without, shared out among them. The baseline is the main camera alone on `bench/baseline_server.py`:
+aiortc encodes it for each peer.
 """
 
 import asyncio

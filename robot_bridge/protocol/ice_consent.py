@@ -4,7 +4,7 @@ aioice gives each check half a second, so that on a path with a longer round tri
 six checks it closes a connection on which everything arrives. RFC 7675 5.1 says otherwise: a check is sent every 4 to 6
 seconds and never repeated, and consent expires 30 s after the last valid answer, however late that answer came.
 
-Only an answer counts, and not a check of the peer's: checks can be recorded and sent again by somebody else, while an
+Only an answer counts, and not a check of the peer's: an attacker can record checks and send them again, while an
 answer names 96 random bits of a check that is at most 30 s old and is authenticated with the connection's password.
 
 `Consent` is the rule. `keep_consent` replaces two public methods of one aioice connection, `query_consent` and
@@ -60,7 +60,7 @@ class _Check:
         self._answered = answered
 
     def response_received(self, message: Any, addr: tuple[str, int]) -> None:
-        """aioice found the transaction; an answer from elsewhere or without the password is nobody's consent."""
+        """aioice found the transaction; an answer from elsewhere or without the password is not consent."""
         if message.message_class != SUCCESS_RESPONSE or addr != self._address:
             return
         if message.check_message_integrity(self._key):
@@ -94,7 +94,7 @@ class _ConsentKeeper:
         try:
             while True:
                 await asyncio.sleep(consent.wait(loop.time()))
-                await asyncio.sleep(0)  # after a pause of the whole process: what has come counts first
+                await asyncio.sleep(0)  # after a pause of the whole process: received answers count first
                 now = loop.time()
                 if consent.expired(now):
                     break
@@ -133,8 +133,8 @@ class _ConsentKeeper:
 def keep_consent(connection: Any, on_expired: Callable[[], bool | None] = lambda: None) -> None:
     """Let `connection`, one of aioice with one component, end after 30 s without a valid answer and no sooner.
 
-    Call before its `connect`. `on_expired` is called once, before the connection closes because of it. True: it does
-    not close by itself, and whoever was asked sends nothing more by it.
+    Call before its `connect`. `on_expired` is called once, before the connection closes because of it. True: the
+    connection does not close, and the called party sends nothing more by it.
 
     Raises:
         RuntimeError: as `require_consent_hooks`.

@@ -62,7 +62,7 @@ class Robot(ABC):
     Values reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
 
     A method that raises ends the bridge. Before it does, the rest values are applied at the axes' brake rates, again
-    after each failure, then `stop` is called, then `close`; each call is made whatever the others raised.
+    after each failure, then `stop` is called, then `close`; each call is made even if the others raised.
     A new object is in the state that `reset` leaves behind; the bridge stops it when it was stopped before.
     """
 
@@ -104,15 +104,14 @@ class Robot(ABC):
         """Bring the robot to rest now, called from another thread while `apply`, `tick` or `measure` may hang.
 
         Called when no tick came for the description's `watchdog` seconds while the robot moves, and again every
-        so often until one comes. It must not wait for anything that a hanging method may hold, and what such a method
-        still writes when it goes on should not move the robot; the next tick applies rest values. Set
-        `rests_from_thread` where it can do that. It needs the interpreter's lock: native code that blocks
-        without releasing that holds up this call too.
+        so often until one comes. It must not wait for anything that a hanging method may hold, and the late writes of
+        such a method should not move the robot; the next tick applies rest values. Set `rests_from_thread` where it can
+        do that. It needs the interpreter's lock: native code that blocks without releasing that holds up this call too.
 
-        For such code there is `rest_call`. A process of its own imports that module when the bridge starts, and calls
-        the function with `rest_arguments`. What it returns is the function, without arguments, that brings the robot to
-        rest by a way of its own, and says False where nobody can have heard of that; it is called as this method is,
-        and also when the bridge is killed while the robot moves.
+        For such code there is `rest_call`. A separate process imports that module when the bridge starts, and calls
+        the function with `rest_arguments`. It returns a function, without arguments, that brings the robot to rest in
+        its own way, and returns False where no listener can have got that; it is called as this method is, and also
+        when the bridge is killed while the robot moves.
         """
         raise NotImplementedError
 
@@ -122,7 +121,7 @@ class Robot(ABC):
 
         Called when a stop was latched and the axes are back at their rest values (stop category 1 of IEC 60204-1 where
         power is cut), when the bridge ends for any reason, and after a failure of any other method. May be called
-        again. Until `reset`, whatever reaches `apply` must not move the robot. Raising makes the bridge try again,
+        again. Until `reset`, no value in `apply` may move the robot. Raising makes the bridge try again,
         twice, and end.
         """
 

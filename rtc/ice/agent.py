@@ -25,10 +25,10 @@ class Agent:
     Signalling carries `local_credentials` and `local_candidates` to the peer, and the peer's to `set_remote`. Then the
     agent lives by `receive_datagram` and `handle_timer`; drain `datagrams_to_send` and `events` after each. `path` is
     where to send. A restart is `restart` and then `set_remote`; the path stays until the new session has nominated one.
-    An agent that has not heard of its peer waits without end: whoever made it bounds that.
+    An agent without a message from its peer waits without end: its owner bounds that.
 
     Args:
-        local_candidates: Where the peer may reach us, and the addresses that datagrams leave from.
+        local_candidates: The addresses for the peer, and those that datagrams leave from.
         controlling: Whether this agent decides on the path: the one whose offer began the session does, unless the
             peer is a lite agent. If both believe it, tie-breakers settle that.
         directory: Shared by agents that share sockets.

@@ -3,9 +3,9 @@ stranger makes a table grow: until MESSAGE-INTEGRITY holds, the only state is a 
 that run from the cheap to the dear:
 
 1. A response must name a transaction that an agent has begun; a request must name a user that exists. Both are one look
-   into a dictionary, and whoever has not seen our signalling cannot guess either.
+   into a dictionary, and an attacker who has not seen the signalling cannot guess either.
 2. From a path that the agent has not claimed, requests pass a rate limit for their source, one for the agent, and one
-   for all together: whoever has a user's name, a peer of ours or somebody who listens, uses up that user's rate alone.
+   for all together: a sender with a user's name, a peer or an eavesdropper, uses up that user's rate alone.
 3. The agent checks the integrity, and only then remembers anything.
 """
 

@@ -41,7 +41,7 @@ class NegotiatedMedia:
     """One section, after the answer."""
 
     section: MediaSection  # the answer's: codecs and header extensions in use
-    direction: Direction  # ours
+    direction: Direction  # the own one
     ssrc: int  # of what we send
     repair_ssrc: int
     announced: frozenset[int] = frozenset()  # SSRCs that the peer has named

@@ -394,7 +394,7 @@ class Association:
             return "wrong_port"
         first = packet.chunks[0]
         if self._ended:
-            if isinstance(first, ShutdownAck):  # 8.4 5: ours was lost
+            if isinstance(first, ShutdownAck):  # 8.4 5: the own one was lost
                 self._send_alone(packet.tag, ShutdownComplete(reflected=True))
             return "ended"
         if type(first) is Init:

@@ -86,7 +86,7 @@ class Reassembly:
             stream = self._streams[chunk.stream] = _Stream()
         if chunk.flags & UNORDERED:
             if isinstance(chunk, Data):
-                return 0  # RFC 9260 3.3.1: there is none
+                return 0  # RFC 9260 3.3.1: it has no sequence
             stream.unordered = max(stream.unordered, found := unwrap(chunk.sequence, stream.unordered))
             return found
         return unwrap(chunk.sequence, stream.expected, self._sequence_mask)

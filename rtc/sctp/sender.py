@@ -514,7 +514,7 @@ class Sender:
             if not chunk.newest_wins:
                 self._lose(chunk, now)
             if chunk.state is _ACKNOWLEDGED and chunk.reported != self._sacks:
-                chunk.state = _WAITING  # the peer has dropped what it had acknowledged (RFC 9260 6.2.1 D iii)
+                chunk.state = _WAITING  # the peer has dropped acknowledged chunks (RFC 9260 6.2.1 D iii)
                 heappush(self._waiting, (chunk.tsn, chunk))
         self.window.expired()
 

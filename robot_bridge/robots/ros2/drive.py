@@ -81,7 +81,7 @@ class Drive(ABC):
         """What keeps this part from being driven, for a person."""
         found = self.sensor_faults(now)
         if not self._heard:
-            found.append(f"{self._topic}: nobody listens for {self._kind.__name__}")
+            found.append(f"{self._topic}: no subscriber for {self._kind.__name__}")
         if self._stream.withheld and not self._stopped and not found:
             found.append(f"{self._topic}: let go once; the robot's side was lost while it was driven")
         return found
