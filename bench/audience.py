@@ -31,7 +31,7 @@ Counts = dict[str, list[int]]  # per stream: frames, packets lost
 async def attend(link: str, count: int, plain: bool) -> None:
     began = time.monotonic()
     attending = asyncio.current_task()
-    if attending is not None:  # observers take their leave, or the console would go on sending to nobody for a while
+    if attending is not None:  # observers say goodbye, or the console would send to closed sockets for a while
         asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, attending.cancel)
     gate = asyncio.Semaphore(AT_ONCE)
     stacks = [AsyncExitStack() for _ in range(count)]

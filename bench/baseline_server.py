@@ -1,4 +1,4 @@
-"""The baseline: what one builds with aiortc in an afternoon. `python -m bench.baseline_server tcp://HOST:PORT [HOST]`
+"""The baseline: a server that takes an afternoon with aiortc. `python -m bench.baseline_server tcp://HOST:PORT [HOST]`
 
 The same pictures of the same robot bridge, from its robot link; each peer has a `VideoStreamTrack` of its own that
 gives out the newest picture as soon as there is one, and aiortc encodes it for each peer alone. No stamps, no

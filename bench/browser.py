@@ -1,4 +1,4 @@
-"""Pages in Chromium with what a measurement puts into them."""
+"""Pages in Chromium with a measurement's scripts."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager

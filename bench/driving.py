@@ -46,7 +46,7 @@ def round_and_round(description: RobotDescription) -> Callable[[float], list[flo
 
 
 class Pause:
-    """Between two commands: what the event rate demands, and up to a tick more.
+    """Between two commands: the interval of the event rate, and up to a tick more.
 
     Without that the commands would all meet the control tick at the same phase. The last of it is not slept: timers
     keep to the clock's milliseconds, on which the ticks lie too, and a tenth of a millisecond in the path would then
@@ -65,12 +65,12 @@ class Pause:
 
 
 async def drive_on(console: Console, values: Mapping[str, float] | Sequence[float]) -> Feedback:
-    """Drive, and arm first wherever the robot asks for it: nobody stands beside a simulated one.
+    """Drive, and arm first whenever the robot asks for it: a simulated robot endangers no person.
 
     A machine that is busy may hold the robot up again between the two.
 
     Raises:
-        NotArmed: it asked for it every time.
+        NotArmed: the robot asked for it every time.
         CommandRefused: the robot is stopped, this console does not hold the seat, …
         ConsoleLost: the connection ended.
     """

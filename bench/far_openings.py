@@ -24,7 +24,7 @@ async def far_console(profile: Profile | str, robot: str) -> AsyncIterator[tuple
     """A console and its robot on the far side; and the operator's link.
 
     Raises:
-        NamespacesUnavailable: says what is missing.
+        NamespacesUnavailable: names the missing part.
     """
     lockstep = str(Path(sys.executable).with_name("lockstep"))
     with tempfile.TemporaryDirectory() as state:

@@ -1,4 +1,4 @@
-"""Hundreds of observers on this machine who take no time from what is measured."""
+"""Hundreds of observers on this machine that take no time from the measurement."""
 
 import shutil
 import sys
@@ -12,13 +12,13 @@ __all__ = ["idle_crowd"]
 
 AT_MOST = 100  # in one process
 CONNECT_SECONDS = 150.0
-# Real ones have machines of their own: these take what the others leave (sched(7)).
+# Real observers have their own machines: these take the time that others leave (sched(7)).
 IDLE = ("chrt", "--idle", "0") if shutil.which("chrt") else ("nice", "-n", "19")
 
 
 @asynccontextmanager
 async def idle_crowd(link: str, count: int, context: Context) -> AsyncIterator[list[Running]]:
-    """`count` observers (`bench/audience.py`), in processes that run when nobody else wants to."""
+    """`count` observers (`bench/audience.py`), in processes that run when no other process wants to."""
     async with AsyncExitStack() as stack:
         audiences: list[Running] = []
         for size in [min(AT_MOST, count - first) for first in range(0, count, AT_MOST)]:

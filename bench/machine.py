@@ -1,4 +1,4 @@
-"""What the figures were measured on."""
+"""The machine of the measurements."""
 
 import asyncio
 import os
@@ -28,7 +28,7 @@ def machine_facts() -> dict[str, Any]:
 
 
 async def busy_percent(seconds: float) -> float:
-    """What of the whole machine's processor time is used while we wait (proc(5), /proc/stat)."""
+    """The used share of the whole machine's processor time while this process waits (proc(5), /proc/stat)."""
     total, idle = _processor_time()
     await asyncio.sleep(seconds)
     later, later_idle = _processor_time()
@@ -36,7 +36,7 @@ async def busy_percent(seconds: float) -> float:
 
 
 def _processor_time() -> tuple[int, int]:
-    """In ticks since boot: all of it, and what was idle or waited for a disk."""
+    """In ticks since boot: all of it, and the part that was idle or waited for a disk."""
     first, _, _ = Path("/proc/stat").read_text().partition("\n")
     fields = [int(field) for field in first.split()[1:9]]  # guests are counted in the user time already
     return sum(fields), fields[3] + fields[4]

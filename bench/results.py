@@ -10,7 +10,7 @@ Bound = Literal["at most", "at least"]
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """A figure with what it is held against. `value` None: it could not be measured; `conditions` says why."""
+    """A figure with its target and its baseline. `value` None: it could not be measured; `conditions` says why."""
 
     section: str  # "lossy"
     name: str  # "command → feedback, p99"
@@ -21,7 +21,7 @@ class Result:
     baseline: float | None = None  # the same figure of `baseline_name`, from the same run
     baseline_name: str = ""  # "reliable data channel"
     samples: int = 0
-    conditions: str = ""  # what it was measured under
+    conditions: str = ""  # of the measurement
 
     @property
     def met(self) -> bool | None:
@@ -34,14 +34,14 @@ class Result:
 
     @property
     def ratio(self) -> float | None:
-        """Ours to the baseline's."""
+        """The figure divided by the baseline's."""
         if self.value is None or not self.baseline:
             return None
         return self.value / self.baseline
 
     @property
     def command(self) -> str:
-        """What measures it again."""
+        """The command that measures it again."""
         return f"make bench ARGS={self.section}"
 
     def fields(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ def quantile(samples: Sequence[float], share: float) -> float:
     """The nearest-rank quantile: the least sample that at least `share` of all are not above.
 
     Raises:
-        ValueError: there are none, or `share` is not between 0 and 1.
+        ValueError: no samples, or `share` is not between 0 and 1.
     """
     if not samples:
         raise ValueError("no samples")

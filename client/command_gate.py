@@ -89,8 +89,8 @@ class CommandGate:
         return NextCommand(event_after(self._feedback[0]), self._feedback[1])
 
     def _picture_is_near(self, event: int) -> bool:
-        """Near enough to stay within tolerance when the next feedback comes, one event on. At tolerance 0 none is:
-        there the picture of the newest event must do."""
+        """Near enough to stay within tolerance when the next feedback arrives, one event on. At tolerance 0 no picture
+        is; there the picture of the newest event suffices."""
         if self._shown is None:
             return False
         return -self.tolerance <= event_gap(event, self._shown) <= max(self.tolerance - 1, 0)

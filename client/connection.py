@@ -44,18 +44,18 @@ from robot_bridge.protocol.messages import Feedback, Ping, Pong, Refusal, Stop, 
 __all__ = ["Connection", "ConnectionOptions"]
 
 HEARTBEAT = 0.5  # s between two reports, and between two pings
-OBSERVER_HEARTBEAT = 1.0  # s, of somebody who cannot drive; there may be hundreds
-RELAYED_HEARTBEAT = 5.0  # s, of an observer that nobody waits for
-LINE_HEARTBEAT = 15.0  # s, of one with a line, which loses nothing
+OBSERVER_HEARTBEAT = 1.0  # s, of a peer that cannot drive; there may be hundreds
+RELAYED_HEARTBEAT = 5.0  # s, of an observer, whose answers delay no command
+LINE_HEARTBEAT = 15.0  # s, of an observer on a WebSocket, which loses nothing
 EARLY_PINGS = 5  # to know the path before the first command
 EARLY_PING = 0.05  # s between them
 STOP_SECONDS = 0.3  # for a channel to confirm a stop, before HTTP is tried as well or after HTTP has failed
-RETRY_SECONDS = 1.0  # while the robot is not reached yet; what the console's Retry-After says
+RETRY_SECONDS = 1.0  # while the robot is not reached yet; as the console's Retry-After
 
 
 @dataclass(frozen=True)
 class ConnectionOptions:
-    """What `Console` was told."""
+    """The arguments of `Console`."""
 
     link: ConsoleLink
     pacing: Pacing
@@ -78,7 +78,8 @@ class ConnectionOptions:
 
 
 class Connection:
-    """`open`, use, `close`. After the connection ended by itself, `lost` says why and every wait raises it."""
+    """`open`, use, `close`. After a connection that was not closed here has ended, `lost` has the reason and every wait
+    raises it."""
 
     def __init__(self, options: ConnectionOptions) -> None:
         self.options = options
@@ -139,7 +140,7 @@ class Connection:
             async with asyncio.timeout_at(deadline):
                 await self._until(lambda: self.session.welcome is not None and self._driver is not None)
         except TimeoutError:
-            raise ConnectFailed("connected, but the console said nothing of its robot") from None
+            raise ConnectFailed("connected, but the console did not describe its robot") from None
         except ConsoleLost as error:
             raise ConnectFailed(error.detail) from error
 
@@ -152,7 +153,7 @@ class Connection:
         self._peer = WatchLine(options.link, where.relay, options.tls_ca, self._received, options.silence_seconds)
 
     async def _watch_through(self, wanted: dict[str, int], deadline: float) -> None:
-        """The console tells what lets into the relay only to whoever is connected."""
+        """The console gives the relay's key only to a connected observer."""
         try:
             async with asyncio.timeout_at(deadline):
                 await self._until(lambda: self.session.welcome is not None)
@@ -222,7 +223,7 @@ class Connection:
         self.media.close()
 
     async def _until(self, condition: Callable[[], bool]) -> None:
-        """Wait for what a message will make true. Raises ConsoleLost."""
+        """Wait until a message makes the condition true. Raises ConsoleLost."""
         while not condition():
             if self.lost is not None:
                 raise self.lost
@@ -260,10 +261,10 @@ class Connection:
         welcome = self.session.welcome
         return welcome is not None and welcome.role == "observer"
 
-    # What the console says
+    # Messages from the console
 
     def _received_from_relay(self, data: str | bytes) -> None:
-        """A relay is believed what it is asked for, and nothing else."""
+        """Take only the kinds of message that this client asked the relay for."""
         try:
             message = decode_server_message(data)
         except MessageError:
@@ -341,7 +342,7 @@ class Connection:
         if self._driver is not None and cameras and stream == cameras[0].name:
             self._driver.shown(stamp)
 
-    # What is known after `open`
+    # Known after `open`
 
     @property
     def driver(self) -> Driver:
@@ -400,7 +401,7 @@ class Connection:
             ping=ping,
         )
 
-    # What is asked of the console
+    # Requests to the console
 
     async def restart_ice(self) -> None:
         """Raises SignallingRefused or ConnectFailed."""
@@ -410,7 +411,8 @@ class Connection:
         """Raises StopUnconfirmed when neither the data channel nor HTTP brought the robot's answer."""
         press = secrets.token_hex(16)
         self._peer.send("stop", Stop(by=self.options.name, reason=reason, press=press))
-        # What an observer says on a channel may have to wait behind a crowd of others; a stop by HTTP waits for nobody.
+        # An observer's message on a channel may wait behind those of a crowd; a stop by HTTP waits for no other
+        # request.
         if self._is_observer() or not await self._is_confirmed_soon(press):
             await self._stop_by_http(reason, press)
         if self._driver is not None:

@@ -29,22 +29,21 @@ LEAVE_SECONDS = 1.5  # for the robot to come to rest before the connection is cl
 
 
 class Console:
-    """One connection to a Lockstep console; an async context manager. A lost one is not used again: make another.
+    """One connection to a Lockstep console; an async context manager. Do not use a lost one again: make another.
 
     Args:
-        link: what `lockstep up` printed: "http://host:port/#token=…"
+        link: as `lockstep up` prints it: "http://host:port/#token=…"
         pacing: "feedback": the next command waits for the feedback of the last; "media": also for its picture
         tolerance: largest gap of a rendered picture, in events
         audio_tolerance: the same for sound
-        gate: "event": the rule. "off": renders everything. "age": renders what is at most 0.5 s old by synchronised
-            clocks, as others do; needs the carrier "capture-time" or "trailer". The last two are for comparison
-        carrier: how the event reference travels with media; the only one that is offered
-        video: how many cameras at most; True: four, False: none
-        audio: whether to receive sound
+        gate: "event": the rule. "off": renders everything. "age": renders media that are at most 0.5 s old by
+        synchronised clocks, as other consoles do; needs the carrier "capture-time" or "trailer". The last two are for
+        comparison carrier: how the event reference travels with media; no other carrier is offered video: how many
+        cameras at most; True: four, False: none audio: whether to receive sound
         decode: False only counts RTP packets and frames: no pictures, no sound, next to no cost
-        codec: "VP8" or "H264"; None: what the console prefers
+        codec: "VP8" or "H264"; None: the console's first choice
         sound_codec: "opus" or "PCMU"; None: the same
-        event_rate: most events per second; None: what the robot's description says. Never more than that
+        event_rate: most events per second; None: the rate of the robot's description. Never more than that
         name: what other participants see
         connect_seconds: allowed for connecting, waiting for the robot included
         silence_seconds: without any message from the console after which it counts as lost
@@ -129,13 +128,13 @@ class Console:
                 async with asyncio.timeout(LEAVE_SECONDS):
                     await connection.driver.rest()
         except (ConsoleError, TimeoutError):
-            pass  # the robot comes to rest by itself when its operator is gone
+            pass  # the bridge brings the robot to rest when its operator is gone
         finally:
             if connection.session.holds_seat:
                 connection.session.release_seat()
             await connection.close()
 
-    # What is known
+    # Known state
 
     @property
     def description(self) -> RobotDescription:
@@ -174,7 +173,7 @@ class Console:
 
     @property
     def role(self) -> Role:
-        """What this link permits."""
+        """The role of this link."""
         return self._live().welcome.role
 
     @property
@@ -184,7 +183,7 @@ class Console:
 
     @property
     def notes(self) -> list[SharedNote]:
-        """What was written to everyone, oldest first; the last hundred."""
+        """The notes to everyone, oldest first; the last hundred."""
         return list(self._live().session.notes)
 
     def stats(self) -> ConsoleStatistics:
@@ -200,10 +199,9 @@ class Console:
         return list(self._live().feedback_log)
 
     async def restart_ice(self) -> None:
-        """Look for a new path to the console, as after a change of networks; what is connected stays so meanwhile.
-
-        Nothing is lost but what was on its way, and the seat is kept. A path that was gone for longer than the console
-        waits for a sign of life (20 s) takes a new `Console`.
+        """Look for a new path to the console, as after a change of networks; the connection lives on meanwhile. Only
+        packets on their way are lost, and the seat is kept. A path that was gone for longer than the console waits for
+        a sign of life (20 s) takes a new `Console`.
 
         Raises:
             SignallingRefused: the console has given up this connection.
@@ -215,24 +213,24 @@ class Console:
     # Driving
 
     async def take_seat(self) -> None:
-        """Take the control seat: an operator when it is free, a supervisor from whoever holds it; and `arm`.
+        """Take the control seat: an operator when it is free, a supervisor from any holder; and `arm`.
 
         While the robot is stopped or away the seat is taken, and `arm` is left to you.
 
         Raises:
-            SeatRefused: somebody else holds it, or this link is an observer's.
+            SeatRefused: another peer holds it, or this link is an observer's.
         """
         connection = self._live()
         await connection.session.take_seat()
         await self._arm_if_possible(connection)
 
     async def request_seat(self, seconds: float = 65.0) -> None:
-        """Ask whoever holds the control seat for it; returns when it is granted, or at once when it is free.
+        """Ask the holder of the control seat for it; returns when it is granted, or at once when it is free.
 
         `seconds` covers the 60 s after which the console counts no answer as no. Cancelled, the request is withdrawn.
 
         Raises:
-            SeatRefused: the holder declined, nobody answered, or this link is an observer's.
+            SeatRefused: the holder declined or did not answer, or this link is an observer's.
         """
         connection = self._live()
         await connection.session.request_seat(seconds)
@@ -249,7 +247,7 @@ class Console:
         """Let the robot move again, by one neutral command; the feedback that answers it.
 
         Needed after a stop and its reset, a lost robot link, and whenever the robot says so; taking the seat arms too.
-        Call it when whoever is responsible wants the robot to move on, never as an answer to `NotArmed` alone.
+        Call it when the responsible person wants the robot to move on, never as an answer to `NotArmed` alone.
 
         Raises:
             CommandRefused: the robot is stopped, this console does not hold the seat, …
@@ -274,8 +272,8 @@ class Console:
 
         `values` has one value per axis in the description's order, or names axes; those not named get their value
         at rest. The first call arms: from then on, whenever 200 ms pass without another call, the console sends
-        neutral values, five times a second, until `rest`. A lost command is repeated; one that came too late is
-        tried again on fresh feedback.
+        neutral values, five times a second, until `rest`. A lost command is repeated; a command that arrived too late
+        is tried again on fresh feedback.
 
         Raises:
             CommandError: an unknown axis, or a value that is not finite.
@@ -322,11 +320,11 @@ class Console:
         return await self._live().stop(reason)
 
     async def reset(self, number: int | None = None) -> StopState:
-        """Release stop `number`, or the newest that this connection was told of; moves nothing, and `arm` comes next.
+        """Release stop `number`, or the newest that this connection knows; moves nothing, and `arm` comes next.
 
         Raises:
             CommandRefused: neither holder of the seat nor supervisor, a newer stop (`stale_reset`), less than a second
-                after the stop (`too_soon`), somebody at the robot keeps it (`locked_out`), …
+                after the stop (`too_soon`), a person at the robot keeps the stop (`locked_out`), …
         """
         session = self._live().session
         return await session.reset(self._live().options.name, session.newest_stop if number is None else number)

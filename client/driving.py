@@ -1,4 +1,4 @@
-"""The shell around the pilot: its timer, and the futures of those who wait for feedback."""
+"""The shell around the pilot: its timer, and the futures of callers that wait for feedback."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ __all__ = ["Driver"]
 
 
 class Driver:
-    """Sends what the pilot says is due, at once and at the right times."""
+    """Sends the pilot's commands and rests, at once and at the right times."""
 
     def __init__(self, pilot: Pilot, send: Callable[[Command | Rest], None]) -> None:
         self.pilot = pilot
@@ -42,7 +42,7 @@ class Driver:
         self.pump()
 
     def loss(self) -> None:
-        """Some message of this connection was lost."""
+        """A message of this connection was lost."""
         self.pilot.loss(self._loop.time())
 
     async def drive(self, values: Sequence[float]) -> Feedback:
@@ -50,7 +50,7 @@ class Driver:
 
         Raises:
             NotArmed: a neutral command comes first.
-            CommandRefused: and another try would be refused as well.
+            CommandRefused: another try would be refused as well.
             ConsoleLost: the connection ended.
         """
         answered: asyncio.Future[Feedback] = self._future()
@@ -66,7 +66,7 @@ class Driver:
         return await answered
 
     def hold_back(self, reason: RefusalReason) -> None:
-        """The robot may not move until somebody arms again."""
+        """The robot may not move until the program arms again."""
         self.pilot.hold_back(reason)
         self.pump()
 
@@ -84,7 +84,7 @@ class Driver:
         return self._loop.create_future()
 
     def pump(self) -> None:
-        """Send what is due, hand out what is known, and set the timer for the rest."""
+        """Send what the pilot has due, hand out outcomes, and set the timer for the next time."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -117,7 +117,7 @@ class Driver:
             self._rested.clear()
 
     def end(self, lost: ConsoleLost) -> None:
-        """The connection ended: nobody waits any longer."""
+        """The connection ended: end every wait."""
         self._lost = lost
         self.pump()
         pending: list[asyncio.Future[Any]] = [*(future for _, future in self._waiting), *self._rested]

@@ -1,8 +1,8 @@
-"""What can go wrong at a client.
+"""Errors of the client.
 
 ConsoleError
 ├── LinkFormatError         the link given to Console is not one that `lockstep up` prints     (caller)
-├── CommandError            values that no robot could be asked for                             (caller)
+├── CommandError            values that no robot accepts (caller)
 ├── NoSuchStream            a camera or microphone that is not received                        (caller)
 ├── SignallingRefused       the console answered WHEP with an error
 ├── ConnectFailed           the console, or the way to it, did not work within the time allowed
@@ -32,7 +32,7 @@ __all__ = [
 ADVICE = {
     "unauthorized": "use a link of this console: one that it printed, or that `lockstep invite` made",
     "link_expired": "ask for a new link",
-    "link_revoked": "ask whoever invited you",
+    "link_revoked": "ask the person who invited you",
     "not_allowed": "this link's role does not permit it; use the operator's link",
     "robot_unreachable": "start the robot bridge, or give the console its address",
     "too_many_peers": "close another connection first",
@@ -86,7 +86,7 @@ class ConnectFailed(ConsoleError):
 
 
 class ConsoleLost(ConsoleError):
-    """The connection ended. The robot comes to rest by itself; a new Console connects again."""
+    """The connection ended. The bridge brings the robot to rest; a new Console connects again."""
 
 
 class Refused(ConsoleError):
@@ -117,10 +117,10 @@ class NotArmed(CommandRefused):
 
 
 class StopUnconfirmed(ConsoleError):
-    """A stop that the robot has not confirmed. The console keeps it, if it was reached; use the hardware stop.
+    """A stop that the robot has not confirmed. The console keeps it, if the stop reached it; use the hardware stop.
 
     Attributes:
-        press: its id; the same press may be said again
+        press: its id; the same press may be sent again
     """
 
     def __init__(self, press: str, detail: str) -> None:

@@ -73,16 +73,16 @@ class AudioAssembler:
         return False
 
     def broken(self) -> None:
-        """Every audio packet decodes by itself."""
+        """Every audio packet decodes without others."""
 
 
 class VideoAssembler:
-    """Frames in order. Call `add` with every packet, then `wants_keyframe`. Others ask for what is missing."""
+    """Frames in order. Call `add` with every packet, then `wants_keyframe`. Other parts ask for missing packets."""
 
     def __init__(self, is_keyframe: Callable[[bytes], bool]) -> None:
         self.lost = 0  # packets given up
         self.round_trip = 0.0  # s
-        self.undecodable = 0  # complete frames left out for want of a keyframe
+        self.undecodable = 0  # complete frames left out because a keyframe is missing
         self._is_keyframe = is_keyframe
         self._packets: dict[int, MediaPacket] = {}
         self._start: int | None = None  # sequence number that begins the next frame

@@ -1,7 +1,7 @@
 """The gate for pictures and sound: one rule, the same in web/, both held to tests/vectors/gate.json. No I/O.
 
-The mode `event` is the rule. The two others are what it is compared with: `off` renders everything; `age` renders what
-was captured at most `MAX_AGE` ago by synchronised clocks and knows nothing of events.
+The mode `event` is the rule. The two others are for comparison: `off` renders everything; `age` renders media that were
+captured at most `MAX_AGE` ago by synchronised clocks, and ignores events.
 """
 
 from typing import Generic, Literal, NamedTuple, TypeVar
@@ -60,7 +60,7 @@ class MediaGate(Generic[Medium]):
         self.received = 0
         self.rendered = 0
         self.discarded = 0
-        self.held = 0  # media that had to wait, whatever became of them
+        self.held = 0  # media that had to wait, rendered later or not
         self.violations = 0  # rendered with |gap| > tolerance; in the mode `event` also without a gap
         self._gaps = 0  # sum of |gap| rendered
         self._gaps_known = 0  # renderings with a gap
@@ -74,7 +74,7 @@ class MediaGate(Generic[Medium]):
 
     @property
     def mean_gap(self) -> float | None:
-        """Of |gap| over what was rendered; None before the first gap is known."""
+        """Of |gap| over the rendered media; None before the first gap is known."""
         return self._gaps / self._gaps_known if self._gaps_known else None
 
     def reported(self) -> None:

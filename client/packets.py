@@ -1,4 +1,4 @@
-"""From what a connection receives to whoever takes the packets of a section."""
+"""Hands the packets of a connection to the consumer of each section."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

@@ -178,7 +178,7 @@ class Peer:
         self._need_packets().to_sinks(sinks, sections, uri, stamp_reader(self._carrier))
 
     def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
-        """Give every RTP packet to `take`, and nothing to anybody else. Between `negotiate` and `connect`."""
+        """Give every RTP packet to `take`, and to no other consumer. Between `negotiate` and `connect`."""
         self._need_packets().plain(take, control)
 
     def send_control(self, packet: bytes) -> None:
@@ -291,7 +291,7 @@ class Peer:
                 if self._resource:
                     await self._whep.end(self._resource)
         except (TimeoutError, ConsoleError):
-            pass  # it ends the session by itself when nothing arrives any more
+            pass  # it ends the session when no packet arrives any more
         finally:
             if self._endpoint is not None:
                 self._endpoint.close()

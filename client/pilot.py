@@ -1,20 +1,20 @@
-"""Driving, without I/O: which command or rest to send when, and what became of each intention.
+"""Driving, without I/O: which command or rest to send when, and the outcome of each intention.
 
-Feed it with `feedback`, `refusal`, `shown`, `intend`, `rest`; after each, and at `wake_at`, send what `due` returns
-and hand out what `outcomes` returns.
+Call `feedback`, `refusal`, `shown`, `intend` and `rest`. After each call, and at `wake_at`, send the messages that
+`due` returns, and hand out the results that `outcomes` returns.
 
 - One command is in flight; its repeats carry the newest intention under the same event number, and answer the newest
   issue of its feedback.
-- Armed and without a new intention for `IDLE`, it sends neutral values at that interval.
+- Armed and without a new intention for `IDLE`, the pilot sends neutral values at that interval.
 - A neutral command has to be executed before the robot may move: after taking the seat, a stop, a reset, a lost link,
-  and whenever the robot says so. That lets motion begin again, so only `arm` sends it, which somebody asked for: what
-  was in flight or wanted before is given up, and nothing neutral leaves by itself until then.
+  and whenever the robot says so. The neutral command lets motion begin again, so only `arm` sends it, which a caller
+  asked for. The pilot gives up the command in flight and the wanted values, and sends no neutral command until then.
 - While the path loses packets every command is followed by `ECHOES` copies, `ECHO` apart, until its answer: a copy
   covers the loss of the command and, being answered from the stored feedback, the loss of the answer too. On a clean
   path nothing is copied.
-- Losses come in a row. When all were lost on such a path, the first repeat comes early, and each repeat is a salvo of
-  `SALVO` copies, which ends with the answer: single repeats would wait out a row of lost packets one by one. A repeat
-  that leaves before an answer can have come, on a path longer than the interval, is single.
+- Losses come in a row. When a command and all copies were lost on such a path, the first repeat comes early, and each
+  repeat is a salvo of `SALVO` copies, which ends with the answer: single repeats would wait out a row of lost packets
+  one by one. A repeat that leaves before an answer can have arrived, on a path longer than the interval, is single.
 """
 
 from collections import deque
@@ -31,7 +31,7 @@ from robot_bridge.protocol.serial import FIRST_EVENT, event_gap
 __all__ = ["Outcome", "Pilot"]
 
 IDLE = 0.2  # s; 5 Hz
-TURN = 0.1  # s; who waited for an answer longer than `IDLE` has so long to say what comes next
+TURN = 0.1  # s for the next intention of a caller that waited longer than `IDLE` for an answer
 ECHO = 0.020  # s; longer than the console's own path to the robot and back
 ECHOES = 3  # at most; with the command itself as many as a row of lost packets is long
 SALVO = 12
@@ -88,7 +88,7 @@ class Pilot:
         self.timer = RepeatTimer()
         self.armed = False
         self.ready = False  # whether the robot may move: a neutral command was executed since one was last needed
-        self.holds_seat = True  # else what is executed is somebody else's
+        self.holds_seat = True  # else the executed event is another peer's
         self.newest: Feedback | None = None
         self.repeats = 0  # sent because no answer came in time
         self.echoes = 0  # sent because the path loses packets
@@ -139,10 +139,11 @@ class Pilot:
         self.hold_back("no_seat")
 
     def hold_back(self, reason: RefusalReason) -> None:
-        """The robot may not move until somebody arms again: gives up what is wanted or in flight, for `reason`."""
+        """The robot may not move until the program arms again: give up the wanted values and the flight, for
+        `reason`."""
         self.ready = False
         if self._arming and reason == "not_neutral":
-            return  # that is what it is for
+            return  # arming is for that
         self.armed = self._arming = False
         self._want = _Want.NOTHING
         if self._flight is not None:
@@ -341,18 +342,18 @@ class Pilot:
     def _values_for(self, want: _Want) -> list[float]:
         return self._values if want is _Want.VALUES else self._neutral
 
-    # What follows
+    # After an answer
 
     def _landed(self, flight: _Flight, feedback: Feedback, now: float) -> None:
         if not self.holds_seat:
-            self.hold_back("no_seat")  # that event was somebody else's command
+            self.hold_back("no_seat")  # that event was another peer's command
             return
         self._flight = None
         self._prove(flight, feedback)
         taken = now - flight.first_sent_at
         self.samples.append(taken)
         soonest = NEEDLESS * min(self._pings) if self._pings else NEEDLESS_BLIND * taken
-        # A later issue of this feedback came by itself, not as an answer.
+        # A later issue of this feedback is a refresh, not an answer.
         if feedback.issue == 1 and (flight.sends == 1 or now - flight.last_sent_at < soonest):
             self.timer.sample(taken)  # echoes make a sample too long at times, which is the safe side
         else:
@@ -363,7 +364,7 @@ class Pilot:
 
     def _prove(self, flight: _Flight, feedback: Feedback) -> None:
         """Whether the robot may move now. A neutral command that answers an issue from before, say, a reset counts for
-        nothing at the robot, so one more follows it. A cause that outlives that one came after somebody armed."""
+        nothing at the robot, so one more follows it. A cause that outlives that one arose after the arming."""
         if feedback.stop.stopped or (not self.ready and not self._arming):
             return
         if not feedback.neutral_needed:

@@ -95,7 +95,7 @@ class Reception:
             self._reports.packet(header, time.monotonic())
 
     async def run(self) -> None:
-        """Decode, or report what is only counted, until cancelled."""
+        """Decode, or report the streams that are only counted, until cancelled."""
         if self._source is not None and self._counters:
             await self._report(self._source)
         if self._executor is None:
@@ -165,7 +165,7 @@ class Reception:
         )
 
     def end(self) -> None:
-        """Nothing will come any more."""
+        """No more packets will arrive."""
         for stream in self._streams:
             stream.close()
 

@@ -38,13 +38,13 @@ __all__ = ["RelayMedia", "RelayTicket"]
 
 ANSWER_SECONDS = 10.0
 KEEPALIVE_SECONDS = 25.0  # Janus forgets a session after 60 s
-SILENCE_SECONDS = 1.5  # without a word on the feedback channel; the console says something there every 0.4 s
+SILENCE_SECONDS = 1.5  # without a message on the feedback channel; the console sends one there every 0.4 s
 HELD_UP_SECONDS, MOST_HELD_UP = 0.1, 3  # later than that this process was held up; so often in a row it may be
 MAX_MESSAGE = 256 * 1024  # bytes
 
 
 class RelayTicket(msgspec.Struct, frozen=True, kw_only=True):
-    """What GET /api/relay answers. Of a relay that is no Janus, only `engine` counts."""
+    """The answer of GET /api/relay. For a relay other than Janus, only `engine` counts."""
 
     engine: str
     relay: str
@@ -78,11 +78,11 @@ class RelayMedia:
 
     @property
     def name(self) -> str:
-        """As the console counts its relays."""
+        """The relay's number at the console."""
         return self._ticket.relay
 
     async def negotiate(self, wanted: Callable[[StreamInfo], bool] = lambda _: True) -> list[Section]:
-        """Subscribe: the sections of what will come. Raises ConnectFailed."""
+        """Subscribe; the sections of the coming media. Raises ConnectFailed."""
         try:
             self._socket = await connect(
                 self._ticket.url,
@@ -114,7 +114,7 @@ class RelayMedia:
         except SdpError as error:
             raise ConnectFailed(f"the relay's offer cannot be used: {error}") from error
         self._endpoint = open_endpoint(own_addresses())
-        # We open DTLS: we know first that ICE has found a path.
+        # The client opens DTLS, because it knows first that ICE has found a path.
         settings = PeerSettings(setup="active")
         self._connection = self._endpoint.connect(controlling=False, settings=settings, listener=self._event)
         self._packets = Packets(self._connection)
@@ -134,7 +134,8 @@ class RelayMedia:
         self._need_packets().send_control(packet)
 
     def round_trip(self, seconds: float) -> None:
-        """To the console, not to the relay: nothing measures that, and what is assumed serves."""
+        """The round trip to the console. Not used: the round trip to the relay is not measured, and the assumed one
+        suffices."""
 
     @property
     def connection(self) -> Connection:
@@ -156,7 +157,7 @@ class RelayMedia:
             async with asyncio.timeout(ANSWER_SECONDS):
                 await self._heard.wait()
         except TimeoutError:
-            raise ConnectFailed("nothing came from the relay: is UDP between here and there blocked?") from None
+            raise ConnectFailed("no packet arrived from the relay: is UDP blocked on the way to it?") from None
 
     async def run(self) -> None:
         """Until cancelled: keeps the session, and notices when the relay is gone."""
@@ -205,7 +206,7 @@ class RelayMedia:
             self.ended.set()
 
     async def _ask(self, kind: str, **fields: Any) -> Heard:
-        """Before `run`, which reads what comes afterwards."""
+        """Before `run`, which reads later messages."""
         transaction = f"{self._prefix}-{next(self._numbers)}"
         if self._socket is None:
             raise ConnectFailed("not connected to the relay")
@@ -256,7 +257,7 @@ class RelayMedia:
                     await self._heard.wait()
                 held_up = 0
             except TimeoutError:
-                # Late: this process was held up, and what came meanwhile is not read yet.
+                # Late: this process was held up, and has not read the packets of that time yet.
                 held_up = held_up + 1 if loop.time() - due >= HELD_UP_SECONDS else 0
                 if not 0 < held_up <= MOST_HELD_UP:
                     self._lose(f"nothing came from the relay for {SILENCE_SECONDS:g} s")

@@ -10,12 +10,13 @@ SETTLE = 1.0  # s after which any feedback that is at rest was measured after th
 
 
 class RestCall:
-    """Proof is a feedback at rest that cannot have been measured before the rest took effect: that of the neutral
-    command sent after it, one from a stopped robot, or, when commands are refused, one that came much later."""
+    """Proof is a feedback at rest that cannot have been measured before the rest took effect: the feedback to the
+    neutral command that was sent after it, a feedback from a stopped robot, or, when commands are refused, a feedback
+    that arrived much later."""
 
     def __init__(self, rest: Rest, once: bool, now: float) -> None:
         self.rest = rest
-        self.once = once  # nothing was moving: say it, and do not wait for proof
+        self.once = once  # no axis was moving: send it, and do not wait for proof
         self.due_at = now
         self.neutral: int | None = None  # event of the neutral command that followed
         self._began = now

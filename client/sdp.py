@@ -1,4 +1,4 @@
-"""The little of SDP that the client reads and writes by itself. Text in, text out; no I/O."""
+"""The few parts of SDP that the client reads and writes itself. Text in, text out; no I/O."""
 
 import re
 from dataclasses import dataclass, field

@@ -29,10 +29,10 @@ KEPT_NOTES = 100
 
 
 class Session:
-    """Show it every message with `hear`; the requests wait with `until` for what a message makes true.
+    """Give it every message with `hear`; the requests wait with `until` for a message that answers them.
 
     Attributes:
-        welcome: who this connection is; None before the console said so
+        welcome: this connection's id and role; None before the console sent it
         seated: called when this connection becomes the holder of the seat
         unseated: called when it is the holder no longer
     """
@@ -46,7 +46,7 @@ class Session:
         self.seat = Seat()
         self.stop_state = StopState()
         self.taken: dict[str, StopTaken] = {}  # answers to presses of this connection
-        self.newest_stop = 0  # number of the newest stop that this connection was told of
+        self.newest_stop = 0  # number of the newest stop that this connection knows
         self.participants = Participants(participants=[])
         self.notes: deque[SharedNote] = deque(maxlen=KEPT_NOTES)
         self.seated: Callable[[], None] = _ignore
@@ -83,7 +83,7 @@ class Session:
                     self.unseated()
 
     def stop_shown(self, stop: StopState) -> None:
-        """What the robot says of its stop now."""
+        """The robot's present stop state."""
         self.stop_state = stop
         self.newest_stop = max(self.newest_stop, stop.number)
 
@@ -95,7 +95,7 @@ class Session:
         self.newest_stop = max(self.newest_stop, taken.number)
 
     def confirmed(self, press: str) -> StopState | None:
-        """The stop that `press` became; None as long as nothing says so that was said of this press."""
+        """The stop that `press` became; None as long as no message about this press names it."""
         taken, shown = self.taken.get(press), self.stop_state
         if shown.press == press:
             return shown
@@ -111,7 +111,7 @@ class Session:
         await self._seat(SeatTake() if takes else SeatRequest(only_if_free=True), ANSWER_SECONDS)
 
     async def request_seat(self, seconds: float) -> None:
-        """Raises SeatRefused, also when nobody answers within `seconds`; the claim is withdrawn then."""
+        """Raises SeatRefused, also without an answer within `seconds`; the claim is withdrawn then."""
         try:
             await self._seat(SeatRequest(), seconds)
         except ConsoleLost:

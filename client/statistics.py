@@ -87,7 +87,7 @@ class ConsoleStatistics(msgspec.Struct, frozen=True, kw_only=True):
     command_to_feedback_ms: Percentiles = Percentiles()
     event_rate: float = 0.0  # Hz
     bad_messages: int = 0  # from the console, that could not be read
-    repeats: int = 0  # commands sent again for want of an answer
+    repeats: int = 0  # commands sent again because no answer arrived
     echoes: int = 0  # copies of commands because the path loses packets
 
 

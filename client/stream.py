@@ -149,7 +149,8 @@ class Stream:
         return self.gate.check(medium.stamp, self._age(medium))
 
     def _age(self, medium: Decoded) -> float | None:
-        """Since its capture, in s, if the sender's clock and ours agree; None when the medium does not say."""
+        """Its age in s, if the sender's clock and this one agree; None when the medium does not carry its capture
+        time."""
         return None if medium.captured is None else self._wall_clock() - medium.captured
 
     def _render(self, gated: Gated[Decoded] | None) -> None:
@@ -175,7 +176,7 @@ class Stream:
         self._unread += reader.dropped
 
     def close(self) -> None:
-        """Nothing will come any more: readers read what is there, and end."""
+        """No more media will arrive: readers read the remaining ones, and end."""
         self._closed = True
         for reader in self._readers:
             reader.close()

@@ -29,7 +29,7 @@ MAX_WAITING = 64  # messages that could not leave yet; then the oldest go
 
 
 class LineBlocked(ConnectFailed):
-    """No WebSocket to the console, which answers over HTTP: something between here and there lets none pass."""
+    """No WebSocket to the console, which answers over HTTP: a proxy or firewall on the way lets no WebSocket pass."""
 
 
 class WatchLine:
@@ -122,7 +122,7 @@ class WatchLine:
 
     async def restart_ice(self, seconds: float) -> None:
         """Raises ConnectFailed: there is no ICE in TCP."""
-        raise ConnectFailed("this observer's line to the console is TCP: another path takes another Console")
+        raise ConnectFailed("this observer's WebSocket to the console is TCP: for another path make a new Console")
 
     async def stop_by_http(self, reason: str, press: str) -> StopTaken:
         """The way to stop that needs no line; raises as `Whep.stop`."""
@@ -141,7 +141,7 @@ class WatchLine:
                 async with asyncio.timeout(CLOSE_SECONDS):
                     await self._socket.close()
         except TimeoutError:
-            pass  # the console notices by itself
+            pass  # the console notices without a message
         finally:
             await self._whep.aclose()
 
@@ -189,4 +189,4 @@ class WatchLine:
             async with asyncio.timeout(CLOSE_SECONDS):
                 await self._whep.decline(ticket)
         except (TimeoutError, ConsoleError):
-            pass  # it ends by itself
+            pass  # it ends without being cancelled

@@ -95,9 +95,8 @@ class Whep:
         return [IceServer(each.urls, each.username, each.credential) for each in found]
 
     async def relay(self, peer: str = "") -> RelayTicket | None:
-        """Where the console wants this observer to watch; None: with itself. Raises as `offer`.
-
-        Only `peer`, which is connected, is told what lets it in.
+        """The relay for this observer; None: the console itself. Raises as `offer`. Only for a connected `peer` the
+        answer has the relay's key.
         """
         response = await self._request("GET", f"{self._base}/api/relay{f'?peer={peer}' if peer else ''}")
         try:

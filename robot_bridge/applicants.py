@@ -24,9 +24,8 @@ def address_group(address: str) -> str:
 
 
 class Applicants(Generic[Applicant]):
-    """When there are too many, the oldest of the address that has the most goes.
-
-    So one address only ever takes from itself, and whoever needs less time than it takes to fill all places gets in.
+    """When there are too many, the oldest applicant of the address with the most goes. So an address only ever takes
+    places from itself, and a client that is quicker than all places fill gets in.
     """
 
     def __init__(self, limit: int) -> None:

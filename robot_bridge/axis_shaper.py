@@ -1,7 +1,7 @@
 """From commanded to applied axis values: clamp, slew, hold, brake. No I/O, no clock.
 
 Every value stays inside an envelope around its rest value that closes at the axis' `brake` rate and has closed `hold`
-seconds after the last execution. So a command never outlives `hold`, whatever else happens, and no ramp is ever
+seconds after the last execution. So a command never outlives `hold`, and no ramp is ever
 steeper than `brake` unless ticks were missed. A limiter (position limits, geofences) has the last word.
 """
 
@@ -48,13 +48,13 @@ class AxisShaper:
         self._targets = None
 
     def brake(self, dt: float) -> list[float]:
-        """One step towards rest at the brake rate, whatever was aimed for; the limiter is not asked."""
+        """One step towards rest at the brake rate, from any target; the limiter is not asked."""
         self._targets = None
         self._values = self._braked(dt)
         return list(self._values)
 
     def cut(self) -> None:
-        """The values are at rest from now on, without a ramp: nobody knows what the robot has done meanwhile."""
+        """The values are at rest from now on, without a ramp: the robot's motion meanwhile is unknown."""
         self._targets = None
         self._values = list(self._rest_values)
 
@@ -75,7 +75,7 @@ class AxisShaper:
         return min(max(value, axis.rest - reach), axis.rest + reach)
 
     def _braked(self, dt: float) -> list[float]:
-        """One step of braking from what was applied last."""
+        """One step of braking from the last applied values."""
         return [
             max(axis.rest, value - axis.brake * dt) if value > axis.rest else min(axis.rest, value + axis.brake * dt)
             for value, axis in zip(self._values, self._axes, strict=True)

@@ -55,14 +55,14 @@ class Bridge:
     def __init__(
         self, robot: Robot, settings: BridgeSettings, now: clock.Clock = clock.now, *, liveness: Liveness | None = None
     ) -> None:
-        """`now`: what bounds motion is measured with; it counts suspended time.
+        """`now`: the clock that bounds motion; it counts suspended time.
 
         `liveness`: ends the process when it hangs, which has to be the bridge's alone; None: nothing does.
 
         Raises:
             DescriptionError: the robot's description contradicts itself.
-            InsecureLink: anybody who reaches the address could drive, and the settings do not say that this is wanted.
-            SecretError: the TLS files are no good.
+            InsecureLink: any client that reaches the address could drive, and the settings do not say that this is
+            wanted. SecretError: the TLS files are no good.
         """
         check_link(settings)
         self.description = robot.describe()
@@ -81,7 +81,7 @@ class Bridge:
             start_warning=self.description.start_warning,
         )
         self._keeper = StopKeeper(settings.state_dir, settings.older_state_dirs)
-        self._resetting: tuple[LinkPeer, Reset] | None = None  # who waits for a reset to be on the disk
+        self._resetting: tuple[LinkPeer, Reset] | None = None  # links that wait for a reset to be on the disk
         self._lockout = None if settings.lockout_file is None else LockoutFile(settings.lockout_file)
         self._signal = StartSignal(self.description)
         self._limits = MotionLimits(self.description, robot, robot.tick_seconds)
@@ -100,7 +100,7 @@ class Bridge:
         )
         self._watchdogs = Watchdogs(robot, watchdog_seconds(self.description, robot.tick_seconds), now)
         self._liveness = liveness or Liveness()
-        self._rested_why = ""  # what brought the robot to rest by itself, until a command executes; "": nothing
+        self._rested_why = ""  # why the robot came to rest on its own, until a command executes; "": it did not
         self._log: EventLog | None = None
         self._times = EventTimes()
         self._last_known = LastKnown(self.description)
@@ -210,7 +210,7 @@ class Bridge:
         atexit.unregister(self._rest_at_exit)
 
     def _rest_at_exit(self) -> None:
-        """The process ends and nobody has closed the bridge: its loop is gone."""
+        """The process ends without `close`: the bridge's loop is gone."""
         leaving = self._coming_to_rest()
         leaving.at_once()
         leaving.stop()
@@ -286,7 +286,7 @@ class Bridge:
         self._keeper.answer(peer, stop.press, given.number)
 
     def _note_stop(self, given: StopGiven, by: str, reason: str, press: str = "") -> None:
-        """The robot rests first, whatever else a stop brings with it."""
+        """The robot rests first, before any other effect of a stop."""
         if not given.is_new:
             return
         self._shaper.rest()
@@ -402,7 +402,7 @@ class Bridge:
         return ComingToRest(self._robot, self._shaper, self.description.hold, self._now())
 
     def _fail(self, error: BaseException) -> None:
-        """Latch the stop: whoever starts the bridge again, nothing moves until somebody resets it."""
+        """Latch the stop: after a restart of the bridge no axis moves until a reset."""
         if self._failure:
             return
         self._failure = f"robot failed: {named(error)}"[:500]
@@ -410,7 +410,7 @@ class Bridge:
         self._note_stop(self._core.stop("", "", self._failure, self._now()), "", self._failure)
 
     def _tell_failure(self) -> None:
-        """Feed back what has happened, with what was measured last where nothing can be measured any more."""
+        """Feed back the new state, with the last measured values if the robot cannot be measured any more."""
         try:
             measured = self._robot.measure()
         except BaseException:  # the robot is not to be trusted with anything any more
@@ -460,7 +460,7 @@ class Bridge:
             self._issue()
 
     def _look_at_lockout(self, now: float) -> None:
-        """The switch file, or the robot's own input: whoever stands at the robot comes before whoever is far away."""
+        """The switch file, or the robot's own input: a person at the robot comes before a remote one."""
         file = "" if self._lockout is None else self._lockout.reason
         reason = " · ".join(filter(None, (file, self._robot.locked_out())))[:500]
         if reason == self._core.stop_state.locked_out:
@@ -474,7 +474,7 @@ class Bridge:
             self._note_stop(given, "at the robot", reason)
 
     def _held_up(self, held: Held) -> None:
-        """No tick came for too long: nobody knows what the robot has done, and whoever drives has to begin anew."""
+        """No tick came for too long: the robot's motion meanwhile is unknown, and the operator has to begin anew."""
         self._shaper.cut()
         self._core.need_neutral()
         self.counters.stalls += 1
@@ -501,7 +501,7 @@ class Bridge:
         )
         limits = sorted(self._acted | self._acting)
         feedback = self._core.issue(measured, self._now(), limits, unknown, time=taken)
-        measured_by = time.monotonic()  # what was captured before may show less than this feedback says
+        measured_by = time.monotonic()  # a picture that was captured before may show less than this feedback has
         self._times.changed(feedback.event, measured_by)
         self._acted.clear()
         self.counters.issued += 1
@@ -516,7 +516,7 @@ class Bridge:
         self._record("limit", self._core.current, acting=sorted(acting))
 
     def _note_blind(self, blind: frozenset[str]) -> None:
-        """A deadman that is held until the position is known again must not make the robot start by itself."""
+        """A deadman that is held until the position is known again must not start the robot."""
         begun, self._blind = blind - self._blind, blind
         if begun:
             self._need_neutral()

@@ -1,4 +1,4 @@
-"""Whether a robot's description makes sense: checked by the bridge before it listens, and by whoever connects to it."""
+"""Checks a robot's description: the bridge does so before it listens, and a client when it connects."""
 
 import math
 import unicodedata
@@ -30,14 +30,14 @@ MAX_BODIES = 1024
 MAX_GEOMS = 4096
 MAX_LAYERS = 32
 MAX_LIMITS = 256
-FARTHEST = 1e6  # m, of what is drawn; other numbers of it alike
+FARTHEST = 1e6  # m, of drawn parts; their other numbers too
 MAX_NAME = 200  # characters, of a name or a label
 MAX_BYTES = 60_000  # of JSON: a peer that says nothing else takes messages of 65,536 bytes (RFC 8841 6.1)
 SIDES = range(1, 8193)  # pixels
 FRAME_RATES = 240.0  # Hz
 SAMPLE_RATES = range(8000, 192_001)  # Hz
 CHANNELS = range(1, 9)
-# Characters that end a line, command a terminal, or turn the direction of what is written around them.
+# Characters that end a line, command a terminal, or change the direction of the text around them.
 _CONTROL = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
 
@@ -84,10 +84,8 @@ def check_description(description: RobotDescription) -> None:
 def check_bounds(description: RobotDescription) -> None:
     """Whether it can be shown: how much there is of everything, how far it reaches, and what names hold.
 
-    Enough for one that drives nothing any more, as of a recording; an older one may contradict what is asked for now.
-
-    Raises:
-        DescriptionError: with the first that is too many, too long or cannot be printed.
+    Enough for a description that drives no robot any more, as of a recording; an older one may break newer rules.
+    Raises: DescriptionError: names the first part that is too many, too long or cannot be printed.
     """
     _check_counts(description)
     _check_texts(description)
@@ -133,7 +131,7 @@ def _check_counts(description: RobotDescription) -> None:
 
 
 def _check_reach(description: RobotDescription) -> None:
-    """Of what is drawn: beyond this nothing but numbers that are none comes of it."""
+    """A bound for drawn parts: beyond it, computed numbers are not finite."""
     for body in description.bodies:
         numbers = [*body.position, *body.orientation]
         for joint in body.joints:

@@ -17,7 +17,7 @@ def check_link(settings: BridgeSettings) -> None:
     if settings.tls is not None and settings.tls.authority is not None:
         return
     raise InsecureLink(
-        f"anybody who reaches {settings.host or 'this machine'} could drive the robot: give --link-secret-file, or"
+        f"any client that reaches {settings.host or 'this machine'} could drive the robot: give --link-secret-file, or"
         " --link-tls-cert with --link-tls-ca for client certificates, or --insecure-link if that is wanted"
     )
 

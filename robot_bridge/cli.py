@@ -42,7 +42,7 @@ __all__ = ["main", "robot_app", "run"]
 SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
-# Wrong however often it is tried; the rest may go away by itself, as a robot that is not switched on.
+# Another try cannot mend these errors; the others may end, as a robot that is not switched on yet.
 CANNOT_BE_MEANT = (UnknownRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
 
 _logger = logging.getLogger(__name__)
@@ -68,7 +68,7 @@ def run(
     ] = None,
     lockout_file: Annotated[
         Path | None,
-        typer.Option(help="While this file exists nobody drives; also while its folder cannot be read."),
+        typer.Option(help="While this file exists the robot is locked; also while its folder cannot be read."),
     ] = None,
     event_log: Annotated[
         Path | None, typer.Option(help="Append a JSON line for each event, refusal and medium.")
@@ -86,7 +86,7 @@ def run(
         Path | None, typer.Option(help="Ask clients for a certificate that this one signed.")
     ] = None,
     insecure_link: Annotated[
-        bool, typer.Option(help="Listen beyond loopback although anybody there could drive the robot.")
+        bool, typer.Option(help="Listen beyond loopback although any client there could drive the robot.")
     ] = False,
     event_strip: Annotated[
         bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")
@@ -196,9 +196,9 @@ def _announce(name: str, bridge: Bridge, scheme: str, as_json: bool) -> None:
     url = f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
     typer.echo(json.dumps({"robot": url}) if as_json else f"{name} at {url}")
     sys.stdout.flush()
-    if as_json:  # whoever reads that line may never read on, and a full pipe would hold up the ticks
+    if as_json:  # the reader of that line may never read on, and a full pipe would hold up the ticks
         with contextlib.suppress(OSError):
-            os.dup2(2, 1)  # what is printed from now on goes where the log goes
+            os.dup2(2, 1)  # later output goes to the log
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """The clock by which motion is bounded: it goes on while the machine is suspended.
 
-CLOCK_MONOTONIC stands still then, so that a bridge would wake up with what was left of `hold` and drive on. Capture
+CLOCK_MONOTONIC stands still then, so a bridge would wake up with the remaining `hold` and drive on. Capture
 times of media stay on CLOCK_MONOTONIC, which cameras stamp with; the two are never compared.
 """
 

@@ -17,8 +17,8 @@ _logger = logging.getLogger(__name__)
 class ComingToRest:
     """Call `step` every tick until it returns True, or `at_once` when no more ticks will come; then `stop`.
 
-    Each call of the adapter is guarded by itself, whatever it raises: one that fails keeps no other from being made.
-    The values ramp down at the axes' brake rates. After an `apply` that raised nobody knows what the robot does, so
+    Each call of the adapter is guarded against any exception: a failed call does not prevent the next one.
+    The values ramp down at the axes' brake rates. After an `apply` that raised the robot's motion is unknown, so
     that the rest values follow at once.
     """
 

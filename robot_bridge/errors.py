@@ -33,7 +33,7 @@ class BridgeError(Exception):
 
     Attributes:
         name: stable, lower-case identifier
-        detail: what is wrong and, where known, how to put it right
+        detail: the fault and, where known, the remedy
     """
 
     name = "bridge"

@@ -20,13 +20,13 @@ from robot_bridge.stop_latch import ResetOutcome, ResetTaken, StopGiven, StopLat
 __all__ = ["Absorbed", "Answered", "CommandOutcome", "EventCore", "Executed", "Refused", "draw_nonce"]
 
 REFRESH_INTERVAL = 0.5  # s between issues of the same event while nothing is commanded
-BURST = 2  # events that may come ahead of the event rate: the network bunches what was sent in time
+BURST = 2  # events that may arrive ahead of the event rate: the network bunches timely commands
 MAX_REMEMBERED_ISSUES = 1024  # of the current event; a forgotten issue counts as late
-MAX_NONCE = 2**53 - 1  # what a JavaScript number holds exactly
+MAX_NONCE = 2**53 - 1  # a JavaScript number holds these exactly
 
 
 def draw_nonce() -> int:
-    """Nobody can guess it; never 0, which is what a command without a nonce names."""
+    """A nonce that cannot be guessed; never 0, which stands for a command without a nonce."""
     return 1 + secrets.randbelow(MAX_NONCE)
 
 
@@ -108,7 +108,7 @@ class EventCore:
 
     @property
     def pending(self) -> int | None:
-        """The event that was executed and waits for its feedback; None when there is none."""
+        """The event that was executed and waits for its feedback; None without such an event."""
         return self._pending
 
     @property
@@ -134,7 +134,7 @@ class EventCore:
         return self._interlock.warns(now)
 
     def moves(self, values: Sequence[float]) -> bool:
-        """Whether these values are an intention to move; a light or horn alone is none."""
+        """Whether these values are an intention to move; a light or horn alone is not."""
         return any(
             value != rest and drives
             for value, rest, drives in zip(values, self._rest_values, self._drives, strict=True)
@@ -245,7 +245,7 @@ class EventCore:
             self._issue_wanted = True
 
     def want_issue(self) -> None:
-        """Issue again at the end of this tick (somebody joined)."""
+        """Issue again at the end of this tick (a client joined)."""
         self._issue_wanted = True
 
     def issue_due(self, now: float) -> bool:
@@ -272,7 +272,7 @@ class EventCore:
     ) -> Feedback:
         """The feedback of the pending event, which thereby becomes current, or of the current event again.
 
-        `time`: what it says it was issued at, on the clock of capture times; None: `now`.
+        `time`: its time of issue, on the clock of capture times; None: `now`.
         """
         if self._pending is not None:
             self._current, self._pending = self._pending, None

@@ -41,7 +41,8 @@ _logger = logging.getLogger(__name__)
 
 
 class EventLog:
-    """`record` may be called from the loop at any rate; `close` writes what waits and blocks until it is written."""
+    """`record` may be called from the loop at any rate; `close` writes the waiting lines and blocks until they are
+    written."""
 
     def __init__(self, path: Path) -> None:
         """Appends to `path`.

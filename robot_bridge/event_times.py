@@ -21,7 +21,7 @@ class EventTimes:
             self._changes.append(Stamp(event, now))
 
     def at(self, time: float) -> Stamp | None:
-        """The event that held at `time`; None when that is longer ago than what is remembered."""
+        """The event that held at `time`; None for a time before the remembered events."""
         for change in reversed(self._changes):
             if change.time <= time:
                 return Stamp(change.event, time)

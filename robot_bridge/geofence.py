@@ -1,9 +1,9 @@
 """Geofences: zones on the floor that a base stays inside of, or outside of. No I/O, no clock.
 
-Each edge of a zone is an obstacle of its own. The distance to a segment is a convex function of the place, so a motion
+Each edge of a zone is a separate obstacle. The distance to a segment is a convex function of the place, so a motion
 by `w` comes nearer to the edge by no more than the part of `w` that points from the base to the edge's nearest point.
-Keeping that part below the room to each edge therefore keeps the base on its side of every edge, whatever the
-shape of the zone.
+Keeping that part below the room to each edge therefore keeps the base on its side of every edge, for zones of any
+shape.
 
 The base is the circle that holds it, so turning on the spot is free. Turning while moving swings the motion round:
 until it has ended, an axis may point anywhere within the angle that the turn still covers.
@@ -64,7 +64,7 @@ class Zone:
 
 
 class FenceGuard:
-    """Says what the base's axes ask of all zones."""
+    """Computes the base's demand on all zones."""
 
     def __init__(self, base: PlanarBase, description: RobotDescription, tick_seconds: float) -> None:
         index = {axis.name: number for number, axis in enumerate(description.axes)}

@@ -1,4 +1,5 @@
-"""Addresses from which a link was admitted: their TLS handshakes wait for nobody else's, after a restart too."""
+"""Addresses from which a link was admitted: their TLS handshakes do not wait for those of other addresses, after a
+restart too."""
 
 import os
 from contextlib import suppress

@@ -10,7 +10,7 @@ __all__ = ["LastKnown"]
 
 
 class LastKnown:
-    """Makes measurements fit to be sent: every number is finite, and what is not known is named."""
+    """Makes measurements fit for sending: every number is finite, and unknown ones are named."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._axis_names = [axis.name for axis in description.axes]

@@ -57,10 +57,9 @@ class _Pace:
 
 
 class LinkAcceptor:
-    """Takes over a listening socket. `close` ends it and what is still shaking hands.
-
-    TLS begins when the client's first record is there, whole: a connection that says less costs a descriptor and no
-    more. Addresses from which a link was admitted before do not wait for the handshakes of others.
+    """Takes over a listening socket. `close` ends it and the handshakes under way. TLS begins when the client's first
+    record has arrived whole: a connection that sends less costs only a descriptor. Addresses from which a link was
+    admitted before do not wait for the handshakes of others.
     """
 
     def __init__(
@@ -114,7 +113,7 @@ class LinkAcceptor:
                 await asyncio.wait([accepting])
             if self._writing is not None:
                 await asyncio.wait([self._writing])
-        finally:  # also when the closing is cancelled: nobody comes back to it
+        finally:  # also when the closing is cancelled: no other code closes it
             self._listener.close()
 
     async def _accept(self) -> None:
@@ -173,7 +172,7 @@ def _close_if_cancelled(connection: socket.socket, task: asyncio.Task[None]) -> 
 
 
 async def _first_record(connection: socket.socket) -> None:
-    """Returns when a whole TLS record can be read. Raises OSError when there is none in time."""
+    """Returns when a whole TLS record can be read. Raises OSError when no record arrives in time."""
     async with asyncio.timeout(SILENCE):
         await _readable(connection, TLS_HEADER)
         header = connection.recv(TLS_HEADER, socket.MSG_PEEK)

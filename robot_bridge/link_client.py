@@ -1,4 +1,4 @@
-"""The robot link from the outside: what the console's server uses, and anybody who writes a client."""
+"""The robot link's client, for the console's server and for other programs."""
 
 import asyncio
 import ssl
@@ -87,9 +87,9 @@ class RobotLink:
         """Connect and shake hands. Call once.
 
         Raises:
-            LinkLost: nobody listens there, or nobody answers.
+            LinkLost: no process listens there, or it does not answer.
             LinkRefused: the bridge said goodbye; the detail begins with its stable name, as in "taken: ...".
-            HandshakeError: what listens there is not a bridge of this protocol version.
+            HandshakeError: the process there is not a bridge of this protocol version.
         """
         loop = asyncio.get_running_loop()
         try:

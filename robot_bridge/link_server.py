@@ -61,7 +61,7 @@ class LinkHandler(Protocol):
         """Something else, on a link that lives on; already counted."""
 
     def operator_lost(self) -> None:
-        """The operator link ended, for whatever reason."""
+        """The operator link ended, for any reason."""
 
 
 class LinkPeer(LinkTransport):
@@ -74,7 +74,7 @@ class LinkPeer(LinkTransport):
         super().__init__(session, clock, self._reads)
         self._bridge_session = session
         self._server = server
-        self.name = ""  # what the client calls itself, "console"
+        self.name = ""  # the client's own name, "console"
         self.address = ""  # where it comes from, "10.0.0.9"
 
     def _admit(self, hello: Hello) -> Hello | Goodbye:
@@ -148,7 +148,7 @@ class LinkServer:
 
     @property
     def operator(self) -> LinkPeer | None:
-        """The operator link; None when there is none."""
+        """The operator link; None without one."""
         return self._operator
 
     @property
@@ -251,12 +251,12 @@ class LinkServer:
         return self._hello
 
     def _has_room(self, hello: Hello) -> bool:
-        """The last place is the operator's: whatever others open, a console comes back."""
+        """The last place is the operator's: a console comes back, no matter how many links others open."""
         others = len(self._known) - (self._operator is not None)
         return others < (self._max_links if hello.role == "operator" else self._max_links - 1)
 
     def _is_kept_from(self, name: str) -> bool:
-        """Whether somebody else's operator link broke just now: a stall gives the robot to nobody."""
+        """Whether another client's operator link broke just now: a stall gives the robot to no other client."""
         return self._kept_for not in ("", name) and self._clock() < self._kept_until
 
     def connected(self, peer: LinkPeer) -> None:

@@ -45,7 +45,7 @@ __all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkSta
 PING_INTERVAL = 0.2  # s
 SILENCE = 1.0  # s without a valid message after which the other side is taken for dead, and `ROUND_TRIPS` besides
 ROUND_TRIPS = 4  # in which TCP has found out about a loss and repaired it, though what repairs it may be lost too
-MOST_SILENCE = 5.0  # s, whatever the other side makes of the round trip by late pongs
+MOST_SILENCE = 5.0  # s, even when the other side lengthens the round trip by late pongs
 PINGS_OUT = 64  # of which a pong still tells the round trip
 HELLO_TIMEOUT = 2.0  # s
 OWN_STALL = 0.5  # s between two ticks; more means that we did not look, not that the other side was silent
@@ -82,7 +82,7 @@ class LinkSession:
     def __init__(self, now: float, *, max_frame: int) -> None:
         self.state = LinkState.HANDSHAKE
         self.role: LinkRole | None = None  # the client's role; None before it is known
-        self.ended: Goodbye | None = None  # why it ended, whoever said it; None while it lives
+        self.ended: Goodbye | None = None  # why it ended, by either side; None while it lives
         self.left = False  # the other side ended it because it goes away
         self._reader = FrameReader(max_frame)
         self._allowed: tuple[type[LinkMessage], ...] = ()
@@ -111,13 +111,12 @@ class LinkSession:
 
     @property
     def waits(self) -> bool:
-        """Whether something that came was not read for want of `rate`: call `receive` again when there is some."""
+        """Whether received bytes were not read because `rate` was used up: call `receive` again later."""
         return self.ended is None and self._reader.has_frame
 
     def receive(self, data: bytes, now: float, rate: MessageRate | None = None) -> list[LinkMessage | BadInput]:
-        """What these bytes bring, in order; heartbeats are answered here and not returned.
-
-        `rate`: what it does not allow to be read now waits; None: there is no bound.
+        """The messages in these bytes, in order; heartbeats are answered here and not returned. `rate`: messages beyond
+        it wait; None: no bound.
         """
         events: list[LinkMessage | BadInput] = []
         self._reader.feed(data)
@@ -335,7 +334,7 @@ class ClientSession(LinkSession):
             if message.description is not None:
                 check_description(message.description)
         except DescriptionError as error:
-            return self._reject("description", f"the bridge's description makes no sense: {error}")
+            return self._reject("description", f"the bridge's description is invalid: {error}")
         assert self.role is not None  # set by __init__
         self._measured(now - self._opened)
         self._open(self.role, FROM_ROBOT[self.role], now)
@@ -344,7 +343,7 @@ class ClientSession(LinkSession):
         return message
 
     def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
-        """A feedback that does not fit the description is bad input: nobody could show or record it."""
+        """A feedback that does not fit the description is bad input: no part could show or record it."""
         described = None if self.hello is None else self.hello.description
         if isinstance(message, Feedback) and isinstance(message, self._allowed) and described is not None:
             wrong = misfit(message, described)
@@ -363,7 +362,7 @@ class ClientSession(LinkSession):
         return None
 
     def _is_proven(self, hello: Hello) -> bool:
-        """Without a secret of ours nothing needs to be proven; with one, also an unasked bridge is refused."""
+        """Without a secret the bridge needs no proof; with one, a bridge that did not ask for it is refused too."""
         if self._secret is None:
             return True
         if self._bridge_nonce is None:

@@ -22,11 +22,11 @@ CLOSE_TIMEOUT = 1.0  # s for the goodbye to leave
 
 
 class LinkTransport(asyncio.Protocol):
-    """Feeds the session, sends what it wants sent, and drops a peer that does not read.
+    """Feeds the session, sends its messages, and drops a peer that does not read.
 
     While the socket is full, messages wait in outboxes: one per kind, media per stream, newest wins. At most
-    `HIGH_WATER` bytes and one message are buffered besides. What comes faster than `rate` allows waits in the socket,
-    so that whoever sends it finds that full; nothing is lost.
+    `HIGH_WATER` bytes and one further message are buffered. Messages beyond `rate` wait in the socket, so that the
+    sender finds that full; no message is lost.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class LinkTransport(asyncio.Protocol):
             self._message_rate.refill(now)
         events = self.session.receive(data, now, self._message_rate)
         if self.session.ended is None:
-            self._send_outgoing()  # our hello goes before any answer to what came with theirs
+            self._send_outgoing()  # the own hello leaves before any answer to messages behind the peer's
         for event in events:
             self.received(event)
         self._flush_session(now)

@@ -1,4 +1,4 @@
-"""Ends the process when its control ticks have stopped for good, so that whoever started it starts it again.
+"""Ends the process when its control ticks have stopped for good, so that its service manager starts it again.
 
 By then the watchdog has long brought the robot to rest (`watchdogs.py`). A thread ends the process with a message; the
 kernel's alarm does where that thread cannot run, because native code keeps the interpreter's lock, or cannot write.
@@ -76,7 +76,7 @@ class Liveness:
         self._wind_up()
 
     def close(self) -> None:
-        """The ticks have ended in order. The alarm stays: what is left of the process may hang too. Idempotent."""
+        """The ticks have ended in order. The alarm stays: the rest of the process may hang too. Idempotent."""
         self._closed.set()
         if self._thread.is_alive():
             self._thread.join(BEAT)

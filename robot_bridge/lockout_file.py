@@ -1,4 +1,4 @@
-"""A switch file at the robot: while it exists, nobody drives. A thread looks at it, because a disk may hang."""
+"""A switch file at the robot: while it exists, the robot is locked. A thread looks at it, because a disk may hang."""
 
 import threading
 import time
@@ -8,7 +8,7 @@ from pathlib import Path
 __all__ = ["LockoutFile", "look_at"]
 
 INTERVAL = 0.2  # s between two looks
-PATIENCE = 1.5  # s without a look after which nobody knows
+PATIENCE = 1.5  # s without a look after which the state is unknown
 JOIN_SECONDS = 1.0
 
 

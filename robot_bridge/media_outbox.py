@@ -41,7 +41,7 @@ class NewestOutbox(Generic[Key, Item]):
 
 
 class MediaOutbox(Generic[Item]):
-    """Waiting media of one peer. `Item` is what is sent: the message or its bytes."""
+    """Waiting media of one peer. `Item` is the message or its bytes."""
 
     def __init__(self) -> None:
         self._streams: dict[str, deque[Item]] = {}

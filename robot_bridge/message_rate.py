@@ -1,4 +1,5 @@
-"""How much of what a peer sends is read before others have their turn. No I/O, no clock: the caller hands in `now`."""
+"""A bound on how many of a peer's messages are read before others have their turn. No I/O, no clock: the caller hands
+in `now`."""
 
 __all__ = ["MessageRate"]
 

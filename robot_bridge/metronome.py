@@ -4,7 +4,7 @@ __all__ = ["Metronome"]
 
 
 class Metronome:
-    """Call `wait` before each beat and sleep for what it returns."""
+    """Call `wait` before each beat and sleep for the seconds that it returns."""
 
     def __init__(self, period: float, now: float, *, catch_up: int = 0) -> None:
         """`catch_up`: how many missed beats are made good at once; the rest are skipped and counted."""

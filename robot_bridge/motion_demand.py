@@ -17,12 +17,12 @@ class Demand(NamedTuple):
     axes: tuple[int, ...]  # indices of the axes that are slowed when it is too much
     linear: float  # distance in the joint's unit
     square: float
-    room: float  # what is left; below 0 when the bound was passed
+    room: float  # the remaining room; below 0 when the bound was passed
     is_blind: bool = False  # the position is not known
 
 
 def doubt(limit: str, axes: tuple[int, ...]) -> Demand:
-    """Nothing is known: whatever these axes do is too much."""
+    """The position is unknown: any motion of these axes is too much."""
     return Demand(limit, axes, 1.0, 0.0, 0.0, True)
 
 

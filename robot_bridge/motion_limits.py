@@ -28,11 +28,11 @@ class PositionSense(Protocol):
 
 
 class MotionLimits:
-    """Call once a tick, with what the axes would do and what they would do if they braked.
+    """Call once a tick, with the axes' wanted motion and their motion under braking.
 
     Attributes:
-        acting: names of the limits that slow something now
-        blind: names of those that do so because the position is not known
+        acting: names of the limits that slow an axis now
+        blind: names of the limits that do so because the position is not known
     """
 
     def __init__(self, description: RobotDescription, sense: PositionSense, tick_seconds: float) -> None:
@@ -114,7 +114,7 @@ class MotionLimits:
         return (value - rest) * (braked - rest) >= 0 and abs(value - rest) >= abs(braked - rest)
 
     def _braking(self, number: int, value: float, braked: float) -> float:
-        """Braking, or what was asked for where that is nearer to rest on the same side."""
+        """The braking values, or the wanted ones where they are nearer to rest on the same side."""
         rest = self._rest_values[number]
         same_side = (value - rest) * (braked - rest) > 0
         return value if same_side and abs(value - rest) < abs(braked - rest) else braked

@@ -1,7 +1,7 @@
-"""A link that is read no faster than its share of the thread's time allows: what comes beyond that waits at its source.
+"""A link that is read no faster than its share of the thread's time allows: further data waits at its source.
 
-One event loop of a console serves many robots and all who drive them. A bridge that sends without end, whatever it
-sends, takes half of the loop's time at most with its two links, in turns of a millisecond or two.
+One event loop of a console serves many robots and all their operators. A bridge that sends any data without end takes
+half of the loop's time at most with its two links, in turns of a millisecond or two.
 """
 
 import asyncio
@@ -17,7 +17,7 @@ __all__ = ["PIECE", "READ_BURST", "READ_SHARE", "READ_TURN", "PacedTransport", "
 READ_SHARE = 0.25  # of the thread's time
 READ_BURST = 0.1  # s of it at once
 READ_TURN = 0.001  # s of it in one turn of the loop
-LONG_TURN = 0.01  # s of a turn that are made up for; more was somebody else's processor time
+LONG_TURN = 0.01  # s of a turn that are made up for; a longer turn was another process' time
 PIECE = 4 << 10  # bytes between two looks at the time; a thousand of the shortest messages
 
 
@@ -34,7 +34,7 @@ class ReadBudget:
         self._at = now
 
     def spend(self, worked: float, now: float) -> float:
-        """So much went into what came; returns the seconds until more may be read, 0 for now."""
+        """Account for the seconds spent on received data; returns the seconds until the next read, 0 for now."""
         self._left = min(self._burst, self._left + (now - self._at) * self._share) - worked
         self._at = now
         return max(0.0, -self._left / self._share)

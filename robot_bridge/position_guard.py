@@ -10,9 +10,8 @@ __all__ = ["PositionGuard"]
 
 
 class PositionGuard:
-    """Says what the axes ask of the limit.
-
-    What leads away from the bound is not set off against what leads there: the axes do not all stop at the same time.
+    """Computes the axes' demand on the limit. Motion away from the bound is not set off against motion towards it: the
+    axes do not all stop at the same time.
     """
 
     def __init__(self, limit: PositionLimit, description: RobotDescription, tick_seconds: float) -> None:

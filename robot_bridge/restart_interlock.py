@@ -1,5 +1,5 @@
-"""What keeps a robot from moving on by itself: a neutral command has to come first, and the robot may warn before it
-moves. No I/O, no clock (docs/robot-link.md, "Before the first motion").
+"""Keeps a robot from moving on without its operator: a neutral command has to come first, and the robot may warn before
+it moves. No I/O, no clock (docs/robot-link.md, "Before the first motion").
 """
 
 import math

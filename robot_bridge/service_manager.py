@@ -12,10 +12,10 @@ _logger = logging.getLogger(__name__)
 
 
 class ServiceManager:
-    """Says nothing where nobody listens.
+    """Sends nothing without a listener.
 
     Attributes:
-        watchdog_seconds: it restarts a process that is not `alive` for that long; None: it does not look
+        watchdog_seconds: it restarts a process that is not `alive` for that long; None: no watchdog
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -43,7 +43,7 @@ class ServiceManager:
             self._socket = None
 
     def _say(self, state: bytes) -> None:
-        """Never blocks: what the manager does not take now is lost, as it is with everybody who does not listen."""
+        """Never blocks: a message that the manager does not take now is lost."""
         if not self._address:
             return
         try:
@@ -66,7 +66,7 @@ def _address(name: str) -> bytes:
 
 def _watchdog_seconds(environment: Mapping[str, str]) -> float | None:
     if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
-        return None  # meant for whoever started this process
+        return None  # meant for the parent of this process
     with suppress(ValueError):
         microseconds = int(environment.get("WATCHDOG_USEC", ""))
         return microseconds / 1e6 if microseconds > 0 else None

@@ -16,8 +16,8 @@ class BridgeSettings:
     port: int = 5600  # 0: any free one
     event_log: Path | None = None  # JSON lines of all that happened to events; None writes nothing
     state_dir: Path | None = None  # keeps the latched stop over restarts; None: in memory only, and feedback says so
-    older_state_dirs: tuple[Path, ...] = ()  # what is in these holds where `state_dir` is new
-    lockout_file: Path | None = None  # while it exists, nobody drives; None: there is none
+    older_state_dirs: tuple[Path, ...] = ()  # the state in these holds where `state_dir` is new
+    lockout_file: Path | None = None  # while it exists, the robot is locked; None: no switch file
     first_event: int = FIRST_EVENT  # tests start near the wrap
     max_links: int = 32  # admitted ones
     max_strangers: int = (
@@ -26,6 +26,6 @@ class BridgeSettings:
     operator_grace: float = 10.0  # s that a broken operator link is kept for the client of the same name
     secret: LinkSecret | None = None  # that clients have to know
     tls: LinkTls | None = None
-    insecure: bool = False  # listen beyond loopback although anybody could drive
+    insecure: bool = False  # listen beyond loopback although any client could drive
     event_strip: bool = False  # draw the stamp into raw pictures, for tests and measurements
     log_interval: float = 60.0  # s between log lines with the counters

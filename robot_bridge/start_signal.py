@@ -8,7 +8,7 @@ __all__ = ["StartSignal"]
 
 
 class StartSignal:
-    """Puts the signal's value in the place of whatever its axis would be driven to."""
+    """Replaces the value of the signal's axis."""
 
     def __init__(self, description: RobotDescription) -> None:
         """A description that was checked."""

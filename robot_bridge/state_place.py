@@ -23,7 +23,7 @@ def default_place(robot: str) -> Path:
 def older_places(place: Path, names: Sequence[str]) -> tuple[Path, ...]:
     """Places of the robot from when they were named by port. `names`: that the robot had.
 
-    A bridge that finds nothing in `place` begins with what is in these.
+    A bridge that finds no state in `place` begins with the state in these.
     """
     if place.parent.name != FOLDER:
         return ()

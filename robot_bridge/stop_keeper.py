@@ -22,7 +22,7 @@ __all__ = ["StopAsker", "StopKeeper"]
 
 RETRY = 1.0  # s between two tries to write
 MAX_WAITING = 256  # presses that wait for the disk; a further one is answered as not kept, and its repeat waits anew
-LOOK = 5.0  # s between two looks whether what was written is still there
+LOOK = 5.0  # s between two checks that the files are still there
 CLOSE_TIMEOUT = 3.0  # s for the disk when the bridge ends; after that the next start finds that it did not end in order
 
 _logger = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ class _Waiting(NamedTuple):
 
 
 class StopKeeper:
-    """`open` before the first message, `changed` after whatever may have changed the latch, `close` at the end."""
+    """`open` before the first message, `changed` after each possible change of the latch, `close` at the end."""
 
     def __init__(self, directory: Path | None, older: Sequence[Path] = ()) -> None:
         """`older`: directories whose latch holds where `directory` is new."""
@@ -60,7 +60,7 @@ class StopKeeper:
         self._trouble = ""  # why the disk does not take it; "" while it does
 
     async def open(self, now: float) -> StopLatch:
-        """The latch as it was left, or stopped for what was found; the disk says from now on that a bridge runs.
+        """The latch as it was left, or stopped with the reason found; from now on the disk says that a bridge runs.
 
         Raises:
             StateDirInUse: another bridge uses the directory.
@@ -111,7 +111,7 @@ class StopKeeper:
             self._store.note_end(reason)
 
     async def close(self, *, in_order: bool) -> None:
-        """Write what is not on the disk yet, and with it whether the bridge ended in order. Idempotent."""
+        """Write the changes that are not on the disk yet, and whether the bridge ended in order. Idempotent."""
         store, self._store = self._store, None
         if self._writing is not None:
             self._writing.cancel()

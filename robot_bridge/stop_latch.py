@@ -1,10 +1,10 @@
 """The latched stop: its numbers, the presses behind them, and which reset releases it. No I/O, no clock.
 
 Call `stop`, `reset`, `lock_out` and `let_in` in any order, `may_move` when the robot may move again, and `shown` with
-every stop state that was fed back, twice a second at least. Where the latch is kept on a disk, whatever changes it
-raises `version`: write `record` away from the loop, and call `written` with the version that was written, or could not
-be. Without a disk a reset takes effect at once and nothing is kept.
-Rules and reasons: docs/robot-link.md, "Stop and reset".
+every stop state that was fed back, twice a second at least. Where the latch is kept on a disk, each change raises
+`version`: write `record` away from the loop, and call `written` with the version that was written, or could not be.
+Without a disk a reset takes effect at once and no state is kept. Rules and reasons: docs/robot-link.md, "Stop and
+reset".
 """
 
 import math
@@ -101,10 +101,10 @@ class StopLatch:
         """`record`: as it was left; None before the first run. `numbers_after`: no number up to this is given again.
 
         `keeps`: whether there is a disk that `record` is written to. `now`: a stop that was left counts as new, since
-        nobody knows how long ago it was.
+        its age is unknown.
         """
         record = record or StopRecord()
-        self.version = 0  # of `record`; raised by whatever has to be written
+        self.version = 0  # of `record`; raised by each change that has to be written
         self._state = StopState(
             stopped=record.stopped, by=record.by, reason=record.reason, number=record.number, press=record.press
         )
@@ -165,10 +165,9 @@ class StopLatch:
         return StopGiven(number, is_new=True, latched=latched, overtaken=overtaken)
 
     def may_move(self) -> None:
-        """The robot may move from now on: whatever press comes now is a new stop, be its id a known one or not.
-
-        So no choice of an id keeps a stop from stopping. What is on the disk may still have them: a bridge that starts
-        does not move before this is called again.
+        """The robot may move from now on: each press from now on is a new stop, even with a known id. So no choice of
+        an id keeps a stop from stopping. The disk may still have the old ids: a bridge that starts does not move before
+        this is called again.
         """
         self._presses.clear()
 
@@ -200,7 +199,7 @@ class StopLatch:
     def written(self, version: int, error: str = "") -> WriteOutcome:
         """The record of `version` is on the disk, or could not be written, for a reason in words."""
         if error:
-            self._written = min(self._written, version - 1)  # also what was on the disk and is gone from there
+            self._written = min(self._written, version - 1)  # also a latch that was on the disk and is gone from there
         else:
             self._written = max(self._written, version)
         if self._resetting is None or version < self._resetting[1]:
@@ -228,7 +227,7 @@ class StopLatch:
         return True
 
     def _look(self, now: float) -> None:
-        """After a bridge that was held up the stop counts as new: nobody knows how old the resets are that waited."""
+        """After the bridge was held up the stop counts as new: the age of the waiting resets is unknown."""
         if now - self._shown_at > HELD_UP:
             self._stopped_at = now
 

@@ -1,4 +1,4 @@
-"""The latched stop on the robot's disk: what a state directory means, and how it is read and written.
+"""The latched stop on the robot's disk: the meaning of a state directory, and how it is read and written.
 
 `start_of` is the rule and does no I/O. `StopStore` does it, and blocks: call it from a thread.
 Two files: `stop.json` has the latch; `numbers.json` shows that the directory was used before, has a number that no stop
@@ -57,8 +57,8 @@ class Found(NamedTuple):
     kept: Kept | None  # None: missing or unreadable
     trouble: str = ""  # why it is unreadable, in words; "" when it is missing
     reserved: int = 0  # 0: unknown
-    note: str = ""  # what the bridge before said of its end; "" when it said nothing
-    older: "tuple[Found, ...]" = ()  # what is in the directories that a new one takes the place of
+    note: str = ""  # the reason that the bridge before gave for its end; "" without one
+    older: "tuple[Found, ...]" = ()  # the records of the directories that a new one replaces
 
 
 class Start(NamedTuple):
@@ -144,10 +144,7 @@ class StopStore:
     def write(self, kept: Kept) -> None:
         """Replace the latch in one step; when this returns it has reached the disk.
 
-        A directory that somebody has removed meanwhile is made again.
-
-        Raises:
-            OSError: it has not, or nobody knows.
+        A directory that was removed meanwhile is made again. Raises: OSError: it has not, or that is unknown.
         """
         if not self._has_directory():
             self._take_again()
@@ -165,7 +162,7 @@ class StopStore:
         self._sync_directory()
 
     def is_there(self) -> bool:
-        """Whether what was written is still where the next bridge looks for it."""
+        """Whether the written files are still where the next bridge looks for them."""
         return self._has_directory() and (self._directory / STOP_FILE).exists()
 
     def _has_directory(self) -> bool:

@@ -1,4 +1,4 @@
-"""Names of threads as the kernel has them, for `top -H`, `ps -L` and whoever adds up their processor time."""
+"""Names of threads as the kernel has them, for `top -H`, `ps -L` and measurements of their processor time."""
 
 import threading
 from contextlib import suppress

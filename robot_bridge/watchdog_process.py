@@ -1,12 +1,12 @@
-"""Brings a robot to rest from a process of its own when the bridge is held up or dies.
+"""Brings a robot to rest from a separate process when the bridge is held up or dies.
 
     python -m robot_bridge.watchdog_process SECONDS package.module:function ARGUMENT...
 
-The function is called at once. It returns the call that brings the robot to rest; that call returns False while nobody
+The function is called at once. It returns the call that brings the robot to rest; that call returns False while no node
 listens. The process hears of every tick through a pipe. When no tick comes for SECONDS while the robot moves, it makes
 the call, and makes it again until a tick comes. When the pipe ends while the robot moves, the bridge was killed: the
-process goes on with the call for three seconds after the first that somebody could hear, or for half a minute in all.
-It needs nothing of the bridge's interpreter, so it also works while native code keeps that from running anything.
+process goes on with the call for three seconds after the first call that a listener could get, or for half a minute in
+all. It needs nothing of the bridge's interpreter, so it also works while native code keeps that from running anything.
 """
 
 import logging
@@ -29,12 +29,12 @@ MOVING, RESTING, LEAVING = b"m", b"r", b"q"
 READY, ACTED = b"+", b"!"
 START_SECONDS = 20.0  # for the function's module to be imported and the function to be called
 CLOSE_SECONDS = 2.0
-SAYS_PER_LIMIT = 4  # ticks that are told, at least, in the time without any that counts
+SAYS_PER_LIMIT = 4  # ticks that are reported, at least, in the time after which silence counts
 TRIES = 3
 LAST_ACTS, LAST_INTERVAL = 30, 0.1  # s; when the bridge was killed
-LAST_SECONDS = 30.0  # for somebody to hear of it
+LAST_SECONDS = 30.0  # for a listener to get it
 
-Act = Callable[[], bool | None]  # False: nobody can have heard of it
+Act = Callable[[], bool | None]  # False: no listener can have got it
 
 _logger = logging.getLogger(__name__)
 
@@ -79,10 +79,8 @@ class WatchdogProcess:
         os.set_blocking(process.stdout.fileno(), False)
 
     def ticked(self, now: float, moving: bool) -> None:
-        """A tick begins; `moving`: what it applies is not at rest.
-
-        Raises:
-            RobotUnavailable: the process has ended or does not read: nothing watches over the robot.
+        """A tick begins; `moving`: its values are not at rest. Raises: RobotUnavailable: the process has ended or does
+        not read, so the robot has no watchdog.
         """
         if moving == self._moving and (not moving or now - self._said < self._limit / SAYS_PER_LIMIT):
             return
@@ -146,18 +144,18 @@ def watch(heard: int, said: int, limit: float, act: Act, now: clock.Clock = cloc
 
 
 def _act_for_good(act: Act, said: int, now: clock.Clock) -> None:
-    """The bridge is gone. What listens may not have found this process yet, and nobody says it later."""
+    """The bridge is gone. The listener may not have found this process yet, and no other process sends it later."""
     _logger.error("the bridge is gone: the robot is brought to rest by its watchdog process")
     heard, end = 0, now() + LAST_SECONDS
     while heard < LAST_ACTS and now() < end:
         heard += _act(act, said)
         time.sleep(LAST_INTERVAL)
     if heard == 0:
-        _logger.critical("nobody has heard that the robot has to rest")
+        _logger.critical("no listener got the message that the robot has to rest")
 
 
 def _act(act: Act, said: int) -> bool:
-    """Whether somebody can have heard of it."""
+    """Whether a listener can have got it."""
     is_heard = False
     for _ in range(TRIES):
         try:
@@ -165,7 +163,7 @@ def _act(act: Act, said: int) -> bool:
             break
         except BaseException as error:
             _logger.critical("the watchdog process cannot bring the robot to rest: %r", error)
-    with suppress(OSError):  # nobody hears it any more
+    with suppress(OSError):  # no listener is left
         os.write(said, ACTED)
     return is_heard
 
@@ -183,7 +181,7 @@ def main() -> None:
         signal.signal(number, signal.SIG_IGN)
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     said = os.dup(1)
-    os.dup2(2, 1)  # what a robot's library prints goes where the log goes
+    os.dup2(2, 1)  # output of a robot's library goes to the log
     limit, call, *arguments = sys.argv[1:]
     act = load(call, arguments)
     os.write(said, READY)

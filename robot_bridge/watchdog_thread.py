@@ -35,7 +35,7 @@ class WatchdogThread:
         self._thread.start()
 
     def ticked(self, now: float, moving: bool) -> None:
-        """A tick begins; `moving`: what it applies is not at rest. Cheap: the thread looks by itself."""
+        """A tick begins; `moving`: its values are not at rest. Cheap: the thread does the check."""
         self._last = now
         if moving and not self._moving:
             self._moving = True
@@ -74,7 +74,7 @@ class WatchdogThread:
     def _bring_to_rest(self) -> None:
         if not self._acted:
             _logger.error("no tick for %.3f s: the robot is brought to rest beside the loop", self._now() - self._last)
-        self._acted = True  # before the call: what it did in part counts too
+        self._acted = True  # before the call: a call that ended half-way counts too
         try:
             self._act()
         except BaseException as error:  # the thread lives on and tries again

@@ -35,7 +35,7 @@ class Watchdogs:
         self._now = now
         self._gauge: StallGauge | None = None  # None before the first tick
         self._last = now()
-        self._moved_at = -math.inf  # s, last tick that applied what is not at rest
+        self._moved_at = -math.inf  # s, last tick whose values were not at rest
         self._beside: list[Watchdog] = []
         if robot.rests_from_thread:
             self._beside.append(WatchdogThread(limit, robot.rest_from_thread, now))
@@ -50,21 +50,21 @@ class Watchdogs:
             await asyncio.to_thread(watchdog.start)
 
     def begin(self, now: float, moving: bool) -> Held | None:
-        """Whether the ticks were held up; `moving`: what was applied last is not at rest."""
+        """Whether the ticks were held up; `moving`: the last applied values are not at rest."""
         acted = sum(watchdog.take_acted() for watchdog in self._beside) > 0  # each is asked
         if self._gauge is None:
             self._gauge = StallGauge(self._limit, now)
         seconds, self._last = now - self._last, now
         gap = self._gauge.tick(now, moving)
-        if acted:  # perhaps while the tick before this one began: what it had waited counts
+        if acted:  # perhaps while the tick before this one began: its wait counts
             return Held(max(seconds, self._limit), acted)
         return None if gap is None else Held(seconds, acted)
 
     def ticked(self, now: float, moving: bool) -> None:
-        """The tick goes on; `moving`: what it applies is not at rest.
+        """The tick goes on; `moving`: its values are not at rest.
 
         A robot counts as one that moves until rest has been applied for `limit` seconds: the call that applies it may
-        hang, and what it says may still be on its way when the bridge is killed.
+        hang, and its message may still be on its way when the bridge is killed.
 
         Raises:
             RobotUnavailable: the watchdog process is gone, so that nothing watches over the robot.

@@ -21,7 +21,7 @@ _UNKNOWN = re.compile(r"^Object contains unknown field `(.*)`$", re.DOTALL)
 
 
 class SettingsPlace(ValueError):
-    """A value contradicts others: raised by whoever knows what it means, and located by `YamlFile.error`."""
+    """A value contradicts others: raised by the code that knows its meaning, and located by `YamlFile.error`."""
 
     def __init__(self, keys: tuple[Key, ...], detail: str) -> None:
         super().__init__(keys, detail)
@@ -112,7 +112,7 @@ class _Reader:
         if node.id == "sequence":
             return [self.plain(item, (*keys, index), depth + 1) for index, item in enumerate(node.value)]
         value = self._loader.construct_object(node)
-        # YAML 1.1 takes 1e-3 for text because it has no dot; nobody who writes that means text.
+        # YAML 1.1 takes 1e-3 for text because it has no dot; the writer never means text.
         return float(value) if isinstance(value, str) and node.style is None and _is_number(value) else value
 
     def _map(self, node: Any, keys: tuple[Key, ...], depth: int) -> dict[str, Any]:

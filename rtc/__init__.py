@@ -3,15 +3,15 @@
 Begin at `rtc.endpoint.Endpoint`, the shell, or at `rtc.peer.Peer`, which puts the cores together.
 
 Every protocol is a core that opens no socket, starts no task and reads no clock. `now` is seconds of one monotonic
-clock, and randomness is handed in, so that a test repeats exactly. All cores have one shape:
+clock, and the caller passes in randomness, so that a test repeats exactly. All cores have one shape:
 
-    core.receive_datagram(data, path, now)  # what came in; bad input is dropped and counted, never raised
+    core.receive_datagram(data, path, now)  # received; bad input is dropped and counted, never raised
     core.handle_timer(now)                  # call when `timer()` is due
     core.datagrams_to_send()                # send these; drained
     core.events()                           # frozen dataclasses; drained
     core.timer()                            # when `handle_timer` is due next; None: never
 
-`DtlsConnection` and `DataChannels` lie inside one path and are given no address. OpenSSL reads a clock of its own.
+`DtlsConnection` and `DataChannels` lie inside one path and are given no address. OpenSSL reads its own clock.
 
 After each `receive_datagram`, `handle_timer` or call of yours, drain the other two and ask for the timer again.
 This package imports nothing else of this repository.

@@ -9,7 +9,7 @@ Transport = Literal["udp", "tcp"]  # tcp: datagrams framed as in RFC 4571 on one
 
 
 class Path(NamedTuple):
-    """One way between an address of ours and one of a peer's. An answer takes the path of the question."""
+    """One way between a local address and an address of a peer. An answer takes the path of the question."""
 
     local: Address
     remote: Address

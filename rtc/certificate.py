@@ -12,7 +12,7 @@ from rtc.fingerprint import Fingerprint, fingerprint_of
 __all__ = ["Certificate"]
 
 VALID_DAYS = 30  # RFC 8827 4.3.2.3 is of browsers, which generate one for as long
-SKEW_DAYS = 1  # clocks of peers may be behind ours
+SKEW_DAYS = 1  # clocks of peers may be behind this one
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,8 @@ class Certificate:
 
     @classmethod
     def for_key(cls, key: ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey) -> "Certificate":
-        """A new certificate for `key`. It names nobody, so that two sessions cannot be told to be of one person."""
+        """A new certificate for `key`. It has no name, so that no observer can tell that two sessions belong to one
+        person."""
         name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "WebRTC")])
         now = datetime.datetime.now(tz=datetime.UTC)
         builder = (

@@ -218,7 +218,8 @@ class DataChannels:
             self._watched.add(channel)
 
     def close(self, channel: int, now: float) -> None:
-        """Close it when what waits on it has left. `ChannelClosed` follows. Nothing for a channel that is not there."""
+        """Close it when its waiting messages have left. `ChannelClosed` follows. No effect on a channel that does not
+        exist."""
         target = self._channels.get(channel)
         if target is None or target.state is _State.CLOSING:
             return
@@ -247,7 +248,7 @@ class DataChannels:
         return self.association.timer()
 
     def handle_timer(self, now: float) -> None:
-        """Repeat what nobody has acknowledged."""
+        """Repeat unacknowledged messages."""
         self.association.handle_timer(now)
         self._take_events(now)
 

@@ -4,7 +4,7 @@
     dtls.start(now)
     ... then as every core: `receive_datagram`, `handle_timer`; drain `datagrams_to_send` and `events`; `timer`
 
-OpenSSL keeps a clock of its own for its retransmissions and has no way to be handed another. This is therefore the one
+OpenSSL keeps its own clock for its retransmissions and cannot be given another. This is therefore the one
 core here that is not wholly handed the time: `timer()` translates what OpenSSL reports, and `handle_timer` lets it look
 at its own clock. Called too early, it does nothing and asks again.
 """
@@ -210,7 +210,7 @@ class DtlsConnection:
         if len(data) > MAX_PLAINTEXT:
             raise DtlsMessageTooLong(len(data))
         if not data:
-            return  # an empty record would tell nobody anything
+            return  # an empty record would tell the peer nothing
         try:
             self._ssl.send(data)
         except SSL.Error as error:
@@ -237,7 +237,7 @@ class DtlsConnection:
         return events
 
     def timer(self) -> float | None:
-        """When `handle_timer` is due: a little late rather than early, as OpenSSL's clock is not ours."""
+        """When `handle_timer` is due: a little late rather than early, because OpenSSL has its own clock."""
         return self._timer
 
     # OpenSSL

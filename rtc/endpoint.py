@@ -52,13 +52,13 @@ class TooManyPeers(RuntimeError):
 
 
 class Turns(Protocol):
-    """Gives connections their turns: what their peers send is handled then, and keeps nobody else waiting."""
+    """Gives connections their turns: the packets of their peers are handled then, and delay no other connection."""
 
     def may_go_at_once(self) -> bool:
         """Whether one datagram more need not wait. Asked only where none waits."""
 
     def add(self, connection: "Connection") -> None:
-        """Call its `handle_next` until that returns False. It may be among those that wait already."""
+        """Call its `handle_next` until that returns False. It may be waiting already."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class Connection:
         self.fault: Exception | None = None  # what serving it has raised, after PeerEnded("failed")
         self._waiting: deque[PeerEvent] = deque()
         self._arrived = asyncio.Event()
-        self._ended = False  # PeerEnded is among those that wait, or was read
+        self._ended = False  # PeerEnded waits, or was read
 
     # Negotiation: as of `Peer`
 
@@ -130,7 +130,7 @@ class Connection:
         return answer
 
     def restart(self, candidates: Sequence[LocalCandidate] | None = None) -> Fragment:
-        """`candidates`: None: those of the endpoint now."""
+        """`candidates`: None: the endpoint's present ones."""
         fragment = self.peer.restart(self._loop.time(), self._endpoint.candidates if candidates is None else candidates)
         self.flush()
         return fragment
@@ -263,16 +263,16 @@ class Connection:
         self.settle()
 
     def settle(self) -> None:
-        """As `flush`; what it raises ends this connection and nothing else."""
+        """As `flush`; an exception ends this connection and no other."""
         try:
             self.flush()
         except Exception as error:
             self._fail(error)
 
     def _fail(self, error: Exception) -> None:
-        """A peer has sent what nothing here expects: a fault of ours, which others shall not feel.
+        """A peer has sent something unexpected: a fault of this package, which other peers must not feel.
 
-        A listener finds it in `fault`; where there is none, the loop's exception handler is told.
+        A listener finds it in `fault`; without a listener, the loop's exception handler is told.
         """
         if self.fault is not None:
             return
@@ -288,7 +288,7 @@ class Connection:
         self._endpoint.forget(self)
 
     def flush(self) -> None:
-        """Send what is due, hand out what happened, and set the timer anew. Call it after you used `peer` itself."""
+        """Send the due datagrams, hand out the events, and set the timer anew. Call it after you used `peer` itself."""
         if self.fault is not None:
             return
         self._hand_out(self.peer.events())
@@ -313,7 +313,7 @@ class Connection:
             self._keep(event)
 
     def _tell(self, listener: Listener, events: Sequence[PeerEvent]) -> None:
-        """In order, also when the listener's own doing makes further events. What it raises is a fault of its own."""
+        """In order, also when the listener causes further events. An exception is the listener's own fault."""
         self._waiting.extend(events)
         if self._telling:
             return
@@ -344,7 +344,7 @@ class Connection:
         self._arrived.set()
 
     def _set_timer(self) -> None:
-        """A timer that fires too early is left: most are put off by the next datagram, and nobody waits for them."""
+        """A timer that fires too early is left: the next datagram puts off most of them, and no code waits for them."""
         due = self.peer.timer()
         if due is None and self._timer is not None:
             self._timer.cancel()
@@ -373,7 +373,7 @@ class Connection:
 
 
 class Endpoint:
-    """Many peers on one UDP port. `counts` has what was dropped before it reached a peer."""
+    """Many peers on one UDP port. `counts` has the datagrams that were dropped before they reached a peer."""
 
     def __init__(
         self,
@@ -461,7 +461,7 @@ class Endpoint:
 
     @property
     def candidates(self) -> list[LocalCandidate]:
-        """Of our own addresses, and of those that servers have told."""
+        """Of the local addresses, and of those that servers reported."""
         tcp = self._number if self._tcp is not None else None
         return [*gather(self._hosts, self._number, tcp, self._advertised), *self._told]
 
@@ -481,9 +481,8 @@ class Endpoint:
         self._hosts = [host for host in hosts if host in bound]
 
     async def ask(self, servers: Sequence[IceServer]) -> list[RelayRefused | OSError]:
-        """Ask STUN servers how they see us, and TURN servers for addresses; `candidates` has what they told.
-
-        Addresses of earlier answers that carry nothing are given back. Returns why servers gave none.
+        """Ask STUN servers for the mapped address, and TURN servers for relayed ones; `candidates` has the answers.
+        Earlier relayed addresses that carry no data are given back. Returns the reasons of servers without an answer.
         """
         self._give_back_unused()
         uris = server_uris(servers, self.counts)
@@ -532,7 +531,7 @@ class Endpoint:
         ]
 
     async def _until_answered(self, probes: Sequence[MappedAddress]) -> None:
-        """As soon as one is, which is enough: those of other addresses may have no way there."""
+        """As soon as one is, which is enough: sockets on other addresses may have no way there."""
         while not any(each.mapped is not None for each in probes) and not all(each.done for each in probes):
             due = min((each for each in (probe.timer() for probe in probes) if each is not None), default=None)
             self._probed.clear()

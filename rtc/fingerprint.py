@@ -1,4 +1,4 @@
-"""Fingerprints of certificates (RFC 8122): what a session description says of the certificate to expect."""
+"""Fingerprints of certificates (RFC 8122): the hashes of the expected certificate in a session description."""
 
 import re
 from collections.abc import Sequence
@@ -50,6 +50,6 @@ def is_expected(certificate: x509.Certificate, expected: Sequence[Fingerprint]) 
     """Whether `certificate` has one of the fingerprints of the strongest hash that `expected` and we have."""
     for algorithm in SUPPORTED_HASHES:
         of_this = [each for each in expected if each.algorithm == algorithm]
-        if of_this:  # RFC 8122 5: those of weaker hashes are not looked at
+        if of_this:  # RFC 8122 5: weaker hashes are ignored
             return fingerprint_of(certificate, algorithm) in of_this
     return False

@@ -79,7 +79,7 @@ class PeerSettings:
     ice: IceSettings = field(default_factory=IceSettings)
     dtls: DtlsSettings = field(default_factory=DtlsSettings)
     sctp: SctpSettings = field(default_factory=SctpSettings)
-    # Whether an answer of ours opens DTLS, where the offer leaves the choice (RFC 8842 5.3). The peer knows first that
+    # Whether an own answer opens DTLS, where the offer leaves the choice (RFC 8842 5.3). The peer knows first that
     # ICE has found a path, when it is the one that asks for one.
     setup: Setup = "passive"
     epoch: float = 0.0  # s since 1970 at which the clock of `now` was 0; for sender reports
@@ -88,7 +88,7 @@ class PeerSettings:
 
 @dataclass(frozen=True, slots=True)
 class OfferedMedia:
-    """A section of an offer of ours."""
+    """A section of an own offer."""
 
     mid: str
     kind: str  # "audio" or "video"
@@ -118,10 +118,9 @@ class Peer:
         """
         Args:
             context: from `rtc.dtls.dtls_context`; `fingerprint` is of its certificate.
-            candidates: where the peer may reach us.
-            controlling: whether we decide on the path: who offers does, and who answers a lite agent (RFC 8445 6.1.1).
-            directory: of the `rtc.ice.port.Port` whose sockets it shares.
-            random: nobody may foresee it: a SystemRandom except in tests.
+            candidates: the addresses for the peer. controlling: whether this side decides on the path: the offerer
+            does, and a side that answers a lite agent (RFC 8445 6.1.1). directory: of the `rtc.ice.port.Port` whose
+            sockets it shares. random: must be unpredictable: a SystemRandom except in tests.
         """
         self.settings = settings or PeerSettings()
         self.counts: Counter[str] = Counter()
@@ -134,7 +133,7 @@ class Peer:
         self._identity = Identity.new(self._random)
         self._session_id = self._random.getrandbits(62)  # RFC 8829 5.2.1
         self._ssrcs: dict[str, _Ssrcs] = {}  # by mid
-        self._offer: SessionDescription | None = None  # ours, until it is answered
+        self._offer: SessionDescription | None = None  # the own offer, until it is answered
         self._dtls: DtlsConnection | None = None  # None until both descriptions are known
         self._held: deque[bytes] = deque(maxlen=self.settings.held)
         self.channels: DataChannels | None = None  # None when there are none
@@ -185,20 +184,20 @@ class Peer:
     def accept(self, answer: SessionDescription, now: float) -> None:
         """The peer's answer to our offer. Raises SdpError; RuntimeError without an offer that waits for one."""
         if self._offer is None:
-            raise RuntimeError("there is no offer of ours to answer")
+            raise RuntimeError("no own offer waits for an answer")
         check_answer(self._offer, answer)
         ours = [replace(section, direction=reverse(section.direction)) for section in answer.sections]
         self._offer = None
         self._negotiated(answer, answer, ours, now)
 
     def add_candidate(self, line: str) -> None:
-        """One more of the peer's, "candidate:…" (RFC 8838). What nobody understands is counted and ignored."""
+        """One more of the peer's, "candidate:…" (RFC 8838). An unknown candidate is counted and ignored."""
         try:
             self.ice.add_remote_candidate(parse_candidate(line))
         except CandidateError:
             self.counts["candidate_malformed"] += 1
 
-    # A restart of ICE: what is encrypted stays, the path changes (RFC 8445 9, RFC 8842 5.1)
+    # A restart of ICE: DTLS and SRTP stay, the path changes (RFC 8445 9, RFC 8842 5.1)
 
     @property
     def tagged(self) -> MediaSection:
@@ -287,7 +286,7 @@ class Peer:
     def _negotiated(
         self, remote: SessionDescription, answer: SessionDescription, ours: Sequence[MediaSection], now: float
     ) -> None:
-        """`ours`: the answer's sections with our direction."""
+        """`ours`: the answer's sections with the own direction."""
         self._now = now
         self._tagged = next(iter(answer.accepted), None)
         media = [
@@ -330,9 +329,8 @@ class Peer:
     # Media without stages
 
     def take_plain_packets(self) -> None:
-        """Hand out what comes decrypted and unread, as PlainRtp and PlainRtcp: for somebody who only counts.
-
-        Nothing reports on it then, or asks for what is missing.
+        """Hand out packets decrypted and unread, as PlainRtp and PlainRtcp, for a receiver that only counts. Then this
+        package sends no reports on them, and no requests for missing ones.
         """
         self._plain_packets = True
 
@@ -525,7 +523,7 @@ class Peer:
     # What every core has
 
     def receive_datagram(self, data: bytes, path: Path, now: float) -> None:
-        """From the peer, as far as `rtc.ice.port.Port` can say; whatever it is."""
+        """A datagram from the peer, as far as `rtc.ice.port.Port` can say, of any kind."""
         self._now = now
         if self._ended:
             self.counts["ended"] += 1
@@ -606,7 +604,7 @@ class Peer:
                 self._stir_media()
 
     def _settle(self, now: float) -> None:
-        """Hand on what one core tells the next, and tell the application."""
+        """Pass the cores' events to one another, and to the application."""
         for event in self.ice.events():
             if isinstance(event, PathChanged):
                 self._events.append(PathFound(event.path))
@@ -669,7 +667,7 @@ class Peer:
     # Inside: the way out
 
     def _collect(self) -> None:
-        """Take from each core what is due, the innermost first."""
+        """Take the due data from each core, the innermost first."""
         if self._ended:
             return
         self._out += self.ice.datagrams_to_send()
@@ -685,7 +683,7 @@ class Peer:
             self._media_unsent = False
             sent += self._protected(self._protect.protect_rtcp, self.streams.rtcp_to_send())
             sent += self._protected(self._protect.protect, self.streams.rtp_to_send())
-        if path is not None:  # where there is none, everything is as good as lost, and repeated as such
+        if path is not None:  # without a path every packet is as good as lost, and repeated as such
             self._out += [Datagram(data, path) for data in sent]
 
     def _protected(self, protect: Callable[[bytes], bytes], packets: Iterable[bytes]) -> Iterator[bytes]:

@@ -1,4 +1,4 @@
-"""What a peer tells whoever uses it. Events of its data channels are in `rtc.channels`."""
+"""The events of a peer for its user. Events of its data channels are in `rtc.channels`."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -40,7 +40,7 @@ class Connected:
 
 @dataclass(frozen=True, slots=True)
 class PacketReceived:
-    """A packet of the peer's stream in section `mid`, decrypted. It may come before one that it follows."""
+    """A packet of the peer's stream in section `mid`, decrypted. It may arrive before an earlier one."""
 
     mid: str
     packet: RtpPacket

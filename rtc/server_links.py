@@ -13,9 +13,7 @@ from rtc.turn.servers import IceServer, ServerUri
 
 __all__ = ["RelayLink", "RelayRefused", "open_relay"]
 
-MAX_UNSENT = (
-    256 * 1024
-)  # bytes that wait on a TCP connection to a server; what comes then is lost, as UDP would lose it
+MAX_UNSENT = 256 * 1024  # bytes that wait on a TCP connection to a server; further data is lost, as UDP would lose it
 
 
 class RelayRefused(ConnectionError):
@@ -31,9 +29,8 @@ class RelayRefused(ConnectionError):
 
 
 class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
-    """One allocation and the socket to its server. `relayed` is where peers reach us; None when there is none (more).
-
-    `counts` has what was dropped, by reason.
+    """One allocation and the socket to its server. `relayed` is the address for peers; None before and after the
+    allocation. `counts` has dropped datagrams, by reason.
     """
 
     def __init__(self, uri: ServerUri, server: IceServer, on_data: Callable[[bytes, Path], None]) -> None:
@@ -43,7 +40,7 @@ class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
             server.username or "", server.credential or "", secrets.token_bytes, reliable=self._reliable
         )
         self.counts: Counter[str] = self._core.counts
-        self.mapped: Address | None = None  # ours, as the server sees it
+        self.mapped: Address | None = None  # the own address, as the server sees it
         self.answered: asyncio.Future[None] = self._loop.create_future()
         self._on_data = on_data
         self._stream = TurnStream()
@@ -138,10 +135,8 @@ class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
 
 
 async def open_relay(uri: ServerUri, server: IceServer, on_data: Callable[[bytes, Path], None]) -> RelayLink:
-    """An address on a TURN server. `on_data` gets what comes there, with its path.
-
-    Raises:
-        RelayRefused: the server refuses, or says nothing.
+    """An address on a TURN server. `on_data` gets the datagrams that arrive there, with their path. Raises:
+    RelayRefused: the server refuses, or does not answer.
         OSError: it cannot be reached.
     """
     loop = asyncio.get_running_loop()

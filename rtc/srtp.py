@@ -60,7 +60,7 @@ class SrtpKeys:
 
     profile: SrtpProfile
     local: bytes = field(repr=False)  # for what we send
-    remote: bytes = field(repr=False)  # for what the peer sends
+    remote: bytes = field(repr=False)  # for the peer's packets
 
     @classmethod
     def split(cls, profile: SrtpProfile, material: bytes, is_client: bool) -> "SrtpKeys":
@@ -101,7 +101,7 @@ class SrtpSender:
 
 
 class SrtpReceiver:
-    """Decrypts what the peer sends. Whatever is not the peer's is dropped and counted.
+    """Decrypts the peer's packets. Other packets are dropped and counted.
 
     `counts`: "authentication" (not from this peer), "replay" (seen before or too old), "sources" (more SSRCs than
     MAX_SOURCES), "malformed".
@@ -133,7 +133,7 @@ class SrtpReceiver:
         except ValueError:  # longer than pylibsrtp's buffer
             self.counts["malformed"] += 1
             return None
-        self._sources.add(source)  # only now: anybody can write an SSRC
+        self._sources.add(source)  # only now: any sender can write an SSRC
         return plain
 
 

@@ -1,7 +1,7 @@
 """STUN messages (RFC 8489) with the attributes that ICE needs (RFC 8445 16.1), and short-term credentials.
 
-`parse` takes bytes of anybody and raises nothing but `StunError`. Whether a message is authentic is another question:
-ask `is_authentic` with the password before believing anything it says.
+`parse` takes bytes of any sender and raises only `StunError`. Whether a message is authentic is another question:
+ask `is_authentic` with the password before trusting its content.
 """
 
 import hmac
@@ -91,7 +91,7 @@ class Message:
     kind: Kind
     transaction: bytes  # 12 bytes
     method: int = BINDING
-    username: str | None = None  # "evtj:h6vY": who is asked, a colon, who asks
+    username: str | None = None  # "evtj:h6vY": the receiver's name, a colon, the sender's
     priority: int | None = None  # of the peer-reflexive candidate that this check may show, 1 to 2³¹ − 1
     use_candidate: bool = False
     controlling: int | None = None  # tie-breaker, 64 bits
@@ -185,16 +185,15 @@ def is_authentic(data: bytes, password: str | bytes) -> bool:
 
 
 def transaction_of(data: bytes) -> tuple[Kind, bytes] | None:
-    """The class and transaction of what may be STUN, without a further look; None if it cannot be STUN."""
+    """The class and transaction of a datagram that may be STUN, without a further check; None if it cannot be STUN."""
     if len(data) < HEADER.size or data[0] & 0xC0 or data[4:8] != b"\x21\x12\xa4\x42":
         return None
     return Kind(int.from_bytes(data[:2]) & 0x110), bytes(data[8:20])
 
 
 def username_of(data: bytes) -> str | None:
-    """The USERNAME of what may be a request, without a look at the rest: cheap for whoever sorts many datagrams.
-
-    None where there is none, or it is malformed.
+    """The USERNAME of a datagram that may be a request, without parsing the rest: cheap for sorting many datagrams.
+    None without a USERNAME, or when malformed.
     """
     position, end = HEADER.size, min(len(data), MAX_MESSAGE)
     for _ in range(MAX_ATTRIBUTES):

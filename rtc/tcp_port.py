@@ -21,7 +21,7 @@ __all__ = ["TcpPort", "TcpPortSettings"]
 BACKLOG = 128
 PAUSE = 0.1  # s, when the system has no descriptor left, or too many connect
 TCP_NOTSENT_LOWAT = getattr(socket, "TCP_NOTSENT_LOWAT", 25)  # linux/tcp.h; Python does not name it everywhere
-KERNEL_UNSENT = 32 * 1024  # bytes; what waits longer waits here, where it is counted and bounded
+KERNEL_UNSENT = 32 * 1024  # bytes; further data waits here, where it is counted and bounded
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +31,12 @@ class TcpPortSettings:
     accept_burst: float = 100.0  # connections at once
     strangers: int = 64  # connections on which no check has been authentic
     patience: float = 10.0  # s until a stranger is closed, or a connection that no session uses any more
-    unsent: int = 128 * 1024  # bytes that wait for the network; what comes then is lost, as UDP would lose it
+    unsent: int = 128 * 1024  # bytes that wait for the network; further data is lost, as UDP would lose it
     unsent_urgent: int = 256 * 1024  # the same of urgent datagrams, for which there is room when others have filled it
 
 
 class TcpPort:
-    """`counts` has what was dropped or refused, by reason."""
+    """`counts` has dropped and refused ones, by reason."""
 
     def __init__(
         self,

@@ -20,10 +20,10 @@ from rtc.addresses import Address, Datagram, Path
 __all__ = ["MAX_BACKLOG", "MAX_DATAGRAM", "UdpSocket"]
 
 MAX_DATAGRAM = 2048  # bytes that come in: more than a path of Ethernet carries
-MAX_BATCH = 64  # datagrams of one `receive`, so that who sends much does not keep others waiting
+MAX_BATCH = 64  # datagrams of one `receive`, so that a fast sender does not keep others waiting
 MAX_BACKLOG = 2048  # datagrams of each kind that wait for the kernel: 50 ms at 40,000 a second
 MAX_SEGMENTS = 64  # of one message (UDP_MAX_SEGMENTS of older kernels)
-MAX_MESSAGE = 65000  # bytes of one message before it is cut, below what the length field of IPv4 can say
+MAX_MESSAGE = 65000  # bytes of one message before it is cut, below the maximum of IPv4's length field
 MAX_REFUSALS = 100  # messages that the kernel would not cut, until nothing is combined any more
 MAX_KNOWN = 4096  # paths that are remembered; strangers' come and go
 BUFFER_BYTES = 1 << 21  # of the kernel, each way: pictures for hundreds of peers; it may grant less
@@ -139,16 +139,16 @@ class UdpSocket:
         queue, name = (self._urgent, "backlog_urgent") if urgent else (self._others, "backlog")
         queue.extend(datagrams)
         while len(queue) > MAX_BACKLOG:
-            queue.popleft()  # what has waited longest is worth least
+            queue.popleft()  # the oldest datagram is worth least
             self.counts[name] += 1
 
     def flush(self) -> None:
-        """Send what waits, urgent datagrams first, until the kernel takes no more."""
+        """Send the waiting datagrams, urgent ones first, until the kernel takes no more."""
         while self.wants_write and self._send(self._next_message()):
             pass
 
     def _next_message(self) -> Message:
-        """The next datagram, and those that can leave with it."""
+        """The next datagram, and others that can leave with it."""
         waiting = chain(self._urgent, self._others)
         first = next(waiting)
         message = Message([first.data], first.path)
@@ -192,7 +192,7 @@ class UdpSocket:
         return True
 
     def _origin(self, host: str) -> list[Ancillary]:
-        """The packet information that makes a datagram leave from that address of ours.
+        """The packet information that makes a datagram leave from that local address.
 
         Raises:
             OSError: no IP address of this socket's version.
@@ -223,7 +223,7 @@ def _address(sender: tuple[str, int] | tuple[str, int, int, int]) -> Address:
 
 
 def _tells_local_addresses(sock: socket.socket) -> bool:
-    """Ask the kernel to say of each datagram which address of ours it came to."""
+    """Ask the kernel for the local address at which each datagram arrived."""
     try:
         if sock.family == socket.AF_INET:
             sock.setsockopt(socket.IPPROTO_IP, IP_PKTINFO, 1)
@@ -244,6 +244,6 @@ def _supports_segments(sock: socket.socket) -> bool:
 
 def _remember(entries: dict[Key, Value], key: Key, value: Value) -> Value:
     if len(entries) >= MAX_KNOWN:
-        entries.clear()  # whoever is still there comes back with the next datagram
+        entries.clear()  # a peer that is still there sends another datagram
     entries[key] = value
     return value

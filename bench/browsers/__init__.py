@@ -1,1 +1,1 @@
-"""Real browsers and a real sound card, for whoever measures or tests with them."""
+"""Real browsers and a real sound card, for measurements and tests."""

@@ -13,8 +13,8 @@ __all__ = ["PAD", "chromium_program", "missed_in_page", "open_page", "running_ch
 
 PAD = Path(__file__).with_name("test_pad.js")
 # The switch replaces Playwright's own, whose list these are, but for the last three. With WebUIOmnibox… every window
-# loads two pages for suggestions below an address bar that nobody sees, which costs more than the page that is tested;
-# with SpareRenderer… it starts a process for a page that nobody opens.
+# loads two pages for suggestions below an unseen address bar, which costs more than the tested page;
+# with SpareRenderer… it starts a process for a page that is never opened.
 DISABLED_FEATURES = (
     "AvoidUnnecessaryBeforeUnloadCheckSync",
     "DestroyProfileOnBrowserClose",
@@ -43,7 +43,7 @@ FLAGS = [
 ]
 
 
-ASKED_SECONDS = 5.0  # what the page waits for one answer
+ASKED_SECONDS = 5.0  # the page's wait for one answer
 ANSWER_SECONDS = 15.0  # for it to come
 
 
@@ -97,9 +97,8 @@ async def open_page(
 
 
 async def missed_in_page(page: Page, script: str, seconds: float) -> str | None:
-    """What `script`, a function of milliseconds, found instead of what it waits for; None once it has that.
-
-    It is asked again every few seconds: an answer is lost where the page turns to another document meanwhile.
+    """The last value of `script`, a function of milliseconds, while it waits; None once its wait is over. It is asked
+    again every few seconds: an answer is lost where the page turns to another document meanwhile.
     """
     end = time.monotonic() + seconds
     while True:

@@ -1,4 +1,4 @@
-"""The page as its user handles it, and what it says of itself, for tests in Chromium."""
+"""The page as its user handles it, and its statistics, for tests in Chromium."""
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping
@@ -57,7 +57,7 @@ READ_STRIP = """(name) => {
 }"""
 
 
-# The hook comes with what the page loads after its first picture.
+# The hook is in the code that the page loads after its first picture.
 STATISTICS = """new Promise((resolve) => {
   const look = () => (window.lockstep ? resolve(window.lockstep.stats()) : setTimeout(look, 20));
   look();

@@ -23,12 +23,12 @@ class OneToOneNat:
         return _with_address(packet, SOURCE, self._inner, self._outer)
 
     def inward(self, packet: bytes) -> bytes | None:
-        """An IPv4 packet from outside as it arrives; None: it is for nobody here, not even for the inner address."""
+        """An IPv4 packet from outside as it arrives; None: no host inside gets it, not even the inner address."""
         return _with_address(packet, DESTINATION, self._outer, self._inner)
 
 
 class Firewall:
-    """Lets in only what answers somebody behind it (RFC 4787 5: address and port-dependent filtering)."""
+    """Lets in only answers to hosts behind it (RFC 4787 5: address and port-dependent filtering)."""
 
     def __init__(self) -> None:
         self._open: dict[tuple[int, bytes, bytes, bytes], None] = {}
@@ -50,7 +50,7 @@ def _header(packet: bytes) -> int:
 
 
 def _ports(packet: bytes) -> tuple[bytes, bytes]:
-    """Source and destination of TCP and UDP; for the rest whatever stands there."""
+    """Source and destination port of TCP and UDP; for other protocols the bytes at that place."""
     at = _header(packet)
     return packet[at : at + PORT_BYTES], packet[at + PORT_BYTES : at + 2 * PORT_BYTES]
 

@@ -50,9 +50,9 @@ def network_command(
 ) -> None:
     """Put an emulated network in front of a console or a robot, until interrupted.
 
-    While it runs, lines on standard input are obeyed: "outage 5" lets nothing pass for 5 s, "hold 5" keeps packets
+    While it runs, it obeys lines on standard input: "outage 5" lets nothing pass for 5 s, "hold 5" keeps packets
     meanwhile, "robot outage 5" and "robot hold 5" do so on the robot link, "cut" breaks its connections, "statistics"
-    prints what has happened so far as a JSON line.
+    prints the counts so far as a JSON line.
     """
     try:
         loaded = load_profile(profile)

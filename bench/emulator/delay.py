@@ -64,7 +64,7 @@ class Uniform:
 
 
 class Normal:
-    """Cut off at `min` and at as far above the mean, so that the mean stays what it is."""
+    """Cut off at `min` and at as far above the mean, so that the mean does not change."""
 
     def __init__(self, mean: float, deviation: float, min: float = 0.0) -> None:
         if not 0 <= min < mean or deviation <= 0:

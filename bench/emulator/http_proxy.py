@@ -47,7 +47,7 @@ class ConsoleProxy:
         self._console = console.rstrip("/")
         self._sessions = sessions
         self._paths = paths
-        # The console's own certificate may be self-signed, and there is nobody between it and this process.
+        # The console's own certificate may be self-signed, and no other host is between it and this process.
         self._upstream = httpx.AsyncClient(
             base_url=self._console, timeout=TIMEOUT, trust_env=False, verify=False, limits=httpx.Limits()
         )

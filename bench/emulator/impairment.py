@@ -43,7 +43,7 @@ class Wander:
         self._knot = 0
         self._from = 0.0  # uniform numbers, so that a changed distribution keeps the pattern
         self._to = 0.0
-        self._ends: tuple[Delay, float, float] | None = None  # what they are as delays
+        self._ends: tuple[Delay, float, float] | None = None  # the same as delays
 
     def at(self, now: float, delay: Delay, every: float) -> float:
         if self._began is None:

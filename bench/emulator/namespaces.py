@@ -1,7 +1,7 @@
 """Two network namespaces with an emulated network between them: whole processes run behind it unmodified.
 
 Linux and root only. Every IPv4 packet between the two sides passes a path of the profile; TCP is the kernel's own and
-repeats what is lost by itself.
+repeats lost packets.
 """
 
 import asyncio
@@ -44,7 +44,7 @@ class Namespaces:
     The robot's side is `ROBOT_ADDRESS` and usually runs the console; the operator's side is `OPERATOR_ADDRESS`.
 
     Raises:
-        NamespacesUnavailable: on entering; says what is missing.
+        NamespacesUnavailable: on entering; names the missing part.
     """
 
     def __init__(self, profile: Profile | str, *, seed: int = 1, cloud: str | None = None) -> None:
@@ -147,7 +147,7 @@ class Namespaces:
             if kind is not None:
                 packet = self._translated(side, packet)
             if kind is None or packet[16:20] != _packed(other.address):
-                continue  # IPv6's own talk, broadcasts, and whatever looks for the rest of the world
+                continue  # IPv6's housekeeping, broadcasts, and packets for other networks
             now = time.monotonic()
             for outages in (self._client_outages, self._robot_outages):
                 if not outages.started:

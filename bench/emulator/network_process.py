@@ -1,4 +1,4 @@
-"""A `Network` in a process of its own: what else this process does then adds no delay to its packets.
+"""A `Network` in a separate process: other work of this process then adds no delay to its packets.
 
 Requests and answers are pickled over the pipes of a child that only this process talks to.
 """

@@ -1,4 +1,4 @@
-"""What is told to a running network, one line each: who tests by hand, or from another process, says when it breaks."""
+"""Commands to a running network, one line each: a person or another process says when the network fails."""
 
 import asyncio
 import json

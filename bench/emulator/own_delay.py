@@ -33,7 +33,7 @@ PATIENCE = 30.0  # s
 FRAME_RATE = 30
 BURST = 10  # packets
 PACKET = 1250  # bytes
-STAMP = struct.Struct("!xd")  # the first byte says what it is
+STAMP = struct.Struct("!xd")  # the first byte gives the kind
 MEDIA = 0x80
 OFFER, ANSWER = "client", "console"
 
@@ -100,7 +100,7 @@ class _Ends:
         await self._play(behind, seconds)
 
     async def run_directly(self, seconds: float) -> None:
-        """Without a relay: what the two ends and the system take for themselves."""
+        """Without a relay: the delay of the two ends and the system."""
         await self._play([(console, client.getsockname()) for client, console in self._pairs], seconds)
 
     async def _play(self, behind: list[tuple[socket.socket, tuple[str, int]]], seconds: float) -> None:

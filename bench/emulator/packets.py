@@ -22,7 +22,7 @@ def kind_of(data: bytes | memoryview) -> Kind:
 
 
 def stun_username(data: bytes) -> str | None:
-    """The USERNAME of a binding request, "theirs:ours"; None when it is none."""
+    """The USERNAME of a binding request, "theirs:ours"; None for another packet."""
     if len(data) < HEADER or data[4:8] != MAGIC or struct.unpack_from("!H", data)[0] != BINDING_REQUEST:
         return None
     position = HEADER

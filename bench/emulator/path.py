@@ -1,8 +1,8 @@
 """One direction of one path for packets. No I/O.
 
-Order of what happens to a packet: an outage, the bottleneck's queue, loss, delay, order. Every packet offered takes the
-same number of random numbers, whatever happens to it and whatever is set: the fate of the n-th packet depends on the
-seed and n, on when it came if there is a bottleneck, an outage or a delay that wanders, and on nothing else.
+A packet passes these in order: an outage, the bottleneck's queue, loss, delay, order. Every packet takes the same
+number of random numbers, at any fate and any setting: the fate of the n-th packet depends on the seed and n, on when it
+came if there is a bottleneck, an outage or a delay that wanders, and on nothing else.
 """
 
 from dataclasses import dataclass
@@ -99,7 +99,7 @@ class ImpairedPath:
         return self.impairment.delay.quantile(share)
 
     def _ordered(self, arrives: float, swap: float) -> float:
-        """A real queue is first in, first out, whatever its delay does; what is reordered is outside of that."""
+        """A real queue is first in, first out, at any delay; reordered packets are outside of it."""
         reorder = self.impairment.reorder
         if reorder is not None and swap < reorder.share:
             self.statistics.reordered += 1

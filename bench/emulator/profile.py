@@ -102,8 +102,7 @@ def profile_names() -> list[str]:
 def load_profile(name_or_path: str | Path) -> Profile:
     """One of `profile_names`, or a file: anything with a slash or the ending .toml.
 
-    Raises:
-        ProfileError: there is none, or it cannot be used.
+    Raises: ProfileError: it does not exist, or cannot be used.
     """
     source = str(name_or_path)
     is_file = isinstance(name_or_path, Path) or "/" in source or source.endswith(ENDING)

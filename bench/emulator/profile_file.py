@@ -47,7 +47,7 @@ class DirectionTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class PathTable(DirectionTable, forbid_unknown_fields=True, frozen=True):
-    """Both directions, and what is different in one."""
+    """Both directions, and the differences of one."""
 
     to_operator: DirectionTable = DirectionTable()
     to_robot: DirectionTable = DirectionTable()
@@ -56,7 +56,7 @@ class PathTable(DirectionTable, forbid_unknown_fields=True, frozen=True):
 class BottleneckTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     rate_kbps: Positive
     queue_bytes: Bytes | None = None
-    queue_ms: Positive | None = None  # instead: what the rate sends in that time
+    queue_ms: Positive | None = None  # instead: the bytes that the rate sends in that time
 
 
 class TwoBottlenecks(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

@@ -45,9 +45,10 @@ def reached_from(host: str, console: list[Address]) -> Address:
 
 
 def without_candidates(sdp: str) -> str:
-    """The offer, or a fragment of trickle ICE, with which nobody finds a way around the relay.
+    """The offer, or a fragment of trickle ICE, without a way around the relay.
 
-    The console learns where to send from the checks that arrive. "That was all" goes too, or ICE would give up at once.
+    The console learns where to send from the checks that arrive. The end of candidates is removed too, or ICE would
+    give up at once.
     """
     kept = [line for line in sdp.splitlines() if not line.startswith(("a=candidate:", "a=end-of-candidates"))]
     return "\r\n".join(kept) + "\r\n"

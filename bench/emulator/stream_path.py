@@ -104,7 +104,7 @@ class StreamPath:
         return sum(min(math.ldexp(self._timeout, each), MAX_TIMEOUT) for each in range(times))
 
     def _after(self, silence: Silence, now: float) -> float:
-        """When what was sent at `now` gets through: held packets at the end, lost ones with the first try after it."""
+        """When data sent at `now` gets through: held packets at the end, lost ones with the first try after it."""
         if silence.hold:
             return silence.until
         tried, timeout = now, self._timeout

@@ -89,7 +89,7 @@ class TcpRelay:
                 ways.create_task(_Way(to_robot, bridge, self._deliveries).run(reader, cutter, begun))
                 ways.create_task(_Way(to_operator, writer, self._deliveries).run(from_bridge, _Cutter(), []))
         except (OSError, TimeoutError, ExceptionGroup):
-            pass  # one side broke off or was never there: the other is told by the closing
+            pass  # one side broke off or was never there: the closing tells the other side
         finally:
             for each in (writer, bridge):
                 if each is not None:
@@ -115,7 +115,7 @@ class TcpRelay:
 
 
 class _Cutter:
-    """Cuts what is read into frames, their lengths included; what is not framed passes as it comes."""
+    """Cuts received bytes into frames, their lengths included; unframed bytes pass unchanged."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -154,7 +154,7 @@ class _Way:
         self._landed = asyncio.Event()
 
     async def run(self, reader: asyncio.StreamReader, cutter: _Cutter, begun: list[bytes]) -> None:
-        """Until the sender closes; then what is under way arrives, and the receiver is closed too."""
+        """Until the sender closes; then the bytes under way arrive, and the receiver is closed too."""
         for message in begun:
             self._launch(message)
         while data := await reader.read(READ):

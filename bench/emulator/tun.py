@@ -67,7 +67,7 @@ def open_tun(address: str) -> Tun:
     """A new namespace in which `address` is the machine's own, and everything else lies behind the device.
 
     Raises:
-        NamespacesUnavailable: says what is missing.
+        NamespacesUnavailable: names the missing part.
     """
     if not sys.platform.startswith("linux"):
         raise NamespacesUnavailable("network namespaces need Linux")

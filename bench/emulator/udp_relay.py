@@ -69,7 +69,7 @@ class UdpRelay:
     """
 
     def __init__(self, paths: ClientPaths, deliveries: Deliveries, hosts: Sequence[str] = (LOOPBACK,)) -> None:
-        self.strangers = 0  # packets from somebody who does not know the ICE names
+        self.strangers = 0  # packets from a sender that does not know the ICE names
         self.unsent = 0  # packets that the system took no more
         self.heard_at = time.monotonic()  # when the client sent last
         self._paths = paths
@@ -104,7 +104,7 @@ class UdpRelay:
         return candidates_replaced(sdp, [door.address for door in opened])
 
     def close(self) -> None:
-        """Idempotent; what is under way does not arrive."""
+        """Idempotent; packets under way do not arrive."""
         self._closed = True
         for own in (*(door.socket for door in self._doors), *(flow.upstream for flow in self._flows.values())):
             self._loop.remove_reader(own)
@@ -126,7 +126,7 @@ class UdpRelay:
             self._pass(data, "to_robot", flow)
 
     def _admitted(self, door: _Door, address: tuple[str, int], data: bytes) -> _Flow | None:
-        """A new flow, if this is an ICE check between the two of us (RFC 8445 7.2.2: "theirs:ours")."""
+        """A new flow, if this is an ICE check between client and console (RFC 8445 7.2.2: "theirs:ours")."""
         theirs, _, ours = (stun_username(data) or "").partition(":")
         if theirs not in door.names or ours not in self._offered or len(self._flows) == MAX_FLOWS:
             return None
@@ -157,7 +157,7 @@ class UdpRelay:
                 flow.upstream.send(data)
             else:
                 flow.door.socket.sendto(data, flow.client)
-        except OSError:  # its buffer is full, or nobody is there any more
+        except OSError:  # its buffer is full, or the socket is closed
             self.unsent += 1
 
 

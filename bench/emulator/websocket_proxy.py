@@ -59,7 +59,7 @@ async def join(browser: WebSocket, console: str, paths: Mapping[Direction, Strea
 
 
 def _unchecked() -> ssl.SSLContext:
-    """The console's own certificate may be self-signed, and there is nobody between it and this process."""
+    """The console's own certificate may be self-signed, and no other host is between it and this process."""
     context = ssl.create_default_context()
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE

@@ -1,4 +1,4 @@
-"""An operator at the page who holds the stick, and arms again as soon as the page lets them."""
+"""An operator at the page who holds the stick, and arms again as soon as the page permits it."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""What a run is told, and what follows from its profile. No I/O."""
+"""The options of a run, and the settings that follow from its profile. No I/O."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -21,7 +21,7 @@ THESIS_ROBOTS = {
 PROFILES = (*THESIS_ROBOTS, "lte-drive", "wifi-handover", "satellite", "bursty-loss", "narrow-uplink")
 
 
-# What the console sends by itself; profiles say otherwise where they have a reason to.
+# The console's own settings; a profile with a reason has others.
 USUAL_KBPS = 800
 USUAL_FRAME_RATE = 30.0
 USUAL_TOLERANCE = 4
@@ -49,7 +49,7 @@ class MediaChoice:
 
 
 def media_of(profile: Profile, adapts: bool | None = None) -> MediaChoice:
-    """The thesis' settings for its profiles, fixed as they were there. For others what the console does by itself, its
+    """The thesis' settings for its profiles, fixed as they were there. For others the console's own settings, its
     quality controller included, unless `adapts` says otherwise."""
     said = profile.experiment
     adapting = said.video_kbps is None if adapts is None else adapts
@@ -65,7 +65,7 @@ def media_of(profile: Profile, adapts: bool | None = None) -> MediaChoice:
 
 
 def round_trip_of(profile: Profile) -> float:
-    """Mean time of a command to the robot and its feedback back, in s, without what the programs take."""
+    """Mean time of a command to the robot and its feedback back, in s, without the time in the programs."""
     paths = (profile.control, profile.robot_control)
     return sum(path.to_operator.delay.mean + path.to_robot.delay.mean for path in paths)
 

@@ -90,7 +90,7 @@ def experiment_command(
     json_to: Annotated[str, typer.Option("--json", help="Write the figures there; - is standard output.")] = "",
     report: Annotated[Path | None, typer.Option(help="Write a page with the figures into this folder.")] = None,
 ) -> None:
-    """Drive a robot over an emulated network and say what was rendered, and how far behind the robot it was."""
+    """Drive a robot over an emulated network and report the rendered media, and how far they were behind the robot."""
     choices = Choices(
         profile=profile,
         mode=mode,
@@ -110,7 +110,7 @@ def experiment_command(
         else:
             _work(session, choices, seconds, robot, network)
     except KeyboardInterrupt:
-        _say("interrupted: this is what was found so far")
+        _say("interrupted: the results so far")
     session.publish(json_to)
 
 

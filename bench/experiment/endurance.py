@@ -54,14 +54,14 @@ class _Total:
 
 @dataclass
 class Endurance:
-    """Give it what the client says of itself (`look`) and what the console says (`ended`), as time goes on."""
+    """Give it the client's statistics (`look`) and the console's counts (`ended`), as time goes on."""
 
     outages: Sequence[PlannedOutage] = ()
     losses: list[Lost] = field(default_factory=list)
     reconnections: int = 0  # the client was live again after it had not been
     seat_losses: int = 0
     longest_silence: float = 0.0  # s in which the client was not live
-    refused: Mapping[str, float] = field(default_factory=dict)  # what the console took from no peer, by why
+    refused: Mapping[str, float] = field(default_factory=dict)  # refused messages at the console, by reason
     driven_seconds: float = 0.0  # the client was armed and had the seat
     _ended: Counter[str] = field(default_factory=Counter)
     _at: float | None = None
@@ -73,7 +73,7 @@ class Endurance:
     def look(
         self, at: float, *, live: bool, mine: bool, driving: bool, streams: Mapping[str, Mapping[str, Any]]
     ) -> None:
-        """`streams`: of each its kind, and what was rendered and violated so far."""
+        """`streams`: of each its kind, renderings and violations so far."""
         passed = 0.0 if self._at is None else at - self._at
         self._at = at
         if live:
@@ -89,7 +89,7 @@ class Endurance:
                 self._totals.setdefault((f"{each['kind']} {what}", name), _Total()).see(each[what])
 
     def ended(self, at: float, counts: Mapping[str, float]) -> list[Lost]:
-        """The console's count of connections that ended, by why; what is new in it."""
+        """The console's count of connections that ended, by reason; only the new ones."""
         new = [
             Lost(round(at, 1), why, cut_for_long(self.outages, at))
             for why, count in counts.items()

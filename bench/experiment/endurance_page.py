@@ -32,7 +32,7 @@ REQUEST = """[...document.querySelectorAll("button")]
 
 
 class PageHands:
-    """The hands on a pad, and the eyes on what the page says of itself."""
+    """The hands on a pad, and the eyes on the page's statistics."""
 
     def __init__(self, evaluate: Evaluate, description: RobotDescription, seed: int) -> None:
         self._evaluate = evaluate
@@ -79,7 +79,7 @@ class PageHands:
 
 @asynccontextmanager
 async def driven_page(browser: Literal["chromium", "firefox"], link: str, choices: Choices) -> AsyncIterator[PageHands]:
-    """A page on `link`, with the choices' gate, pacing and tolerances. Raises what the browser's driver raises."""
+    """A page on `link`, with the choices' gate, pacing and tolerances. Raises the errors of the browser's driver."""
     async with AsyncExitStack() as stack:
         environment = None
         if shutil.which("pulseaudio") is not None:  # without a sound card the page has no sound to judge

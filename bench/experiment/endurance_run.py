@@ -1,4 +1,4 @@
-"""`lockstep experiment endurance`: somebody drives over one network for as long as one likes."""
+"""`lockstep experiment endurance`: an operator drives over one network for any time."""
 
 import asyncio
 import contextlib
@@ -33,7 +33,7 @@ SILENCE_SECONDS = 30.0  # after which a headless client takes its console for lo
 
 
 class Driven(Protocol):
-    """A client in somebody's hands."""
+    """A client with an operator."""
 
     async def until_live(self) -> None:
         """A picture was rendered."""

@@ -1,4 +1,4 @@
-"""The figures that the thesis prints, and what they leave unsaid: SVG text. Needs matplotlib."""
+"""The thesis' figures, and further ones: SVG text. Needs matplotlib."""
 
 import io
 from collections.abc import Sequence

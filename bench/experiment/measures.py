@@ -32,7 +32,7 @@ def event_rate(feedbacks: Sequence[Arrival]) -> float:
 
 
 def beyond(rendered: Iterable[Rendered], tolerance: int) -> int:
-    """Renderings outside the tolerance, counted again from feedback and stamp alone, whatever the gate said."""
+    """Renderings outside the tolerance, counted again from feedback and stamp alone, without the gate's verdict."""
     return sum(
         abs(event_gap(each.feedback, each.stamp)) > tolerance
         for each in rendered

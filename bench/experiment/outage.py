@@ -1,4 +1,4 @@
-"""The network is cut in mid-drive and comes back: what the robot did, and when the operator drives again."""
+"""The network is cut in mid-drive and comes back: the robot's motion, and the time until the operator drives again."""
 
 import asyncio
 import contextlib
@@ -35,7 +35,7 @@ RETURN_SECONDS = 2.0
 
 
 class Stick(Protocol):
-    """An operator who holds the stick, whatever happens, and takes control again as soon as that is possible."""
+    """An operator who always holds the stick, and takes control again as soon as that is possible."""
 
     intentions: list[tuple[float, float]]  # (time, value of the first axis); empty when they all are the same
 
@@ -113,7 +113,7 @@ async def _cut(stage: Stage, choices: Choices, held: bool) -> tuple[Cut, Stick, 
 
 
 async def _until_driven(stage: Stage, since: float) -> None:
-    """A command that moves was executed; what the bridge's log says, a little later."""
+    """A moving command was executed, by the bridge's log, a little later."""
     while True:
         found = await asyncio.to_thread(lambda: list(records(stage.event_log)))
         if any(each["kind"] == "executed" and each["time"] >= since and any(each["values"]) for each in found):

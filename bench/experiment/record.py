@@ -38,7 +38,7 @@ class RobotRecord:
 
 @dataclass
 class ClientRecord:
-    """One client: what it is, what it saw, what it says of itself."""
+    """One client: its kind, its renderings, its statistics."""
 
     name: str
     kind: str  # "headless" or "chromium"
@@ -66,7 +66,7 @@ class Run:
     clients: list[ClientRecord]
     cameras: list[str]  # names, the main one first
     microphones: list[str]
-    network: dict[str, Any] = field(default_factory=dict)  # what the emulator counted
+    network: dict[str, Any] = field(default_factory=dict)  # the emulator's counts
 
     @property
     def operator(self) -> ClientRecord:

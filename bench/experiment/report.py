@@ -69,7 +69,7 @@ def _comparisons(findings: Findings) -> Iterator[tuple[str, str]]:
 
 
 def _standing_alone(svg: str) -> str:
-    """On white, whatever is behind it."""
+    """On white, on any background."""
     head, _, rest = svg.partition(">")
     return f'{head}><rect width="100%" height="100%" fill="#fff"/>{rest}'
 

@@ -1,4 +1,4 @@
-"""Reads the bridge's own log: what was executed, answered and captured when."""
+"""Reads the bridge's own log: commands, feedback and captures, with their times."""
 
 import json
 from collections.abc import Iterator

@@ -20,7 +20,7 @@ EXIT_BROKEN, EXIT_NOT_STARTED = 1, 3
 def fleet_soak_command(
     robots: Annotated[int, typer.Option(min=2, max=32, help="Simulated planar robots on one console.")] = 8,
     seconds: Annotated[
-        float, typer.Option(min=8, max=36_000, help="How long they drive; in the first quarter nobody dies.")
+        float, typer.Option(min=8, max=36_000, help="How long they drive; in the first quarter no bridge is killed.")
     ] = 120,
     kill_every: Annotated[
         float, typer.Option(min=1, max=600, help="Seconds from one bridge's death to the next.")

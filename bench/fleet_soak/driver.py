@@ -1,4 +1,4 @@
-"""One operator of one robot: drives all the time, and says what it noticed while its own bridge lived."""
+"""One operator of one robot: drives all the time, and reports faults while its own bridge lived."""
 
 import asyncio
 import time
@@ -85,7 +85,7 @@ class FleetDriver:
     def _answered(self, epoch: str, sent: float, now: float) -> None:
         if self._died_at is not None:
             if epoch == self._dead_epoch:
-                return  # what was on its way when the bridge died
+                return  # the command on its way when the bridge died
             self.slowest_return = max(self.slowest_return, now - self._died_at)
             self._died_at = None
         else:

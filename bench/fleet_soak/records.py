@@ -1,4 +1,4 @@
-"""Reading what a bridge wrote down over several lives."""
+"""Reads the event logs of a bridge over several lives."""
 
 import json
 from collections.abc import Mapping

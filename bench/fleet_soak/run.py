@@ -14,7 +14,7 @@ from bench.fleet_soak.world import FleetWorld
 
 __all__ = ["FleetPlan", "fleet_soak"]
 
-CALM_SHARE = 0.25  # of the time, at the beginning, in which nobody dies
+CALM_SHARE = 0.25  # of the time, at the beginning, without a kill
 LOOK_SECONDS = 0.05
 START_SECONDS = 60.0  # for all to drive
 RETURN_SECONDS = 30.0  # for a robot whose bridge was killed to be driven again
@@ -30,11 +30,11 @@ class FleetPlan(NamedTuple):
 
 
 async def fleet_soak(plan: FleetPlan, say: Callable[[str], None]) -> dict[str, Any]:
-    """What happened, by name; those of MUST_BE_ZERO must be 0.
+    """The counts, by name; those of MUST_BE_ZERO must be 0.
 
     Raises:
         ProcessFailed: a bridge or the console did not start.
-        TimeoutError: somebody could not drive at the beginning.
+        TimeoutError: an operator could not drive at the beginning.
     """
     with TemporaryDirectory(prefix="lockstep-fleet-") as folder:
         async with FleetWorld(Path(folder), plan.robots, plan.picture_rate) as world:
@@ -93,7 +93,7 @@ class _Soak:
             due = max(due + self._plan.kill_every, time.monotonic())
 
     async def _watch_machine(self) -> None:
-        """A machine that has no time for its processes breaks links by itself; that is not the console's fault."""
+        """A machine without time for its processes breaks links; that is not the console's fault."""
         while True:
             due = time.monotonic() + LOOK_SECONDS
             await asyncio.sleep(LOOK_SECONDS)

@@ -20,7 +20,7 @@ class Span(NamedTuple):
 
     began: float
     ended: float
-    robot: str  # whose bridge was away; "" nobody's
+    robot: str  # the robot whose bridge was away; "": none
 
 
 def robot_verdict(driver: FleetDriver, records: Sequence[Record]) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def robot_verdict(driver: FleetDriver, records: Sequence[Record]) -> dict[str, A
 def fleet_verdict(
     drivers: Sequence[FleetDriver], robots: dict[str, dict[str, Any]], calm: Span, kills: Sequence[Span]
 ) -> dict[str, Any]:
-    """`calm`: while nobody was killed; `kills`: from each death until that robot was driven again."""
+    """`calm`: while all bridges lived; `kills`: from each death until that robot was driven again."""
     calmly = _times(each for driver in drivers for each in driver.trips if _within(each, calm))
     meanwhile = _times(
         each

@@ -20,9 +20,9 @@ def hostile_command(
     seconds: Annotated[float, typer.Option(min=2, max=600, help="How long they do.")] = 30,
     seed: Annotated[int, typer.Option(help="Of what they do.")] = 1,
     kind: Annotated[
-        list[str] | None, typer.Option(help="One kind of misbehaviour alone; again for more, each by itself.")
+        list[str] | None, typer.Option(help="One kind of misbehaviour alone; again for more, each alone.")
     ] = None,
-    each: Annotated[bool, typer.Option("--each", help="Every kind by itself.")] = False,
+    each: Annotated[bool, typer.Option("--each", help="Every kind alone.")] = False,
     front: Annotated[str, typer.Option(help="How they come: direct, tls or caddy.")] = "direct",
     json_file: Annotated[
         str | None, typer.Option("--json", help="Write the figures here; - is standard output.")

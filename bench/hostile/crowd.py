@@ -1,10 +1,8 @@
-"""The crowd, in a process of its own: `python -m bench.hostile.crowd LINK OPERATOR BRIDGE COUNT SEED [KIND]`.
+"""The crowd, in a separate process: `python -m bench.hostile.crowd LINK OPERATOR BRIDGE COUNT SEED [KIND]`.
 
-LINK is an observer's, OPERATOR the link of somebody who publishes a camera and speaks, BRIDGE is tls://host:port.
-It runs with the processor time that nobody else wants (SCHED_IDLE): attackers have machines of their own.
-
-It says in a JSON line that it has begun, answers each line on standard input with what it has seen, and ends at the end
-of its input.
+LINK is an observer's, OPERATOR the link of a peer that publishes a camera and speaks, BRIDGE is tls://host:port.
+It runs with the processor time that no other process wants (SCHED_IDLE): attackers have their own machines. It prints a
+JSON line when it has begun, answers each line on standard input with its counts, and ends at the end of its input.
 """
 
 import asyncio
@@ -89,7 +87,7 @@ class Crowd:
             self.attempts[kind.__name__] += 1
             try:
                 await kind(target, random)
-            except Exception as error:  # whoever breaks all rules breaks aiortc's own assumptions too
+            except Exception as error:  # a peer that breaks all rules breaks aiortc's own assumptions too
                 self.failures[f"{kind.__name__}: {type(error).__name__}"] += 1
             await asyncio.sleep(random.uniform(0, 2 * PAUSE))
 

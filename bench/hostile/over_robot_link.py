@@ -1,4 +1,4 @@
-"""What can be done to a robot bridge that listens beyond loopback, by who knows its address and no secret."""
+"""Attacks on a robot bridge that listens beyond loopback, by a client that knows its address and not its secret."""
 
 import asyncio
 import ssl

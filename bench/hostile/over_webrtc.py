@@ -1,4 +1,4 @@
-"""What can be done to a console by who has an observer's link and speaks WebRTC."""
+"""Attacks on a console by a peer with an observer's link that speaks WebRTC."""
 
 import asyncio
 import socket
@@ -40,7 +40,7 @@ BURST = 100
 
 
 class Peer:
-    """A connection that obeys no rule of ours."""
+    """A connection that obeys none of the console's rules."""
 
     def __init__(self) -> None:
         self.pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
@@ -112,7 +112,7 @@ async def _until_thrown_out(peer: Peer, target: Target) -> None:
 
 
 async def message_flood(target: Target, random: Random) -> None:
-    """Valid messages, many more than anybody needs."""
+    """Valid messages, many more than a client needs."""
     async with joined(target) as peer:
         if peer is None:
             return
@@ -127,7 +127,7 @@ async def message_flood(target: Target, random: Random) -> None:
 
 
 async def media_flood(target: Target, random: Random) -> None:
-    """Voice many times faster than anybody speaks, reports on nothing, and datagrams that only look like SRTP."""
+    """Voice many times faster than speech, reports on nothing, and datagrams that only look like SRTP."""
     async with joined(target, speaks=True) as peer:
         if peer is None or peer.pc.sctp is None:
             return

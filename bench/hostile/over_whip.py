@@ -1,4 +1,4 @@
-"""What can be done to a console by somebody with an operator's link who publishes a camera (WHIP)."""
+"""Attacks on a console by a client with an operator's link that publishes a camera (WHIP)."""
 
 import asyncio
 import re
@@ -18,7 +18,7 @@ __all__ = ["publisher_flood"]
 SDP = "application/sdp"
 CONNECT_SECONDS = 8.0
 FLOOD_SECONDS = 10.0  # of one kind of packet, or until the console has ended it
-BURST = 50  # packets between two looks at what the console says
+BURST = 50  # packets between two looks at the console's answers
 PICTURE = bytes((0x10, 0x90, 0x80)) + bytes(1100)  # the first packet of a VP8 picture
 
 
@@ -84,6 +84,6 @@ def _sources(number: int, packet: RtpPacket, random: Random) -> bytes:
 
 
 def _reports(number: int, packet: RtpPacket, random: Random) -> bytes:
-    """As full as they can be, each from somebody new."""
+    """As full as they can be, each from a new source."""
     blocks = [RtcpReceiverInfo(random.getrandbits(32), 0, 0, 0, 0, 0, 0) for _ in range(31)]
     return bytes(RtcpRrPacket(random.getrandbits(32), blocks))

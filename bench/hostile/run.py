@@ -1,4 +1,4 @@
-"""Drive a robot in peace, then among the crowd, then in peace again; compare what the operator feels.
+"""Drive a robot in peace, then among the crowd, then in peace again; compare the operator's times.
 
 The crowd comes directly, with TLS, or through a real Caddy with deploy/Caddyfile.
 """

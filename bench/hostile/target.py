@@ -21,7 +21,7 @@ class Target(NamedTuple):
     operator: str  # an operator's, who publishes a camera and speaks
     bridge: tuple[str, int]  # where the robot's listens, by TLS
     http: httpx.AsyncClient
-    seen: Counter[str]  # what the console said, by name or status
+    seen: Counter[str]  # the console's answers, by name or status
 
     @property
     def address(self) -> tuple[str, int]:

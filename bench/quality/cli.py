@@ -34,7 +34,7 @@ Seconds = Annotated[float, typer.Option(min=5, help="Of each drive.")]
 Tolerance = Annotated[int, typer.Option(min=1, help="Largest gap of a picture, in events.")]
 Seed = Annotated[int, typer.Option(help="Of the network.")]
 Robot = Annotated[str, typer.Option(help="The simulated robot.")]
-Codec = Annotated[str | None, typer.Option(help="VP8 or H264; what the console prefers unless set.")]
+Codec = Annotated[str | None, typer.Option(help="VP8 or H264; the console's first choice unless set.")]
 JsonTo = Annotated[str, typer.Option("--json", help="Write the results there as JSON; - is standard output.")]
 
 

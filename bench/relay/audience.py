@@ -29,7 +29,7 @@ TRIES = 5
 
 
 class _Counter:
-    """Stands before what one observer's connection to the relay makes of a datagram."""
+    """Stands before an observer's connection to the relay, and sees each datagram first."""
 
     def __init__(self, peer: Any) -> None:
         self.packets = 0

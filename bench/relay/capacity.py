@@ -1,7 +1,7 @@
-"""What so many observers take, from measured figures: `python -m bench.relay.capacity [COUNT …] [--gigabits 1]`.
+"""The cost of many observers, from measured figures: `python -m bench.relay.capacity [COUNT …] [--gigabits 1]`.
 
-Most figures are those that `python -m bench relay` and `python -m bench observers` measure; what is assumed says so.
-docs/scale.md has the conditions. Pure arithmetic: nothing is run.
+Most figures are those that `python -m bench relay` and `python -m bench observers` measure; assumed ones say so.
+docs/scale.md has the conditions. Pure arithmetic: no process runs.
 """
 
 import math

@@ -21,7 +21,7 @@ CROWD_SECONDS = 400.0
 CALM = (
     0.3  # s between the crowd's operator's commands: every feedback goes to each observer, on the machine that drives
 )
-NICE = ("nice", "-n", "19")  # observers have machines of their own, and take what the others leave
+NICE = ("nice", "-n", "19")  # observers have their own machines, and take the time that others leave
 
 
 async def hop_delays(folder: Path, seconds: float) -> dict[str, list[float]]:

@@ -1,7 +1,7 @@
-"""What a Janus spends on one packet to one observer: `python -m bench.relay.packets HOST`.
+"""The cost of a Janus for one packet to one observer: `python -m bench.relay.packets HOST`.
 
 HOST is an address of this machine, not loopback. One publisher of noise, 400 packets a second; 1, 6, then 12
-subscribers that count what comes out of their sockets. The cost is the slope; what a Janus spends besides is not in it.
+subscribers that count the packets of their sockets. The cost is the slope; the fixed cost of a Janus is not in it.
 """
 
 import asyncio

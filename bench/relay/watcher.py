@@ -1,6 +1,6 @@
-"""A headless observer in a process of its own: `python -m bench.relay.watcher LINK PICTURES`.
+"""A headless observer in a separate process: `python -m bench.relay.watcher LINK PICTURES`.
 
-It watches where the console sends it, reads pictures until it has so many, and says in one JSON line what it saw.
+It watches where the console sends it, reads this many pictures, and prints one JSON line about them.
 """
 
 import asyncio

@@ -1,1 +1,1 @@
-"""What others build, reduced to what is compared: pictures of the same robot bridge, sent the way they send them."""
+"""Other consoles, reduced to the compared part: pictures of the same robot bridge, sent in their way."""

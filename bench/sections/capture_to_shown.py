@@ -1,13 +1,13 @@
 """From the capture of a picture at the bridge to its drawing in Chromium.
 
 The bridge logs when it captured each picture. A probe, put into the page from outside, notes the RTP timestamp and
-the time of each drawing on the main camera's canvas; `bench/media_join.py` tells which captured picture that is, and
+the time of each drawing on the main camera's canvas; `bench/media_join.py` finds the captured picture, and
 `bench/page_clock.py` puts both on one clock. Rendering at the robot and the way over TCP are part of the time.
 
 "Drawn" is when the page has drawn the picture on its canvas. "Shown" is when the browser then begins to compose a
 frame, the same moment at which requestVideoFrameCallback tells a bare page about a picture of its <video>. The
 baselines are that bare page on `bench/baseline_server.py`, and pictures over WebSockets (`bench/rivals/`), one after
-the other in the same run, at the same bridge, with nobody driving.
+the other in the same run, at the same bridge, without an operator.
 """
 
 import asyncio

@@ -20,7 +20,7 @@ RATES, QUICK_RATES = (5.0, 20.0), (20.0,)  # events a second
 SECONDS, QUICK_SECONDS = 12, 4
 VIEWERS: tuple[tuple[GateMode, float], ...] = (("event", 0.0), ("age", 0.0), ("off", 0.0))
 BASELINES = {
-    "age": "a gate by age: what was captured at most 0.5 s ago, by clocks that agree",
+    "age": "a gate by age: media captured at most 0.5 s ago, by clocks that agree",
     "off": "no gate",
 }
 

@@ -1,18 +1,19 @@
-"""50, 100 and 200 observers besides one operator: does each get every picture, what does one cost, who is slowed?
+"""50, 100 and 200 observers besides one operator: does each get every picture, how much does one cost, is the operator
+slowed?
 
-The observers are headless clients in a process of their own; they receive all cameras and the sound, count RTP and
-decode nothing. Their processes run when nobody else wants to: real ones have machines of their own. The operator drives
-from a third process, before they come, while they are there and after they have left: the machine's own speed changes
-within a minute.
+The observers are headless clients in a separate process; they receive all cameras and the sound, count RTP and
+decode nothing. Their processes run when no other process wants to: real observers have their own machines. The operator
+drives from a third process, before they come, while they are there and after they have left: the machine's own speed
+changes within a minute.
 
 Every picture: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while
-the pictures are counted, at the console's encoders and at each observer. Missed is what the console dropped because
-somebody's outbox was full, and what was lost on the way, as the gaps in RTP's numbers tell. That nothing else is
-missing is shown by those who were in one tier (docs/quality.md) all the time: they have exactly as many pictures as
-its encoder made. How many have a number that is no tier's is told: their path looked full for a part of the spell, so
-that they got other pictures meanwhile, or they missed some.
-Cost: processor time of the console's process (proc(5)) with the observers less that without, shared out among them.
-The baseline is the main camera alone on `bench/baseline_server.py`: aiortc encodes it for each peer.
+the pictures are counted, at the console's encoders and at each observer. Missed are the pictures that the console
+dropped because an outbox was full, and those lost on the way, by the gaps in RTP's numbers. That nothing else is
+missing is shown by those who were in one tier (docs/quality.md) all the time: they have exactly as many pictures as its
+encoder made. How many have a number that is no tier's is told: their path looked full for a part of the spell, so that
+they got other pictures meanwhile, or they missed some. Cost: processor time of the console's process (proc(5)) with the
+observers less that without, shared out among them. The baseline is the main camera alone on `bench/baseline_server.py`:
+aiortc encodes it for each peer.
 """
 
 import asyncio
@@ -37,9 +38,9 @@ EVENTS, QUICK_EVENTS = 400, 60
 BARE_PEERS = 8
 BARE_SECONDS, QUICK_BARE_SECONDS = 8, 3
 ANSWER_SECONDS = 10.0
-SETTLE = 3.0  # s after somebody came or left
+SETTLE = 3.0  # s after an observer came or left
 CALM, QUICK_CALM = 20, 2  # s until what hundreds of handshakes did to the crowd's pictures is over
-ENCODE = 0.03  # s until what the bridge has sent is encoded
+ENCODE = 0.03  # s until the bridge's pictures are encoded
 LOOK, SAME, LOOKS = 0.01, 3, 40  # s between two looks at the observers; looks alike that settle it; looks at most
 ROBOT = "planar"  # the lightest: the machine's cores are for the console and the observers
 CPU_TARGET = 0.5  # % of a core for each of a hundred
@@ -64,7 +65,7 @@ class Counts:
     """With the bridge held still."""
 
     taken: dict[str, int]  # pictures that were encoded, by camera, each once for however many tiers
-    tiers: dict[str, dict[str, int]]  # what was encoded for each tier, by camera
+    tiers: dict[str, dict[str, int]]  # encoded pictures of each tier, by camera
     dropped: int  # pictures that did not fit an observer's outbox
     received: list[Received]  # by observer
 
@@ -80,7 +81,7 @@ class Missed:
 
     @property
     def percent(self) -> float:
-        """Of the pictures that were meant for somebody."""
+        """Of the pictures that were meant for an observer."""
         missed = self.dropped + self.lost
         return 100 * missed / (self.received + missed)
 

@@ -14,7 +14,7 @@ __all__ = ["run"]
 
 SECTION = "recording"
 EVENTS, QUICK_EVENTS = 150, 40  # of a turn
-TURNS = 4  # of each kind; in turns, so that what else the machine does meets both
+TURNS = 4  # of each kind; in turns, so that the machine's other work falls on both
 ALLOWED_MS = 0.5  # more than without
 
 

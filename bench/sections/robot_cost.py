@@ -1,11 +1,11 @@
-"""What the default robot costs of one core: simulation, cameras and sound in its bridge, and encoding in the console.
+"""The default robot's cost of one core: simulation, cameras and sound in its bridge, and encoding in the console.
 
-Processor time is what the kernel has counted for each thread. Encoding is what the console's threads of its streams
-use: decoding, scaling, encoding and packetising of pictures and of sound. The bridge's share holds its sound and the
-robot link too, which run in the same thread as the simulation. The rest of the console (WebRTC, fan-out, feedback,
-HTTP) is told besides: it is no part of the figure that has a target. An operator drives and receives everything, at
-full size and rate: the quality controller is off. As the page does, the operator offers H.264 first. The operator's own
-process is not counted. The bridge writes no event log, as nobody's does who has not asked for one.
+Processor time is the kernel's count for each thread. Encoding is the time of the console's stream threads: decoding,
+scaling, encoding and packetising of pictures and of sound. The bridge's share holds its sound and the robot link too,
+which run in the same thread as the simulation. The rest of the console (WebRTC, fan-out, feedback, HTTP) is a row of
+its own: it is not part of the figure with the target. An operator drives and receives everything, at full size and
+rate: the quality controller is off. As the page does, the operator offers H.264 first. The operator's own process is
+not counted. The bridge writes no event log, as by default.
 """
 
 import asyncio

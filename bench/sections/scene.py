@@ -1,7 +1,6 @@
-"""Do those who look at the 3D scene slow the operator down?
-
-The operator drives with nobody at the scene and with three viewers, in turns, so that what else the machine does falls
-on both alike. The viewers are WebSocket clients of the console's scene, in a process of their own; they draw nothing.
+"""Do viewers of the 3D scene slow the operator down? The operator drives without viewers and with three, in turns, so
+that the machine's other work falls on both alike. The viewers are WebSocket clients of the console's scene, in a
+process of their own; they draw nothing.
 """
 
 import asyncio

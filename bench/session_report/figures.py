@@ -1,4 +1,4 @@
-"""The thesis' figures of a recorded session, and what else an operator would ask: SVG text. Needs matplotlib."""
+"""The thesis' figures of a recorded session, and others for an operator: SVG text. Needs matplotlib."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -69,7 +69,7 @@ def _stream_figure(session: Session, stream: str, shown: Shown) -> Figure:
             Panel(f"{stream}: behind the robot", "events", _against(session.operator, shown.stamp)),
         ],
     ]
-    words = "Left what was captured, right what the operator's page said of itself a few times a second."
+    words = "Left the captures, right the statistics of the operator's page a few times a second."
     return _figure(session, f"stream-{stream}", stream, words, rows)
 
 

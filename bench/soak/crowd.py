@@ -10,7 +10,7 @@ from client.errors import CommandRefused, ConsoleError
 
 __all__ = ["Crowd", "Intruder"]
 
-AGAIN_SECONDS = 1.0  # until somebody who was thrown out tries again
+AGAIN_SECONDS = 1.0  # until an observer that was thrown out tries again
 BETWEEN_TRIES = 0.2  # s between two commands of an intruder
 BACKWARDS = -0.5  # of the first axis; only intruders drive so
 
@@ -38,7 +38,7 @@ class Crowd:
             self._join()
 
     async def go(self) -> None:
-        """A few leave, as somebody who closes the tab."""
+        """A few leave, like a person who closes the tab."""
         for _ in range(min(len(self._guests), self._chance.randint(1, 5))):
             guest = self._guests.pop(self._chance.randrange(len(self._guests)))
             await _ended(guest)

@@ -10,7 +10,7 @@ from playwright.async_api import Error, Page
 __all__ = ["OperatorPage", "WatchedPage"]
 
 LOOK_SECONDS = 0.25
-PATIENCE = 30.0  # s of calm in which a page has to be live again by itself
+PATIENCE = 30.0  # s of calm in which a page has to be live again without a reload
 START, RB = 9, 5  # W3C standard mapping
 LEFT_X, LEFT_Y = 0, 1
 PRESS = "([button, pressed]) => window.testPad.press(button, pressed)"
@@ -18,7 +18,7 @@ TILT = "([axis, value]) => window.testPad.tilt(axis, value)"
 
 
 class WatchedPage:
-    """Looks at what the page says of itself, and reloads it only when it does not come back: that is counted."""
+    """Reads the page's statistics, and reloads the page only when it does not come back, which is counted."""
 
     def __init__(self, page: Page, calm_seconds: Callable[[], float]) -> None:
         self.page = page

@@ -78,7 +78,7 @@ class _Soak:
         )
         self._crowd.fill()
         try:
-            async with asyncio.TaskGroup() as tasks:  # somebody's failure ends the soak
+            async with asyncio.TaskGroup() as tasks:  # a task's failure ends the soak
                 background = [tasks.create_task(each.run()) for each in (operator, observer)]
                 background += [tasks.create_task(each.run()) for each in self._intruders]
                 background.append(tasks.create_task(self._sample_memory()))

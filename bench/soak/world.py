@@ -125,7 +125,7 @@ class World:
                 await asyncio.sleep(1.0)
 
     async def _reset(self, http: httpx.AsyncClient) -> bool:
-        """Ask for the reset of the newest stop, by the link of whoever holds the seat; whether none holds."""
+        """Ask for the reset of the newest stop, by the seat holder's link; whether no stop holds."""
         session = await http.get("/api/session", headers=_bearer(self.operator))
         if not session.is_success or not session.json()["stopped"]:
             return session.is_success

@@ -79,7 +79,7 @@ Role = Literal["operator", "observer", "supervisor"]
 SpeedCapMode = Literal["on", "off", "operator"]  # the console's setting; "operator": as the holder of the seat wants
 Tier = Literal["operator", "high", "low"]  # of the encoded media: the operator's own, and the observers' two
 Name = Annotated[str, msgspec.Meta(max_length=60)]
-Count = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # what a JavaScript number holds exactly
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # a JavaScript number holds these exactly
 Difference = Annotated[int, msgspec.Meta(ge=-(2**53 - 1), le=2**53 - 1)]
 Milliseconds = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
 MAX_STREAMS = 32
@@ -96,7 +96,7 @@ class StreamReport(msgspec.Struct, frozen=True, kw_only=True):
     rendered: Count = 0
     discarded: Count = 0
     held: Count = 0
-    tolerance: Count = 0  # events; what the person at the client allows
+    tolerance: Count = 0  # events; the tolerance of the person at the client
     lag: Difference = 0  # largest feedback - stamp among what arrived since the last report, rendered or not
     violations: Count = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
     gate: Literal["event", "off", "age"] = "event"  # how it is gated now
@@ -117,7 +117,7 @@ class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="r
 class SeatRequest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_request"):
     """Ask for the control seat; answered by `seat` to all, or by a refusal.
 
-    While somebody else holds it the request is put to that person, unless `only_if_free`: then it is refused.
+    While another peer holds it the request is put to that peer, unless `only_if_free`: then it is refused.
     """
 
     only_if_free: bool = False
@@ -136,7 +136,7 @@ class SeatDecline(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", t
 
 
 class SeatTake(msgspec.Struct, frozen=True, tag_field="type", tag="seat_take"):
-    """A supervisor takes the seat from whoever holds it, at once."""
+    """A supervisor takes the seat from its holder, at once."""
 
 
 class SeatRelease(msgspec.Struct, frozen=True, tag_field="type", tag="seat_release"):
@@ -239,7 +239,7 @@ class StreamQuality(msgspec.Struct, frozen=True, kw_only=True):
     width: int  # pixels
     height: int
     frames_per_second: float
-    bits_per_second: float  # what the encoder aims at
+    bits_per_second: float  # the encoder's target
     camera_frames_per_second: float = 0.0  # of which those are some or all; 0: not known
 
 
@@ -266,8 +266,8 @@ class SourceStatus(msgspec.Struct, frozen=True, kw_only=True):
 
     stream: str
     label: str
-    state: Literal["waiting", "connecting", "live", "reconnecting"]  # waiting: nobody publishes it
-    detail: str = ""  # why it is not live; of one that is published, by whom
+    state: Literal["waiting", "connecting", "live", "reconnecting"]  # waiting: for a publisher
+    detail: str = ""  # why it is not live; for a published one, its publisher
 
 
 class Sources(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="sources"):
@@ -279,9 +279,9 @@ class Sources(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
 class Voice(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="voice"):
     """Who is heard at the robot now; sent to everyone when it changes."""
 
-    peer: str = ""  # "" when nobody speaks
+    peer: str = ""  # "" when no peer speaks
     name: str = ""
-    trouble: str = ""  # why nobody can be heard now, as when the loudspeaker does not work
+    trouble: str = ""  # why no voice can be heard now, as when the loudspeaker does not work
 
 
 class RecordingState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="recording"):
@@ -290,16 +290,16 @@ class RecordingState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type"
     state: Literal["off", "recording", "failed"]
     id: str = ""  # of the file that is written now; "" before the robot was reached
     recording: str = ""  # common to all its files
-    name: str = ""  # that somebody gave it
-    by: str = ""  # who started it; "" when nobody did
+    name: str = ""  # that a person gave it
+    by: str = ""  # the person who started it; "" for none
     since: float = 0.0  # s since 1970
     bytes: Count = 0
     lost: Count = 0  # records that were left out because the disk was too slow
-    detail: str = ""  # why it failed, or what it waits for
+    detail: str = ""  # why it failed, or the reason to wait
 
 
 class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note_shared"):
-    """A note that somebody wrote, with the event it belongs to. Newcomers get the last ones."""
+    """A participant's note, with the event it belongs to. Newcomers get the last ones."""
 
     id: int
     peer: str

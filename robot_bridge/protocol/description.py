@@ -65,7 +65,7 @@ class Joint(msgspec.Struct, frozen=True, kw_only=True):
 class AxisGain(msgspec.Struct, frozen=True, kw_only=True):
     """An axis that moves a joint: the joint's velocity is `gain` x (the axis' value - its rest value).
 
-    None: the gain changes with the posture, and the robot adapter says what the axes do to the joint now.
+    None: the gain changes with the posture, and the robot adapter computes the axes' effect on the joint.
     """
 
     axis: str
@@ -84,7 +84,7 @@ class PositionLimit(msgspec.Struct, frozen=True, kw_only=True):
     minimum: float | None = None
     maximum: float | None = None
     axes: tuple[AxisGain, ...]
-    margin: float = 0.0  # rad or m kept besides, for what the robot's own dynamics add
+    margin: float = 0.0  # rad or m of further distance, for the robot's own dynamics
     latency: float = 0.0  # s that the measured position may be late, besides one tick
 
 
@@ -196,7 +196,7 @@ class Body(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BodyTwist(msgspec.Struct, frozen=True, kw_only=True):
-    """Axes that together are the twist of a body, for what the 3D view draws as commanded; "" where there is none."""
+    """Axes that together are the twist of a body, for the commanded pose in the 3D view; "" without such an axis."""
 
     body: str
     frame: str = ""  # the body in whose axes the twist is given; "" for the world
@@ -251,7 +251,7 @@ class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     force_feeling: ForceFeeling | None = None
     body_twists: tuple[BodyTwist, ...] = ()
     start_warning: StartWarning | None = None
-    hold: float = 0.3  # s a command is held before the robot comes to rest by itself
+    hold: float = 0.3  # s a command is held before the robot comes to rest without another
     watchdog: float | None = (
         None  # s without a tick after which the robot is brought to rest; None: see docs/robot-link.md
     )

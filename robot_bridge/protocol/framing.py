@@ -21,7 +21,7 @@ def frame(payload: bytes) -> bytes:
 class FrameReader:
     """Cuts a byte stream into frames.
 
-    Feed what was read with `feed`, then iterate `frames`. The length is checked against the bound before the
+    Pass received bytes to `feed`, then iterate `frames`. The length is checked against the bound before the
     frame's bytes are waited for, so that at most `max_frame` bytes plus one read are ever kept. `max_frame` may be
     changed between frames.
     """
@@ -77,7 +77,7 @@ class FrameReader:
             del self._buffer[:position]
 
     def _begin_large(self, length: int, start: int) -> int:
-        """Move what is there of it; returns how far the buffer was used up."""
+        """Move the part that is there; returns how far the buffer was used up."""
         self._large, self._filled = bytearray(length), len(self._buffer) - start
         self._large[: self._filled] = memoryview(self._buffer)[start:]
         return len(self._buffer)

@@ -1,4 +1,4 @@
-"""What is said to a Janus over its WebSocket, and what it says back: JSON text, no I/O.
+"""Requests to a Janus over its WebSocket, and its answers: JSON text, no I/O.
 
 A request carries a `transaction` that its answer repeats. Requests to a plugin are acknowledged at once and answered
 by an event with the same transaction. It stands here because the console publishes and the headless client watches.
@@ -30,7 +30,7 @@ class Heard:
     kind: Kind
     transaction: str  # "" when it answers nothing
     handle: int  # 0: about the session
-    data: dict[str, Any]  # the plugin's, or what a success carries
+    data: dict[str, Any]  # the plugin's data, or a success' data
     jsep: dict[str, Any] | None  # a description that came with it
     detail: str  # of an error, or why it ended
     code: int  # of an error

@@ -1,4 +1,5 @@
-"""The shared secret of a robot link: who knows it can prove so without saying it (docs/robot-link.md, "The secret").
+"""The shared secret of a robot link: a side that knows it can prove so without sending it (docs/robot-link.md, "The
+secret").
 
 Each side proves it for the two nonces of this one handshake, so that a proof is worth nothing in another one.
 """
@@ -50,7 +51,7 @@ class LinkSecret:
         return cls(secrets.token_urlsafe(MIN_SECRET_BYTES))
 
     def reveal(self) -> str:
-        """The secret itself, to hand to a process of ours."""
+        """The secret itself, to hand to a child process."""
         return self._key.decode()
 
     def client_proof(self, client_nonce: bytes, bridge_nonce: bytes, role: str) -> bytes:

@@ -47,7 +47,7 @@ MAX_FAULTS = 64
 MAX_LIMITS = 512
 
 EventReference = Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]
-IssueNumber = Annotated[int, msgspec.Meta(ge=1, le=2**53 - 1)]  # what a JavaScript number holds exactly
+IssueNumber = Annotated[int, msgspec.Meta(ge=1, le=2**53 - 1)]  # a JavaScript number holds these exactly
 PingId = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 AxisValues = Annotated[list[float], msgspec.Meta(max_length=MAX_AXES)]
 Text = Annotated[str, msgspec.Meta(max_length=500)]
@@ -69,14 +69,14 @@ RefusalReason = Literal[
     "wrong_size",  # not one value per axis
     "malformed",  # not a message of the protocol
     "no_seat",  # the sender does not hold the control seat
-    "seat_taken",  # somebody else holds the control seat
+    "seat_taken",  # another peer holds the control seat
     "declined",  # the seat's holder said no, or nothing in time
     "not_neutral",  # a neutral command has to come first: new holder, stop, new link, fault, restart, suspend
     "unseen",  # its nonce is not that of the issue that it answers: the sender has not seen it
     "stale_reset",  # a reset that does not name the newest stop
     "too_soon",  # a reset within a second after the newest stop, or before a feedback showed that stop
     "not_kept",  # a reset that could not be written to the robot's disk
-    "locked_out",  # somebody at the robot keeps it from being driven
+    "locked_out",  # a person at the robot has locked it
     "warning",  # the robot warns before it moves, and has not warned long enough
     "silenced",  # a supervisor silenced the stops of this link
     "too_often",  # more notes than anyone can read
@@ -94,7 +94,7 @@ class StopState(msgspec.Struct, frozen=True):
     number: StopNumber = 0  # of the newest stop, also after its reset; never given twice; 0 before the first
     press: PressId = ""  # id of the press that became the newest stop
     kept: bool = True  # whether this state is on the robot's disk
-    locked_out: Text = ""  # why somebody at the robot keeps it from being driven; "" when nobody does
+    locked_out: Text = ""  # why a person at the robot has locked it; "" while it is not locked
 
 
 class Hello(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
@@ -105,7 +105,7 @@ class Hello(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="he
 
     version: int = PROTOCOL_VERSION
     role: LinkRole
-    name: Text = ""  # who is calling, for logs
+    name: Text = ""  # the client's name, for logs
     epoch: Text = ""  # one run of a bridge; only the bridge sets it
     description: RobotDescription | None = None  # only the bridge sets it
     nonce: Proof = b""  # 32 random bytes of a client that knows the secret; else empty

@@ -59,10 +59,10 @@ class Robot(ABC):
     """One robot. All methods are called from the bridge's event loop and must return at once.
 
     Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`.
-    Values reach `apply` already clamped, slew-limited and, when there is nothing to execute, at rest.
+    Values reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
 
     A method that raises ends the bridge. Before it does, the rest values are applied at the axes' brake rates, again
-    after each failure, then `stop` is called, then `close`; each call is made whatever the others raised.
+    after each failure, then `stop` is called, then `close`; each call is made even if the others raised.
     A new object is in the state that `reset` leaves behind; the bridge stops it when it was stopped before.
     """
 
@@ -104,15 +104,14 @@ class Robot(ABC):
         """Bring the robot to rest now, called from another thread while `apply`, `tick` or `measure` may hang.
 
         Called when no tick came for the description's `watchdog` seconds while the robot moves, and again every
-        so often until one comes. It must not wait for anything that a hanging method may hold, and what such a method
-        still writes when it goes on should not move the robot; the next tick applies rest values. Set
-        `rests_from_thread` where it can do that. It needs the interpreter's lock: native code that blocks
-        without releasing that holds up this call too.
+        so often until one comes. It must not wait for anything that a hanging method may hold, and the late writes of
+        such a method should not move the robot; the next tick applies rest values. Set `rests_from_thread` where it can
+        do that. It needs the interpreter's lock: native code that blocks without releasing that holds up this call too.
 
-        For such code there is `rest_call`. A process of its own imports that module when the bridge starts, and calls
-        the function with `rest_arguments`. What it returns is the function, without arguments, that brings the robot to
-        rest by a way of its own, and says False where nobody can have heard of that; it is called as this method is,
-        and also when the bridge is killed while the robot moves.
+        For such code there is `rest_call`. A separate process imports that module when the bridge starts, and calls
+        the function with `rest_arguments`. It returns a function, without arguments, that brings the robot to rest in
+        its own way, and returns False where no listener can have got that; it is called as this method is, and also
+        when the bridge is killed while the robot moves.
         """
         raise NotImplementedError
 
@@ -121,8 +120,8 @@ class Robot(ABC):
         """Keep the robot standing by the strongest means that software has: engage brakes, cut power, hold the place.
 
         Called when a stop was latched and the axes are back at their rest values (stop category 1 of IEC 60204-1 where
-        power is cut), when the bridge ends for whatever reason, and after a failure of any other method. May be called
-        again. Until `reset`, whatever reaches `apply` must not move the robot. Raising makes the bridge try again,
+        power is cut), when the bridge ends for any reason, and after a failure of any other method. May be called
+        again. Until `reset`, no value in `apply` may move the robot. Raising makes the bridge try again,
         twice, and end.
         """
 
@@ -130,9 +129,8 @@ class Robot(ABC):
         """The stop was released: undo `stop`. Must not move anything."""
 
     def locked_out(self) -> str:
-        """Why somebody at the robot keeps it from being driven (key switch, teach pendant); "" when nobody does.
-
-        Asked in every tick. While it says so the robot is stopped, and nobody far away can release it.
+        """Why a person at the robot has locked it (key switch, teach pendant); "" while it is not locked. Asked in
+        every tick. While the robot is locked it is stopped, and no remote person can release it.
         """
         return ""
 
@@ -141,4 +139,4 @@ class Robot(ABC):
         return ()
 
     def close(self) -> None:
-        """Release what the robot holds."""
+        """Release the robot's resources."""

@@ -25,7 +25,7 @@ class CameraSource(MediaSource, Generic[State]):
     def __init__(
         self, camera: Camera, draw: Callable[[State, int], bytes | Awaitable[bytes]], state: Callable[[], State]
     ) -> None:
-        """`draw`: the state as yuv420p, and the event where the picture is to show it. `state`: what it is now."""
+        """`draw`: the state as yuv420p, and the event where the picture is to show it. `state`: the present one."""
         self._camera = camera
         self._draw = draw
         self._state = state

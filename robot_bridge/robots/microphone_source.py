@@ -1,4 +1,4 @@
-"""A microphone of a simulated robot: segments of sound, made of what was heard."""
+"""A microphone of a simulated robot: segments of sound, made from the simulation's sounds."""
 
 import asyncio
 import time

@@ -1,4 +1,4 @@
-"""Robots by name. Each is imported only when asked for: what one needs, the others do without."""
+"""Robots by name. Each is imported only when asked for: a robot's packages are not needed for the others."""
 
 from importlib import import_module
 
@@ -22,8 +22,7 @@ def create_robot(name: str) -> Robot:
     """A new robot.
 
     Raises:
-        UnknownRobot: there is none of that name.
-        RobotUnavailable: something it needs is missing on this machine.
+        UnknownRobot: no robot has that name. RobotUnavailable: a package that it needs is missing on this machine.
     """
     if name not in _PACKAGES:
         raise UnknownRobot(f"no robot {name!r}; there are {', '.join(robot_names())}")

@@ -20,15 +20,15 @@ __all__ = ["Agent"]
 
 
 class Agent:
-    """Finds a path to the peer and keeps it; opens no socket, and is handed the time.
+    """Finds a path to the peer and keeps it; opens no socket, and gets the time from its caller.
 
     Signalling carries `local_credentials` and `local_candidates` to the peer, and the peer's to `set_remote`. Then the
     agent lives by `receive_datagram` and `handle_timer`; drain `datagrams_to_send` and `events` after each. `path` is
     where to send. A restart is `restart` and then `set_remote`; the path stays until the new session has nominated one.
-    An agent that has not heard of its peer waits without end: whoever made it bounds that.
+    An agent without a message from its peer waits without end: its owner bounds that.
 
     Args:
-        local_candidates: Where the peer may reach us, and the addresses that datagrams leave from.
+        local_candidates: The addresses for the peer, and those that datagrams leave from.
         controlling: Whether this agent decides on the path: the one whose offer began the session does, unless the
             peer is a lite agent. If both believe it, tie-breakers settle that.
         directory: Shared by agents that share sockets.
@@ -47,7 +47,7 @@ class Agent:
         self._settings = settings or IceSettings()
         self.local_candidates: tuple[LocalCandidate, ...] = ()
         self._set_candidates(local_candidates)
-        self.counts: Counter[str] = Counter()  # what was dropped, by reason
+        self.counts: Counter[str] = Counter()  # dropped datagrams, by reason
         # Requests from paths that it has not claimed; `Port` asks before it passes one on.
         self.unclaimed = TokenBuckets(self._settings.max_checks_per_second, self._settings.check_burst)
         self._directory = directory or Directory()
@@ -88,7 +88,7 @@ class Agent:
             self.add_remote_candidate(candidate)
 
     def add_remote_candidate(self, candidate: Candidate) -> None:
-        """One more, as it comes (RFC 8838). Names and addresses that nobody can send to are counted and ignored."""
+        """One more candidate, as it arrives (RFC 8838). Names and unreachable addresses are counted and ignored."""
         session = self._next or self._current
         remote = session.remote_credentials
         if remote is not None and candidate.ufrag not in (None, remote.ufrag):
@@ -103,10 +103,9 @@ class Agent:
             session.add_remote_candidate(candidate)
 
     def restart(self, now: float, local_candidates: Iterable[LocalCandidate] | None = None) -> Credentials:
-        """Begin another session (RFC 8445 9), in place of one that has not finished. Returns what to signal.
-
-        `Restarted` or `RestartFailed` follows. `local_candidates`: where the peer may reach us from now on, as after a
-        change of the network; None: where it could.
+        """Begin another session (RFC 8445 9), in place of one that has not finished. Returns the credentials to signal.
+        `Restarted` or `RestartFailed` follows. `local_candidates`: the addresses for the peer from now on, as after a
+        change of the network; None: as before.
         """
         if local_candidates is not None:
             self._set_candidates(local_candidates)
@@ -170,7 +169,8 @@ class Agent:
         return min((each for each in times if each is not None), default=None)
 
     def handle_timer(self, now: float) -> None:
-        """Hand over first what the sockets hold: after a pause of the whole process, answers count before the clock."""
+        """Hand over the sockets' datagrams first: after a pause of the whole process, answers count before the
+        clock."""
         if self._retired is not None and now >= self._retired[1]:
             self._retired[0].end()
             self._retired = None
@@ -242,7 +242,7 @@ class Agent:
         self.counts["unknown_transaction"] += 1
 
     def _settle(self, now: float) -> None:
-        """Let sessions follow one another, collect what they send, and say what has changed."""
+        """Let sessions follow one another, collect their datagrams, and report changes."""
         if self.ended:
             return
         for session in self._sessions():

@@ -23,7 +23,7 @@ CandidateType = Literal["host", "srflx", "prflx", "relay"]
 TcpType = Literal["active", "passive", "so"]
 
 TYPE_PREFERENCES: dict[CandidateType, int] = {"host": 126, "prflx": 110, "srflx": 100, "relay": 0}  # RFC 8445 5.1.2.2
-TCP_TYPE_STEP = 36  # TCP comes after UDP of the same type, before what is relayed (RFC 6544 4.2)
+TCP_TYPE_STEP = 36  # TCP comes after UDP of the same type, before relayed candidates (RFC 6544 4.2)
 TCP_DIRECTIONS: dict[TcpType, int] = {"active": 6, "passive": 4, "so": 2}  # of host candidates (RFC 6544 4.2)
 MAX_LINE = 1024  # characters; the longest name of a host has 255
 MAX_EXTENSIONS = 16  # pairs of words after the candidate's type
@@ -61,7 +61,7 @@ class Candidate:
 
     @property
     def is_ip_address(self) -> bool:
-        """False for names: those of mDNS need a resolver. An address with a zone means nothing to another host."""
+        """False for names: mDNS names need a resolver. An address with a zone means nothing to another host."""
         return "%" not in self.host and _ip_address(self.host) is not None
 
     @property
@@ -135,8 +135,8 @@ def pair_priority(controlling: int, controlled: int) -> int:
 
 
 def foundation(kind: CandidateType, base: str, transport: Transport) -> str:
-    """A number as text, equal for equal arguments (RFC 8445 5.1.1.3). It need not be unique: what is alike is only
-    tried one after the other."""
+    """A number as text, equal for equal arguments (RFC 8445 5.1.1.3). It need not be unique: candidates with one number
+    are tried one after the other."""
     return str(zlib.crc32(f"{kind} {base} {transport}".encode()))
 
 

@@ -13,7 +13,7 @@ __all__ = ["CheckList", "LocalCandidate", "Pair", "PairState", "bases"]
 
 @dataclass(frozen=True, slots=True)
 class LocalCandidate:
-    """A candidate of ours, and the address that its datagrams leave from (RFC 8445 4: its base)."""
+    """A local candidate, and the address that its datagrams leave from (RFC 8445 4: its base)."""
 
     candidate: Candidate
     base: Address
@@ -34,9 +34,9 @@ class PairState(Enum):
 
 @dataclass(slots=True, eq=False)
 class Pair:
-    """A candidate of ours and one of the peer's."""
+    """A local candidate and one of the peer's."""
 
-    path: Path  # from the base of ours: what is sent from there, the peer sees coming from our candidate
+    path: Path  # from the local base: the peer sees its datagrams coming from the local candidate
     local: Candidate
     remote: Candidate
     state: PairState = PairState.WAITING
@@ -65,7 +65,7 @@ class CheckList:
                 self.pairs[path] = Pair(path, local.candidate, remote)
 
     def trim(self, controlling: bool, in_use: Pair | None) -> list[Pair]:
-        """Remove what is too much: the worst that has not succeeded (RFC 8445 6.1.2.5). Returns what was removed."""
+        """Remove the pairs beyond the bound: the worst that have not succeeded (RFC 8445 6.1.2.5). Returns them."""
         removed: list[Pair] = []
         while len(self.pairs) > self._max_pairs:
             others = [pair for pair in self.pairs.values() if pair is not in_use]
@@ -75,12 +75,12 @@ class CheckList:
         return removed
 
     def next_ordinary(self, controlling: bool) -> Pair | None:
-        """The pair to check next, of those that nothing has triggered (RFC 8445 6.1.4.2)."""
+        """The pair to check next, without triggered ones (RFC 8445 6.1.4.2)."""
         waiting = (pair for pair in self.pairs.values() if pair.state is PairState.WAITING)
         return max(waiting, key=lambda pair: pair.priority(controlling), default=None)
 
     def remove_undecided(self) -> list[Pair]:
-        """A pair is nominated: what has not succeeded need not be tried any more (RFC 8445 8.1.2)."""
+        """A pair is nominated: pairs that have not succeeded need no more checks (RFC 8445 8.1.2)."""
         removed = [pair for pair in self.pairs.values() if pair.state is not PairState.SUCCEEDED]
         for pair in removed:
             del self.pairs[pair.path]
@@ -96,7 +96,7 @@ def may_pair(local: LocalCandidate, remote: Candidate) -> bool:
     if local.candidate.component != remote.component or local.candidate.transport != remote.transport:
         return False
     if local.candidate.transport == "tcp" and (local.candidate.tcp_type, remote.tcp_type) != ("active", "passive"):
-        return False  # RFC 6544 6.2: whoever listens learns of a pair when the connection comes
+        return False  # RFC 6544 6.2: the passive side learns of a pair when the connection arrives
     here, there = ipaddress.ip_address(local.base[0]), ipaddress.ip_address(remote.host)
     if here.version != there.version:
         return False

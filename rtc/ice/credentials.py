@@ -39,6 +39,6 @@ class Credentials:
 
 
 def new_credentials(random_bytes: Callable[[int], bytes] = secrets.token_bytes) -> Credentials:
-    """For one session; `random_bytes` makes as many as it is asked for, and nobody can foresee them."""
+    """For one session; `random_bytes` makes as many as it is asked for, and they must be unpredictable."""
     ufrag, password = base64.b64encode(random_bytes(UFRAG_BYTES)), base64.b64encode(random_bytes(PASSWORD_BYTES))
     return Credentials(ufrag.decode(), password.decode())

@@ -1,4 +1,5 @@
-"""Whose datagram it is, where many agents share sockets: agents enter here what is theirs, and remove it again."""
+"""The owner of a datagram, where many agents share sockets: agents enter their users, transactions and paths here, and
+remove them again."""
 
 from typing import TYPE_CHECKING
 
@@ -13,9 +14,9 @@ __all__ = ["Directory"]
 class Directory:
     """Each entry belongs to one agent, which alone removes it.
 
-    A path is *claimed* when its far end has answered a check: whoever forges a source address never sees what it would
-    have to answer. A path is *hinted at* when an authenticated check came from there; a hint lets data through that
-    overtake the answer, and never takes a path from the agent that has claimed it.
+    A path is *claimed* when its far end has answered a check: an attacker with a forged source address never sees the
+    check that it would have to answer. A path is *hinted at* when an authenticated check came from there; a hint lets
+    data through that overtake the answer, and never takes a path from the agent that has claimed it.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What an ICE agent tells whoever uses it."""
+"""The events of an ICE agent for its user."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -17,10 +17,10 @@ class AdvertisedError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Advertised:
-    """An address at which a NAT forwards every port to ours, as cloud machines and container networks have it."""
+    """An address at which a NAT forwards every port to this machine, as for cloud machines and container networks."""
 
     outer: str
-    inner: str | None = None  # the address of ours that it forwards to; None: the first of its IP version, but loopback
+    inner: str | None = None  # the local address that it forwards to; None: the first of its IP version, but loopback
 
 
 def parse_advertised(text: str) -> Advertised:
@@ -57,7 +57,7 @@ def gather(
     for place, each in enumerate(advertised):
         inner = each.inner or _first_of_version(hosts, each.outer)
         if inner not in hosts:
-            continue  # nothing of ours stands behind it
+            continue  # no local address is behind it
         preference = 65535 - place
         found.append(_local("srflx", (each.outer, port), (inner, port), preference))
         if tcp_port is not None:
@@ -66,7 +66,7 @@ def gather(
 
 
 def reflexive(mapped: Address, base: Address, place: int) -> LocalCandidate:
-    """What a STUN server sees of the socket at `base`; those of a lower `place` are preferred."""
+    """The mapped address of the socket at `base`, by a STUN server; a lower `place` is preferred."""
     return _local("srflx", mapped, base, 65535 - place)
 
 

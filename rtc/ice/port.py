@@ -1,12 +1,11 @@
-"""Many ICE agents on one UDP port: whose datagram it is, and what strangers may cost.
-
-Nothing that a stranger sends makes anything grow: until MESSAGE-INTEGRITY holds, the only state is a table of a fixed
-size. The checks of that run from the cheap to the dear:
+"""Many ICE agents on one UDP port: the owner of each datagram, and bounds on the cost of strangers. No datagram of a
+stranger makes a table grow: until MESSAGE-INTEGRITY holds, the only state is a table of a fixed size. The checks of
+that run from the cheap to the dear:
 
 1. A response must name a transaction that an agent has begun; a request must name a user that exists. Both are one look
-   into a dictionary, and whoever has not seen our signalling cannot guess either.
+   into a dictionary, and an attacker who has not seen the signalling cannot guess either.
 2. From a path that the agent has not claimed, requests pass a rate limit for their source, one for the agent, and one
-   for all together: whoever has a user's name, a peer of ours or somebody who listens, uses up that user's rate alone.
+   for all together: a sender with a user's name, a peer or an eavesdropper, uses up that user's rate alone.
 3. The agent checks the integrity, and only then remembers anything.
 """
 
@@ -26,7 +25,7 @@ __all__ = ["Port", "PortSettings"]
 
 @dataclass(frozen=True, slots=True)
 class PortSettings:
-    """Bounds of what comes from paths that its agent has not claimed."""
+    """Bounds for datagrams from paths that their agent has not claimed."""
 
     source_rate: float = 100.0  # requests a second of one address (IPv6: network): several browsers that connect
     source_burst: float = 200.0
@@ -36,11 +35,11 @@ class PortSettings:
 
 
 class Port:
-    """Give agents `directory`; hand what comes in to whomever `route` returns."""
+    """Give agents `directory`; hand a datagram to the agent that `route` returns."""
 
     def __init__(self, settings: PortSettings | None = None) -> None:
         self.directory = Directory()
-        self.counts: Counter[str] = Counter()  # what was dropped, by reason
+        self.counts: Counter[str] = Counter()  # dropped datagrams, by reason
         self._limit = SourceLimit(settings or PortSettings())
 
     def route(self, data: bytes, path: Path, now: float) -> Agent | None:
@@ -81,7 +80,7 @@ class SourceLimit:
 
     def __init__(self, settings: PortSettings) -> None:
         # A dictionary of sources would grow with forged ones, or forget honest ones. Python seeds the hash of texts
-        # anew in each process, so that nobody can choose whose slot to share.
+        # anew in each process, so that no sender can choose a slot to share.
         self._sources = TokenBuckets(settings.source_rate, settings.source_burst, settings.source_slots)
         self._total = TokenBuckets(settings.total_rate, settings.total_burst)
 

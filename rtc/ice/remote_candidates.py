@@ -1,4 +1,4 @@
-"""The addresses at which a session's peer may be: those that signalling names, and those that its checks show."""
+"""The addresses at which a session's peer may be: from signalling, and from its checks."""
 
 from rtc.addresses import Path
 from rtc.ice.candidates import Candidate, foundation
@@ -10,7 +10,7 @@ Key = tuple[str, str, int]  # transport, host, port
 
 
 class RemoteCandidates:
-    """Both kinds are bounded by themselves: checks from many addresses leave room for what signalling names."""
+    """Each kind has its own bound: checks from many addresses leave room for signalled candidates."""
 
     def __init__(self, settings: IceSettings) -> None:
         self._settings = settings

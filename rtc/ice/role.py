@@ -18,7 +18,7 @@ class Role:
         return (request.controlling if self.controlling else request.controlled) is not None
 
     def keeps_against(self, request: Message) -> bool:
-        """In a conflict: whether our role stands and the peer is told to change (RFC 8445 7.3.1.1)."""
+        """In a conflict: whether the own role stands and the peer has to change (RFC 8445 7.3.1.1)."""
         theirs = request.controlling if self.controlling else request.controlled
         # The greater tie-breaker controls; of equal ones, the agent that is asked.
         return (self.tie_breaker >= (theirs or 0)) is self.controlling

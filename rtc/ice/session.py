@@ -27,10 +27,10 @@ ROLE_CONFLICT = 487
 
 
 class Session:
-    """What RFC 8445 calls an ICE session; a restart begins another one. `Agent` owns it and passes datagrams on.
+    """An ICE session (RFC 8445); a restart begins another one. `Agent` owns it and passes datagrams on.
 
-    `selected` is the pair to send on; it is set as soon as one works, and changes with nomination. `counts` has what
-    was dropped, by reason, and is shared with the agent.
+    `selected` is the pair to send on; it is set as soon as one works, and changes with nomination. `counts` has the
+    dropped datagrams, by reason, and is shared with the agent.
     """
 
     def __init__(
@@ -135,7 +135,7 @@ class Session:
         request = self._authentic(data, self.local_credentials.password)
         if request is None:
             return
-        # Recorded checks that somebody sends again and again do not use up what the peer may ask.
+        # Recorded checks that an attacker sends again and again do not use up the peer's rate.
         is_new = request.transaction not in self._seen
         if not (self._answers if is_new else self._answers_again).take(now):
             self._counts["checks_over_rate"] += 1
@@ -164,7 +164,7 @@ class Session:
             return
         response = self._authentic(data, self.remote_credentials.password)
         if response is None:
-            return  # also an error without integrity: anybody could have made it
+            return  # also an error without integrity: any sender could have made it
         if path != transaction.path or response.not_understood:  # RFC 8445 7.2.5.2.1, RFC 8489 6.3.3
             self._counts["unexpected_response"] += 1
             return
@@ -244,9 +244,9 @@ class Session:
     def _learn_from_check(self, request: Message, path: Path, is_new: bool, now: float) -> None:
         """RFC 8445 7.3.1.3 to 7.3.1.5.
 
-        A known check that comes again may be the peer's own repetition, by another port of its NAT, or somebody's who
-        has recorded it. It may show a path, which counts for nothing until the peer has answered there; it is no sign
-        of consent, and does not choose among paths that work.
+        A known check that comes again may be the peer's own repetition, by another port of its NAT, or that of an
+        attacker who has recorded it. It may show a path, which counts for nothing until the peer has answered there; it
+        is no sign of consent, and does not choose among paths that work.
         """
         pair = self._list.pairs.get(path) or self._pair_shown_by(request, path, now)
         if pair is None:
@@ -297,7 +297,7 @@ class Session:
         return not crowd
 
     def _local_at(self, path: Path) -> Candidate:
-        """The candidate whose base was asked; an address that nobody has gathered is a host's as well."""
+        """The candidate whose base was asked; an address without a candidate counts as a host candidate."""
         for local in self._locals:
             if local.base == path.local and local.candidate.transport == path.transport:
                 return local.candidate
@@ -306,7 +306,7 @@ class Session:
         name, priority = foundation("host", host, path.transport), candidate_priority("host", 0, tcp_type)
         return Candidate(name, 1, path.transport, priority, host, port, "host", tcp_type=tcp_type)
 
-    # Checks of ours
+    # Own checks
 
     @property
     def is_nominated(self) -> bool:
@@ -345,7 +345,7 @@ class Session:
         return not self.is_nominated and self._list.next_ordinary(self._role.controlling) is not None
 
     def _begin_next_check(self, now: float) -> None:
-        """RFC 8445 6.1.4.2: what was triggered first."""
+        """RFC 8445 6.1.4.2: triggered checks first."""
         pair = self._triggered.popleft() if self._triggered else None
         if pair is None and not self.is_nominated:
             pair = self._list.next_ordinary(self._role.controlling)
@@ -355,7 +355,7 @@ class Session:
             self._next_check_at = now + self._settings.check_interval
 
     def _send_consent_check(self, pair: Pair, now: float) -> None:
-        """Repeats the nomination as well, so that a peer that sees another address of ours moves there at once."""
+        """Repeats the nomination as well, so that a peer that sees another address of this side moves there at once."""
         self._send_check(pair, now, nominates=self._role.controlling and pair.nominated)
 
     def _send_check(self, pair: Pair, now: float, nominates: bool) -> Transaction:
@@ -502,6 +502,7 @@ class Session:
 
 
 def as_peer_reflexive(candidate: Candidate) -> int:
-    """The PRIORITY of a check: what the peer would give a peer-reflexive candidate of this base (RFC 8445 7.1.1)."""
+    """The PRIORITY of a check: the priority that the peer would give a peer-reflexive candidate of this base (RFC 8445
+    7.1.1)."""
     local_preference = candidate.priority >> 8 & (0x1FFF if candidate.tcp_type else 0xFFFF)
     return candidate_priority("prflx", local_preference, candidate.tcp_type)

@@ -15,12 +15,10 @@ class IceSettings:
     last_wait: int = 16  # times `rto`, after the last transmission (Rm, RFC 8489 6.2.1)
     connect_seconds: float = 40.0  # from the peer's credentials to the first path: all transmissions of a check, 39.5 s
     nomination_wait: float = 0.1  # at least, for a better pair than the first that works
-    rival_wait: float = (
-        1.0  # at least, for an answer on the path in use before a worse one that was nominated replaces it
-    )
+    rival_wait: float = 1.0  # at least, for an answer on the path in use before a worse, nominated path replaces it
     consent_seconds: float = 30.0  # after the last valid answer or check (RFC 7675 5.1)
     consent_interval: tuple[float, float] = (4.0, 6.0)  # between two checks, drawn evenly (RFC 7675 5.1)
-    retired_seconds: float = 30.0  # for which the path before a restart is still heard: what was under way is not lost
+    retired_seconds: float = 30.0  # for which the path before a restart is still heard: datagrams are under way there
     max_pairs: int = 100  # RFC 8445 6.1.2.5
     max_local_candidates: int = 32
     max_remote_candidates: int = 32  # that signalling names; a browser with many interfaces has about twenty

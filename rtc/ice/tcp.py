@@ -22,14 +22,14 @@ def frame(data: bytes) -> bytes:
 
 
 class TcpFraming:
-    """Datagrams out of the bytes of one connection, whatever pieces they come in.
-
-    A peer may not promise more than `max_datagram` bytes: what is promised is kept until it is there. After `too_long`
-    close the connection; nothing that follows can be told apart.
+    """Datagrams out of the bytes of one connection, in pieces of any size. A peer may not announce more than
+    `max_datagram` bytes, because the beginning is kept until the end is there. After `too_long` close the connection;
+    the frames that follow cannot be told apart.
     """
 
     def __init__(self, max_datagram: int = 2048) -> None:
-        """`max_datagram`: a path of Ethernet has at most 1,500 bytes, and peers send TCP what they send UDP."""
+        """`max_datagram`: a path of Ethernet has at most 1,500 bytes, and peers send the same datagrams over TCP and
+        UDP."""
         self._max = max_datagram
         self._kept = bytearray()
         self.too_long = False

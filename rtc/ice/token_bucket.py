@@ -8,7 +8,7 @@ __all__ = ["TokenBuckets"]
 class TokenBuckets:
     """`take` permits `burst` at once and `rate` a second in the long run, in each of `count` buckets.
 
-    The memory is of one size from the beginning, whatever comes.
+    The memory has one size from the beginning, under any load.
     """
 
     def __init__(self, rate: float, burst: float, count: int = 1) -> None:

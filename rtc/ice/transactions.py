@@ -1,4 +1,4 @@
-"""A STUN transaction (RFC 8489 6.2): what was asked, when to ask again, and until when an answer counts."""
+"""A STUN transaction (RFC 8489 6.2): its request, when to repeat it, and until when an answer counts."""
 
 from dataclasses import dataclass
 

@@ -37,9 +37,8 @@ class TransportNumbers:
 
 
 class ExtensionWriter(Stage):
-    """Writes the extensions of a stream: fixed ones, the packet's own `values`, and what is known only when it leaves.
-
-    It is the last stage of the way out: a packet that waited in the pacer says when it really left.
+    """Writes the extensions of a stream: fixed ones, the packet's own `values`, and values that are known only when it
+    leaves. It is the last stage of the way out: a packet that waited in the pacer says when it really left.
     """
 
     def __init__(
@@ -49,14 +48,15 @@ class ExtensionWriter(Stage):
         fixed: Mapping[str, bytes] | None = None,
         numbers: TransportNumbers | None = None,
     ) -> None:
-        """`ids`: what was negotiated, by URI; `fixed`: values of every packet, by URI. What has no id is left out."""
+        """`ids`: the negotiated ids, by URI; `fixed`: values of every packet, by URI. A value without an id is left
+        out."""
         super().__init__(following)
         self._ids = dict(ids)
         self._fixed = {self._ids[uri]: value for uri, value in (fixed or {}).items() if uri in self._ids}
         self._send_time = self._ids.get(ABS_SEND_TIME_URI)
         self._number = self._ids.get(TRANSPORT_NUMBER_URI)
         self._numbers = numbers or TransportNumbers()
-        # RFC 8285 4.1.2: one stream does not mix both forms, as long as nobody agreed to it.
+        # RFC 8285 4.1.2: one stream does not mix both forms, unless both sides agreed to it.
         self._two_byte = any(number > ONE_BYTE_MAX_ID for number in self._ids.values())
 
     def rtp(self, packet: RtpPacket, now: float) -> None:

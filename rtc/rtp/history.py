@@ -1,4 +1,4 @@
-"""The stage that remembers what was sent, and sends it again when the peer asks (RFC 4585 6.2.1, RFC 4588)."""
+"""The stage that keeps sent packets, and sends them again when the peer asks (RFC 4585 6.2.1, RFC 4588)."""
 
 from collections import OrderedDict
 from dataclasses import dataclass, replace

@@ -14,7 +14,7 @@ from rtc.rtp.stage import RoundTrip, Sink, StreamEvent
 
 __all__ = ["IncomingParameters", "IncomingStream"]
 
-KEYFRAME_INTERVAL = 0.5  # s between two requests: one that is on its way would only be made twice
+KEYFRAME_INTERVAL = 0.5  # s between two requests: a keyframe that is on its way would only be made twice
 
 
 @dataclass(frozen=True, slots=True)

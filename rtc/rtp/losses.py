@@ -1,4 +1,4 @@
-"""The stage that finds what is missing and asks for it (RFC 4585 6.2.1), on the way in."""
+"""The stage that finds missing packets and asks for them (RFC 4585 6.2.1), on the way in."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ class LossSettings:
     patience: float = 0.01  # s before a packet counts as lost: networks reorder a little
     again: float = 1.1  # round trips between two requests: a sender answers no second one within its own
     tries: int = 8  # times that a packet is asked for
-    seconds: float = 1.5  # after that nobody waits for it any more
+    seconds: float = 1.5  # after that no receiver waits for it any more
     missing: int = 512  # packets that are waited for; with more a keyframe is sooner there
 
 
@@ -34,7 +34,7 @@ class Losses(Stage):
     ) -> None:
         super().__init__(following)
         self.lost = 0  # packets that did not come in time
-        self.repeated = 0  # packets that came twice, or after nobody waited for them any more; they are dropped
+        self.repeated = 0  # packets that came twice or too late; they are dropped
         self._own_ssrc = own_ssrc
         self._ssrc = ssrc
         self._round_trip = round_trip

@@ -103,7 +103,7 @@ class OutgoingStream:
             self.reports.rtp(packet, now)
 
     def rtcp(self, packet: RtcpPacket, now: float) -> None:
-        """An RTCP packet of the peer; what is about other streams does nothing here."""
+        """An RTCP packet of the peer; parts about other streams have no effect here."""
         self.reports.rtcp(packet, now)
 
     def close(self, now: float) -> None:

@@ -15,7 +15,7 @@ class PacerSettings:
     burst: int = 15_000  # bytes that may leave at once: an ordinary picture never waits
     free_rate: float = 20_000_000.0  # bit/s towards a peer whose path has shown no limit
     headroom: float = 2.5  # times the rate that the path is believed to carry
-    waiting: int = 4096  # packets; what comes behind them is dropped, the peer will ask for it
+    waiting: int = 4096  # packets; further ones are dropped, and the peer will ask for them
     least_wait: float = 0.001  # s between two looks; timers are no finer
 
 

@@ -9,7 +9,7 @@ from rtc.rtp.errors import RtpError
 __all__ = ["RtpPacket", "pack_extensions", "parse_extensions"]
 
 HEADER = struct.Struct("!BBHII")
-ONE_BYTE, TWO_BYTE = 0xBEDE, 0x1000  # RFC 8285 4.2, 4.3; the lowest four bits of the latter are anybody's
+ONE_BYTE, TWO_BYTE = 0xBEDE, 0x1000  # RFC 8285 4.2, 4.3; the lowest four bits of the latter are free
 ONE_BYTE_IDS = range(1, 15)  # 15 ends the list, 0 is padding
 ONE_BYTE_LENGTHS = range(1, 17)
 MAX_LENGTH = 255  # bytes of one element
@@ -17,7 +17,7 @@ MAX_LENGTH = 255  # bytes of one element
 
 @dataclass(slots=True)
 class RtpPacket:
-    """One packet. Stages fill it in on its way; whoever hands it on does not change it any more."""
+    """One packet. Stages fill it in on its way; a stage does not change it after handing it on."""
 
     payload_type: int
     sequence_number: int  # 16 bits
@@ -74,7 +74,7 @@ def parse_extensions(profile: int, block: bytes) -> dict[int, bytes]:
         return _parse_elements(block, one_byte=True)
     if profile & 0xFFF0 == TWO_BYTE:
         return _parse_elements(block, one_byte=False)
-    return {}  # RFC 3550 5.3.1: something of somebody else's
+    return {}  # RFC 3550 5.3.1: another application's extension
 
 
 def _parse_elements(block: bytes, *, one_byte: bool) -> dict[int, bytes]:

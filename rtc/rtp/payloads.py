@@ -11,7 +11,7 @@ FU_START = 0x80
 
 
 class PayloadError(ValueError):
-    """A payload that is none of its codec."""
+    """A payload that is invalid for its codec."""
 
 
 class Vp8Part(NamedTuple):

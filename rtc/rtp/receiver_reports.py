@@ -1,4 +1,4 @@
-"""The stage that counts what comes in and reports it (RFC 3550 6.4.2, A.3, A.8)."""
+"""The stage that counts received packets and reports them (RFC 3550 6.4.2, A.3, A.8)."""
 
 from dataclasses import dataclass
 

@@ -10,7 +10,8 @@ __all__ = ["Repairs"]
 
 class Repairs(Stage):
     def __init__(self, following: Stage, ssrc: int, payload_types: Mapping[int, int]) -> None:
-        """`ssrc`: of the stream that is repaired; `payload_types`: of a retransmission, to that of what it repeats."""
+        """`ssrc`: of the repaired stream; `payload_types`: from a retransmission's type to that of the repeated
+        packet."""
         super().__init__(following)
         self.repaired = 0  # packets
         self.empty = 0  # retransmissions of nothing: some senders fill up with them to measure the path

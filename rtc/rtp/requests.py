@@ -1,4 +1,4 @@
-"""The stage that hears what a peer asks of an encoder: keyframes (RFC 4585 6.3.1, RFC 5104 4.3.1) and a bitrate."""
+"""The stage that reads a peer's requests to an encoder: keyframes (RFC 4585 6.3.1, RFC 5104 4.3.1) and a bitrate."""
 
 from dataclasses import dataclass
 

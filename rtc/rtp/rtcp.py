@@ -135,7 +135,7 @@ def _split(data: bytes) -> Iterator[tuple[int, int, bytes]]:
         end = position
         if first & 0x20:  # padding, of the last packet only (RFC 3550 6.4.1)
             if end == start or position != len(data) or not 0 < data[end - 1] <= end - start:
-                raise RtpError("RTCP padding that is none")
+                raise RtpError("invalid RTCP padding")
             end -= data[end - 1]
         yield kind, first & 0x1F, data[start:end]
 

@@ -1,4 +1,4 @@
-"""The stage that counts what is sent, reports it, and reads what the peer reports back (RFC 3550 6.4)."""
+"""The stage that counts sent packets, reports them, and reads the peer's reports (RFC 3550 6.4)."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from rtc.rtp.stage import Reception, RoundTrip, Stage
 __all__ = ["SenderReports", "SenderReportSettings"]
 
 NTP_EPOCH = 2_208_988_800  # s from 1900 to 1970
-MOST_EXPECTED = 100_000  # packets between two reports of a peer; more is nonsense
+MOST_EXPECTED = 100_000  # packets between two reports of a peer; more is invalid
 
 
 @dataclass(frozen=True, slots=True)
 class SenderReportSettings:
-    interval: float = 1.0  # s; RFC 3550 6.2 would let video report more often, which tells nobody more
+    interval: float = 1.0  # s; RFC 3550 6.2 would let video report more often, without a use
     remembered: int = 16  # reports that an answer may name; over a satellite the newest is not the one
 
 

@@ -1,7 +1,7 @@
 """The interface of all stages that packets pass, on the way out and on the way in.
 
-A stage wraps the next one and knows nothing else: it takes what comes, does its one thing, and hands on what is to go
-on. The last one is a `Sink`, which collects. Whoever owns the chain calls its first stage and drains the sink.
+A stage wraps the next one and knows no other: it takes a packet, does its one thing, and passes packets on. The last
+one is a `Sink`, which collects. The owner of the chain calls its first stage and drains the sink.
 
     way out:  application → reports → history → keyframe requests → pacer → extensions → sink → encryption
     way in:   decryption → extensions → reports → repairs → losses → sink → application
@@ -40,7 +40,7 @@ class KeyframeRequested:
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """What the peer reported about a stream of ours, since its report before."""
+    """The peer's report about an own stream, since its previous report."""
 
     ssrc: int
     expected: int  # packets
@@ -89,7 +89,7 @@ StreamEvent = KeyframeRequested | Reception | BandwidthEstimate | Arrivals | Pac
 
 @dataclass(slots=True)
 class RoundTrip:
-    """The round trip of one peer's path. Reports measure it; whoever waits for an answer reads it."""
+    """The round trip of one peer's path. Reports measure it; stages that wait for an answer read it."""
 
     seconds: float = 0.1  # an assumption before one was measured
     measured: bool = field(default=False)
@@ -99,7 +99,7 @@ class RoundTrip:
 
 
 class Stage:
-    """Does nothing but hand on. Stages override what concerns them, and call `super()` for what is to go on."""
+    """Passes everything on. Stages override their methods, and call `super()` to pass on."""
 
     def __init__(self, following: "Stage") -> None:
         self.following = following
@@ -129,7 +129,7 @@ class Stage:
         return None
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due."""
+        """Do the due work."""
         self.following.handle_timer(now)
 
 

@@ -29,7 +29,7 @@ class Identity:
     """What we call ourselves in RTP."""
 
     cname: str
-    ssrc: int  # of whoever receives only
+    ssrc: int  # of a receiver only
 
     @classmethod
     def new(cls, random: Random) -> "Identity":
@@ -41,7 +41,7 @@ class NegotiatedMedia:
     """One section, after the answer."""
 
     section: MediaSection  # the answer's: codecs and header extensions in use
-    direction: Direction  # ours
+    direction: Direction  # the own one
     ssrc: int  # of what we send
     repair_ssrc: int
     announced: frozenset[int] = frozenset()  # SSRCs that the peer has named
@@ -53,7 +53,7 @@ class NegotiatedMedia:
 
 
 class Streams:
-    """`counts`: "rtp_malformed", "rtcp_malformed", and what the router could not place."""
+    """`counts`: "rtp_malformed", "rtcp_malformed", and packets that the router could not place."""
 
     def __init__(self, media: Sequence[NegotiatedMedia], identity: Identity, share: PathShare, random: Random) -> None:
         self.counts: Counter[str] = Counter()
@@ -90,7 +90,7 @@ class Streams:
             return
         for packet in packets:
             for stream in self._all():
-                stream.rtcp(packet, now)  # each takes what is about itself
+                stream.rtcp(packet, now)  # each takes the parts about itself
 
     def timer(self) -> float | None:
         return earliest(*(stream.timer() for stream in self._all()))

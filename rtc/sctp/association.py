@@ -53,7 +53,7 @@ __all__ = ["Association", "State"]
 MOST_STREAMS = 65535  # announced; RFC 8831 6.2
 ROOM_BESIDE_SACK = 192  # bytes
 MOST_CONTROL = 64  # chunks that wait to leave: answers to the peer beyond them are not given
-MOST_REPORTED = 128  # bytes of an unknown chunk that are told to its sender
+MOST_REPORTED = 128  # bytes of an unknown chunk in the report to its sender
 
 _word = Struct("!L")
 
@@ -81,7 +81,7 @@ class Association:
     """Messages over the packets that DTLS carries.
 
     Give every packet to `receive_packet`, call `handle_timer` when `timer` is due, and after each call of any method
-    send what `packets_to_send` gives and look at `events`. `now` is seconds of one monotonic clock. Both ends call
+    send the packets of `packets_to_send` and read `events`. `now` is seconds of one monotonic clock. Both ends call
     `start` when DTLS is up, as RFC 8841 9.3 wants; either may be alone in that.
 
     Nothing but the owner, the peer or a protocol error ends an association, and `Closed` names which. In particular
@@ -211,7 +211,7 @@ class Association:
         return True
 
     def shutdown(self, now: float) -> None:
-        """End when everything has arrived (RFC 9260 9.2). Messages that come meanwhile are still received."""
+        """End when everything has arrived (RFC 9260 9.2). Messages that arrive meanwhile are still received."""
         self.now = now
         if self.state is State.ESTABLISHED:
             self._become(State.SHUTDOWN_PENDING)
@@ -280,7 +280,7 @@ class Association:
         return due
 
     def handle_timer(self, now: float) -> None:
-        """Repeat what nobody has acknowledged. What is due leaves with `packets_to_send`."""
+        """Repeat unacknowledged chunks. They leave with `packets_to_send`."""
         self.now = now
         if self._ended:
             return
@@ -344,7 +344,7 @@ class Association:
         return control + sender.chunks(room, now)
 
     def _take_control(self, room: int) -> bytes:
-        """Control chunks that fit; one that does not waits for the next packet."""
+        """Control chunks that fit; a larger one waits for the next packet."""
         self._add_due_control()
         taken = b""
         while self._control and len(taken) + len(self._control[0]) <= room:
@@ -394,7 +394,7 @@ class Association:
             return "wrong_port"
         first = packet.chunks[0]
         if self._ended:
-            if isinstance(first, ShutdownAck):  # 8.4 5: ours was lost
+            if isinstance(first, ShutdownAck):  # 8.4 5: the own one was lost
                 self._send_alone(packet.tag, ShutdownComplete(reflected=True))
             return "ended"
         if type(first) is Init:

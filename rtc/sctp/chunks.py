@@ -152,7 +152,7 @@ class InitAck(Init):
 
 @dataclass(slots=True)
 class Sack:
-    """SACK (RFC 9260 3.3.4). `gaps` are first and last offsets from `cumulative` of what came beyond it."""
+    """SACK (RFC 9260 3.3.4). `gaps` are first and last offsets from `cumulative` of the chunks beyond it."""
 
     kind: ClassVar[int] = 3
     cumulative: int

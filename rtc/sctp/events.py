@@ -24,7 +24,7 @@ class MessageReceived(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class StreamsReset:
-    """The peer has reset these streams of its own: no message comes on them until it begins anew (RFC 6525 5.2.2)."""
+    """The peer has reset its outgoing streams: no message arrives on them until they begin anew (RFC 6525 5.2.2)."""
 
     streams: tuple[int, ...]  # empty: all
 

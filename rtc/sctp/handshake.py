@@ -86,9 +86,8 @@ def unrecognized(parameters: Iterable[Parameter]) -> list[Parameter]:
 
 
 class Cookies:
-    """Cookies hold all that is known of a peer that is not there yet, so that nothing is kept for it (5.1.3).
-
-    They have a MAC and end after a time. Behind DTLS nobody can forge or spoof anything; what remains is a peer that
+    """Cookies hold the state of a peer that is not there yet, so that this side keeps none for it (5.1.3). They have a
+    MAC and end after a time. Behind DTLS no attacker can forge or spoof packets; the remaining case is a peer that
     answers late, or twice.
     """
 

@@ -42,7 +42,7 @@ class _Stream:
 
 
 class Reassembly:
-    """Messages leave through `delivered`. `held` is what is kept of incomplete and early ones, in bytes."""
+    """Messages leave through `delivered`. `held` is the size of incomplete and early ones, in bytes."""
 
     def __init__(self, settings: SctpSettings, interleaving: bool) -> None:
         self._max_message = settings.max_receive_message
@@ -86,7 +86,7 @@ class Reassembly:
             stream = self._streams[chunk.stream] = _Stream()
         if chunk.flags & UNORDERED:
             if isinstance(chunk, Data):
-                return 0  # RFC 9260 3.3.1: there is none
+                return 0  # RFC 9260 3.3.1: it has no sequence
             stream.unordered = max(stream.unordered, found := unwrap(chunk.sequence, stream.unordered))
             return found
         return unwrap(chunk.sequence, stream.expected, self._sequence_mask)
@@ -154,7 +154,7 @@ class Reassembly:
         """The peer has given up messages: nothing up to the TSN `cumulative` comes any more (RFC 3758 3.6)."""
         latest: dict[tuple[int, bool], int] = {}
         for skip in skips:
-            latest[skip.stream, skip.unordered] = skip.sequence  # one each; what a peer repeats costs nothing
+            latest[skip.stream, skip.unordered] = skip.sequence  # one each; a peer's repeats cost nothing
         for (number, unordered), sequence in latest.items():
             if not unordered:
                 self._skip(self._streams.setdefault(number, _Stream()), sequence)
@@ -163,7 +163,7 @@ class Reassembly:
             self._drop(run)
 
     def _skip(self, stream: _Stream, sequence: int) -> None:
-        """No ordered message up to this one comes any more; those that have come are delivered."""
+        """No ordered message up to this one arrives any more; those that have arrived are delivered."""
         expected = unwrap(sequence, stream.expected, self._sequence_mask) + 1
         if expected <= stream.expected:
             return
@@ -175,7 +175,7 @@ class Reassembly:
         self._release(stream)
 
     def reset(self, streams: tuple[int, ...]) -> None:
-        """These streams begin anew (RFC 6525 5.2.2); all when there is none."""
+        """These streams begin anew (RFC 6525 5.2.2); an empty list means all."""
         for number in streams or tuple(self._streams):
             stream = self._streams.pop(number, None)
             if stream is not None:

@@ -97,7 +97,7 @@ class ReceivedTsns:
                 marks.popleft()
 
     def given_up(self, now: float) -> int | None:
-        """The TSN up to which whatever is missing has been missing for so long that it was given up."""
+        """The TSN up to which missing chunks have been missing for so long that they were given up."""
         if not self._marks or now - self._marks[0][0] < self._given_up_after:
             return None
         if sum(last - first + 1 for first, last in self._runs) < ENOUGH_BEYOND:
@@ -106,7 +106,7 @@ class ReceivedTsns:
         return highest if highest > self.cumulative else None
 
     def sack(self, window: int, most_gaps: int) -> Sack:
-        """What to tell the peer; duplicates are told once. Not more gaps than `most_gaps`, the first ones."""
+        """The SACK for the peer; it reports duplicates once, and at most the first `most_gaps` gaps."""
         base = self.cumulative
         gaps = [(first - base, last - base) for first, last in self._runs[:most_gaps]] if self._runs else ()
         duplicates, self._duplicates = self._duplicates, []

@@ -40,14 +40,12 @@ class Receiver:
 
     @property
     def messages(self) -> list[MessageReceived]:
-        """Whole ones; whoever takes them clears the list."""
+        """Whole messages; the caller that takes them clears the list."""
         return self.reassembly.delivered
 
     def receive_data(self, chunk: Data | InterleavedData, now: float) -> bool:
-        """One DATA or I-DATA chunk. False: its stream is out of bounds, which is to be reported (6.5).
-
-        Raises:
-            ProtocolViolation: what the peer may not do.
+        """One DATA or I-DATA chunk. False: its stream is out of bounds, which is to be reported (6.5). Raises:
+        ProtocolViolation: the peer broke a rule.
         """
         if (chunk.kind != 0) is not self._interleaving:
             raise ProtocolViolation("interleaving_violated")  # RFC 8260 2.2.1
@@ -72,7 +70,7 @@ class Receiver:
         return True
 
     def _is_too_much(self, size: int, tsn: int) -> bool:
-        """Drop what is beyond the window, but not what everything else waits for."""
+        """Drop chunks beyond the window, but not the one that all others wait for."""
         held = self.reassembly.held
         if held > 2 * self._window:
             raise ProtocolViolation("receive_window_exceeded")

@@ -8,7 +8,7 @@ from rtc.sctp.settings import SctpSettings
 __all__ = ["RoundTrip"]
 
 SHORT = 8  # samples, of which the shortest is the path's own round trip, and not an outage's
-LONG = 32  # samples, of which the longest is what the path's jitter does
+LONG = 32  # samples, of which the longest shows the path's jitter
 LARGEST_FACTOR = 8.0
 FACTOR_LASTS = 30.0  # s, after which half of it is given back
 
@@ -16,10 +16,10 @@ FACTOR_LASTS = 30.0  # s, after which half of it is given back
 class RoundTrip:
     """The smoothed round trip, and the two intervals that follow from it.
 
-    The first repeat of a chunk comes after the smoothed round trip and a margin: four times its variation, or what the
-    longest of the latest samples had, whichever is more; but no later than 1.5 round trips and `margin_ceiling`. It is
-    a tail loss probe (RFC 8985 7) instead of RFC 9260's second or more. Where the delay varies by more than that,
-    repeats are needless; the peer reports them as duplicates, and each such report doubles the bound for a while.
+    The first repeat of a chunk comes after the smoothed round trip and a margin: four times its variation, or that of
+    the longest of the latest samples, if that is more; but no later than 1.5 round trips and `margin_ceiling`. It is a
+    tail loss probe (RFC 8985 7) instead of RFC 9260's second or more. Where the delay varies by more than that, repeats
+    are needless; the peer reports them as duplicates, and each such report doubles the bound for a while.
     """
 
     def __init__(self, settings: SctpSettings) -> None:

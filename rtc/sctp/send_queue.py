@@ -52,7 +52,7 @@ class Message:
 
 
 class SendQueue:
-    """Newest-wins messages by themselves; all others by stream, and the streams take turns (RFC 8831 6.4 without
+    """Newest-wins messages apart; all others by stream, and the streams take turns (RFC 8831 6.4 without
     priorities).
 
     `dropped` counts newest-wins messages that made room for newer ones, `expired` messages whose time had passed
@@ -102,7 +102,7 @@ class SendQueue:
         return message
 
     def head(self, now: float) -> Message | None:
-        """The message of the stream whose turn it is; without those that have expired and were never begun."""
+        """The message of the stream whose turn it is; without expired ones that were never begun."""
         while self.turns:
             message = self._streams[self.turns[0]][0]
             late = message.expires is not None and now > message.expires and not message.taken

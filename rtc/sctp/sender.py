@@ -131,7 +131,7 @@ class Sender:
 
     @property
     def idle(self) -> bool:
-        """Nothing waits, and the peer has acknowledged everything, also what was given up."""
+        """No chunk waits, and the peer has acknowledged all, also abandoned ones."""
         return not self._outstanding and self.forward_at is None and not len(self.queue)
 
     @property
@@ -151,7 +151,7 @@ class Sender:
         return not (self.queue.newest or self._waiting or self.queue.turns or self._newest_waiting)
 
     def chunks(self, room: int, now: float) -> bytes:
-        """The chunks that are due and fit into `room` bytes, those of newest-wins messages first."""
+        """The due chunks that fit into `room` bytes, newest-wins messages first."""
         taken = b""
         if not self._flight:
             self._begin_burst()
@@ -261,7 +261,7 @@ class Sender:
         return self._encode(chunk)
 
     def _immediate(self, chunk: Outgoing, now: float) -> int:
-        """The I bit (RFC 7053): on the end of whatever is to arrive, and where the window ends."""
+        """The I bit (RFC 7053): on the end of each reliable message, and where the window ends."""
         if not chunk.newest_wins:
             return IMMEDIATE if chunk.flags & END or not self._admits(self._largest) else 0
         if now - self._asked_at < self._settings.sample_interval:
@@ -383,8 +383,9 @@ class Sender:
                 self._round_trip.needless(now)
 
     def _count_misses(self, arrived: list[Outgoing], now: float) -> None:
-        """Chunks that left before one that has arrived now (RFC 9260 7.2.4). A repeated chunk may be missed again,
-        by what left after the repeat. Three misses within the path's jitter are no loss yet (as in RFC 8985 6.2)."""
+        """Chunks that left before one that has arrived now (RFC 9260 7.2.4). A repeated chunk may be missed again, by
+        chunks that left after the repeat. Three misses within the path's jitter are no loss yet (as in RFC 8985
+        6.2)."""
         once = [chunk for chunk in arrived if chunk.sent_count == 1]
         if not once:
             return
@@ -419,7 +420,7 @@ class Sender:
         heappush(self._waiting, (chunk.tsn, chunk))
 
     def _abandon(self, chunk: Outgoing) -> None:
-        """The whole message is given up, also what was not sent of it (RFC 3758 3.5 A3)."""
+        """The whole message is given up, also its unsent part (RFC 3758 3.5 A3)."""
         message = chunk.message
         message.abandoned = True
         self._counts["abandoned"] += 1
@@ -513,7 +514,7 @@ class Sender:
             if not chunk.newest_wins:
                 self._lose(chunk, now)
             if chunk.state is _ACKNOWLEDGED and chunk.reported != self._sacks:
-                chunk.state = _WAITING  # the peer has dropped what it had acknowledged (RFC 9260 6.2.1 D iii)
+                chunk.state = _WAITING  # the peer has dropped acknowledged chunks (RFC 9260 6.2.1 D iii)
                 heappush(self._waiting, (chunk.tsn, chunk))
         self.window.expired()
 

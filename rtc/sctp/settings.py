@@ -14,7 +14,7 @@ class SctpSettings:
     of the application; its recommended values serve bulk transfer.
     """
 
-    port: int = 5000  # at both ends; what a=sctp-port says (RFC 8841 5)
+    port: int = 5000  # at both ends; the number in a=sctp-port (RFC 8841 5)
 
     max_packet: int = 1160
     """An SCTP packet. 1,200 bytes of UDP payload pass every path that WebRTC runs over; DTLS takes up to 37 of them

@@ -97,7 +97,7 @@ class StreamReset:
             elif kind in (INCOMING_RESET_REQUEST, TSN_RESET_REQUEST, ADD_INCOMING_STREAMS) and len(value) >= 4:
                 self._take_turn(_word.unpack_from(value)[0], DENIED)
             elif kind == ADD_OUTGOING_STREAMS and len(value) >= 4:
-                # Streams cost nothing before they are used, and their number has a bound of its own.
+                # Streams cost nothing before they are used, and their number has its own bound.
                 self._take_turn(_word.unpack_from(value)[0], PERFORMED)
         return events
 
@@ -143,7 +143,7 @@ class StreamReset:
         return []
 
     def advanced(self, cumulative: int) -> list[Event]:
-        """Everything up to `cumulative` has come: what the peer's request waited for may be complete (5.2.2 E2)."""
+        """All chunks up to `cumulative` have arrived: the peer's request may be complete now (5.2.2 E2)."""
         request = self._deferred
         if request is None or cumulative < request.last_tsn:
             return []

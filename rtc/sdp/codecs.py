@@ -16,7 +16,7 @@ LIKE_RTCP = range(64, 96)  # RFC 5761 4: packets with these are taken for RTCP
 AUXILIARY = {"rtx", "red", "ulpfec", "flexfec-03", "telephone-event", "cn"}  # carry nothing without another codec
 # What makes two codecs of one name different things, with the value that is meant where nothing is said.
 FORMAT: Mapping[str, Mapping[str, str]] = {
-    "h264": {"packetization-mode": "0"},  # RFC 6184 8.1; the profile is compared by what it means
+    "h264": {"packetization-mode": "0"},  # RFC 6184 8.1; the profile is compared by its meaning
     "vp9": {"profile-id": "0"},  # RFC 9628 6
     "av1": {"profile": "0"},  # AV1's RTP payload format 7.2.1
     "h265": {"profile-id": "1"},  # RFC 7798 7.1
@@ -109,8 +109,9 @@ def is_same_format(one: Codec, other: Codec) -> bool:
 
 
 def _h264_profile(codec: Codec) -> tuple[int, bool] | None:
-    """Profile and whether it is constrained (RFC 6184 8.1, table 5); None for nonsense, which equals nothing known."""
-    text = codec.parameters.get("profile-level-id", "42000a")  # RFC 6184 8.1: what is meant where nothing is said
+    """Profile and whether it is constrained (RFC 6184 8.1, table 5); None for an invalid one, which equals no known
+    one."""
+    text = codec.parameters.get("profile-level-id", "42000a")  # RFC 6184 8.1: the default
     if not re.fullmatch(r"[0-9A-Fa-f]{6}", text):
         return None
     number = int(text, 16)

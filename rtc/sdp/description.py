@@ -52,7 +52,7 @@ def both(one: Direction, other: Direction) -> Direction:
 
 @dataclass(frozen=True, slots=True)
 class Codec:
-    """A payload type and what it stands for."""
+    """A payload type and its codec."""
 
     payload_type: int  # 0 to 127
     name: str  # "VP8"; compared without case
@@ -115,7 +115,7 @@ class MediaSection:
     kind: str  # "audio", "video", "application"; others are never accepted
     mid: str
     protocol: str = "UDP/TLS/RTP/SAVPF"
-    formats: tuple[str, ...] = ()  # of the m= line; kept for the rejection of what is not understood
+    formats: tuple[str, ...] = ()  # of the m= line; kept for the rejection of unknown sections
     rejected: bool = False  # port 0 without bundle-only (RFC 3264 6)
     direction: Direction = "sendrecv"
     codecs: tuple[Codec, ...] = ()  # the preferred one first
@@ -154,7 +154,7 @@ def rejection_of(kind: str, mid: str, protocol: str, formats: tuple[str, ...]) -
 
 @dataclass(frozen=True, slots=True)
 class SessionDescription:
-    """All media sections and the one transport of those that are in the bundle."""
+    """All media sections, and the one transport of the bundle."""
 
     transport: Transport
     sections: tuple[MediaSection, ...]

@@ -6,8 +6,8 @@ __all__ = ["SdpError"]
 class SdpError(ValueError):
     """A description that cannot be used. The one error of this package.
 
-    `section` is the mid of the media section that is to blame, or "#0" by its place when it has none; None when it is
-    the description as a whole. `reason` is for whoever wrote the description.
+    `section` is the mid of the faulty media section, or "#0" by its place when it has none; None when the whole
+    description is faulty. `reason` is for the author of the description.
     """
 
     def __init__(self, reason: str, section: str | None = None) -> None:

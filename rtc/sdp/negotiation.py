@@ -52,16 +52,16 @@ def answer_to(
     session_id: int = 0,
     version: int = 1,
 ) -> SessionDescription:
-    """Our answer. Sections that we have nothing for, or no codec in common, are rejected (RFC 3264 6).
+    """The own answer. Sections without a local counterpart or a common codec are rejected (RFC 3264 6).
 
     Args:
-        transport: ours; its `setup` says what we are where the offer leaves the choice (RFC 8842 5.3)
-        media: what we can do, by mid
-        data: whether we take data channels
-        max_message_size: bytes of one message that we take; None: 65536
+        transport: the own one; its `setup` is the own role where the offer leaves the choice (RFC 8842 5.3)
+        media: the own abilities, by mid
+        data: whether this side takes data channels
+        max_message_size: bytes of one message that this side takes; None: 65536
 
     Raises:
-        SdpError: nothing in it can be answered, or its extensions are more than there are ids.
+        SdpError: no section can be answered, or its extensions are more than there are ids.
     """
     chosen = _chosen_ids(offer)
     sections = [
@@ -182,7 +182,7 @@ def offer_of(
 
 
 def check_answer(offer: SessionDescription, answer: SessionDescription) -> None:
-    """Whether `answer` answers `offer`. Then its sections say what is in use. Raises SdpError."""
+    """Whether `answer` answers `offer`. Then its sections are in use. Raises SdpError."""
     if len(offer.sections) != len(answer.sections):
         raise SdpError(f"{len(answer.sections)} sections for the offer's {len(offer.sections)} (RFC 3264 6)")
     if answer.transport.setup not in ("active", "passive"):

@@ -1,7 +1,7 @@
 """Reads session descriptions (RFC 8866) of one BUNDLE, as browsers, aiortc, Janus, GStreamer and others write them.
 
-Lines that nothing here needs are left out, as RFC 8866 5.13 asks. A description that lacks what one BUNDLE needs is
-refused as a whole; a codec or header extension that no packet could carry is left out.
+Unknown lines are left out, as RFC 8866 5.13 asks. A description without the lines that one BUNDLE needs is refused as a
+whole; a codec or header extension that no packet could carry is left out.
 """
 
 import re
@@ -31,7 +31,7 @@ ICE_CHARS = re.compile(r"[A-Za-z0-9+/]+")
 TOKEN = re.compile(r"[!#-'*+\-.0-9A-Z^-~]{1,64}")  # RFC 8866 9
 EXTMAP = re.compile(r"([0-9]{1,9})(?:/(sendrecv|sendonly|recvonly|inactive))? +([!-~]+)(?: .*)?")
 NUMBER = re.compile(r"[0-9]{1,10}")
-RTP = re.compile(r"((UDP|TCP)/(TLS|DTLS)/)?RTP/S?AVPF?")  # RFC 8829 5.1.2: what the name says is not looked at
+RTP = re.compile(r"((UDP|TCP)/(TLS|DTLS)/)?RTP/S?AVPF?")  # RFC 8829 5.1.2: the name is ignored
 SCTP = ("UDP/DTLS/SCTP", "TCP/DTLS/SCTP")  # RFC 8841 4.1
 DIRECTIONS: dict[str, Direction] = {
     "sendrecv": "sendrecv", "sendonly": "sendonly", "recvonly": "recvonly", "inactive": "inactive"

@@ -30,12 +30,12 @@ class Allocated:
     """Peers reach us at `relayed` from now on."""
 
     relayed: Address
-    mapped: Address | None  # ours, as the server sees it
+    mapped: Address | None  # the own address, as the server sees it
 
 
 @dataclass(frozen=True, slots=True)
 class AllocationEnded:
-    """There is none, or no more; the last event. `error`: what the server said; 408 when it said nothing."""
+    """There is no allocation, or it ended; the last event. `error`: the server's answer; 408 without one."""
 
     error: StunErrorCode
 
@@ -51,7 +51,7 @@ class _Peer:
 
 
 class Allocation:
-    """`counts`: what was dropped, by reason: "peers", "refused", "waiting", "not_allocated", "malformed", …"""
+    """`counts`: dropped datagrams, by reason: "peers", "refused", "waiting", "not_allocated", "malformed", …"""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class Allocation:
         self._reliable = reliable
         self._requests = Requests(random_bytes, self._settings, username=username, password=password, reliable=reliable)
         self.counts: Counter[str] = self._requests.counts
-        self.relayed: Address | None = None  # None: there is none now
+        self.relayed: Address | None = None  # None: no allocation now
         self._peers: dict[Address, _Peer] = {}
         self._by_channel: dict[int, _Peer] = {}
         self._refresh_at: float | None = None
@@ -214,7 +214,7 @@ class Allocation:
 
     def _note_lifetime(self, answer: Answer, now: float) -> None:
         given = answer.attributes.get(Attribute.LIFETIME, b"")
-        # Coturn bounds it in the first answer only: who asks for more later is told more than is meant.
+        # Coturn bounds it in the first answer only: a later request for more gets a larger number than is kept.
         self._lifetime = min(int.from_bytes(given), self._lifetime) if len(given) == 4 else self._lifetime
         self._refresh_at = now + max(1.0, self._settings.refresh_share * self._lifetime)
 

@@ -60,7 +60,7 @@ def pack_channel_data(channel: int, data: bytes, *, padded: bool) -> bytes:
 
 
 def parse_channel_data(message: bytes) -> tuple[int, bytes] | None:
-    """Channel and data; None for what is no ChannelData."""
+    """Channel and data; None for another message."""
     if len(message) < CHANNEL_HEADER.size:
         return None
     channel, length = CHANNEL_HEADER.unpack_from(message)
@@ -70,7 +70,7 @@ def parse_channel_data(message: bytes) -> tuple[int, bytes] | None:
 
 
 class TurnStream:
-    """Finds messages in what a TCP connection brings. `broken`: it is no TURN; close it."""
+    """Finds messages in the bytes of a TCP connection. `broken`: it is not TURN; close it."""
 
     def __init__(self) -> None:
         self.broken = False
@@ -87,8 +87,8 @@ class TurnStream:
         return messages
 
     def _length(self) -> int | None:
-        """Of the message at the beginning; None: not known yet, or there is none."""
-        if len(self._kept) < 8:  # no message is shorter but ChannelData of at most four bytes, which nobody sends
+        """Of the message at the beginning; None: not known yet, or no message."""
+        if len(self._kept) < 8:  # no message is shorter but ChannelData of at most four bytes, which no server sends
             return None
         first, length = int.from_bytes(self._kept[:2]), int.from_bytes(self._kept[2:4])
         if first in CHANNELS:

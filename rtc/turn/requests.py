@@ -21,7 +21,7 @@ from rtc.turn.settings import TurnSettings
 __all__ = ["TIMEOUT", "Answer", "Request", "Requests"]
 
 UNAUTHENTICATED, STALE_NONCE = 401, 438
-TIMEOUT = StunErrorCode(408, "no answer")  # ours: RFC 8489 has none for it
+TIMEOUT = StunErrorCode(408, "no answer")  # an own code: RFC 8489 has none for it
 Attributes = Sequence[tuple[int, bytes]]
 
 
@@ -31,7 +31,7 @@ class Request:
 
     method: int
     attributes: Attributes
-    subject: object = None  # whatever its user wants to know it by
+    subject: object = None  # chosen by its user
     transaction: bytes = b""
     data: bytes = b""
     due_at: float = 0.0  # when it is repeated, or given up
@@ -50,7 +50,7 @@ class Answer:
 
 
 class Requests:
-    """`begin`, then every core's: what the server answers goes to `receive`; drain `data_to_send` and `answers`."""
+    """`begin`, then as every core: pass the server's answers to `receive`; drain `data_to_send` and `answers`."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class Requests:
     # The way in
 
     def receive(self, data: bytes, now: float) -> None:
-        """A STUN response; what answers nothing of ours is counted."""
+        """A STUN response; an answer to no own request is counted."""
         head = transaction_of(data)
         request = self._pending.get(head[1]) if head is not None else None
         if head is None or request is None or head[0] not in (Kind.SUCCESS, Kind.ERROR):
@@ -132,7 +132,7 @@ class Requests:
         if self._username is None or self._password is None or request.method == BINDING:
             return False
         if error.code == UNAUTHENTICATED and (request.nonce is not None or realm is None):
-            return False  # it does not like what it was told
+            return False  # it does not accept the credentials
         self._nonce = nonce
         if realm is not None:
             self._realm = realm

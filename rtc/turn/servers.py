@@ -1,4 +1,4 @@
-"""Which STUN and TURN servers to ask (RFC 7064, RFC 7065), and what a STUN server says of our address."""
+"""Which STUN and TURN servers to ask (RFC 7064, RFC 7065), and a STUN server's answer about the own address."""
 
 import re
 from collections import Counter
@@ -29,7 +29,7 @@ class ServerUriError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class IceServer:
-    """As RTCIceServer of W3C: one server by one or more ways, and what it asks for."""
+    """As RTCIceServer of W3C: one server by one or more ways, and its credentials."""
 
     urls: Sequence[str]
     username: str | None = None
@@ -77,7 +77,7 @@ def server_uris(servers: Iterable[IceServer], counts: Counter[str]) -> list[tupl
                 counts["server_malformed"] += 1
                 continue
             if (uri.scheme == "stun" and uri.transport == "tcp") or (uri.tls and uri.transport == "udp"):
-                counts["server_unsupported"] += 1  # no address for UDP is learnt there; nobody runs TURN over DTLS
+                counts["server_unsupported"] += 1  # no address for UDP is learnt there; TURN over DTLS is not in use
             elif uri.scheme == "turn" and (server.username is None or server.credential is None):
                 counts["server_without_credentials"] += 1
             elif len(found) < MAX_SERVERS:

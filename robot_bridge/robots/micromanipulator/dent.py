@@ -43,7 +43,7 @@ def draw_dent(picture: Picture, slide: Picture, cover: Plane, state: "Micromanip
     dent = np.exp(-square / np.float32(2 * wide * wide)) * cover[top:bottom, left:right]
     far = REACH / scale
     fade = np.clip(1.0 - square / np.float32(far * far), 0.0, 1.0) ** 2 * cover[top:bottom, left:right]
-    # What is dragged comes from where the tip came from; what is drawn in comes from farther out.
+    # Dragged material comes from behind the tip; drawn-in material comes from farther out.
     inward = np.float32(PULL * depth / wide) * dent
     from_rows = rows * (1.0 + inward) + np.float32(contact.drag[0] / scale) * fade
     from_columns = columns * (1.0 + inward) + np.float32(contact.drag[1] / scale) * fade

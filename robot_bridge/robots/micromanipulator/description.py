@@ -129,7 +129,7 @@ def _needle() -> tuple[Geom, ...]:
     """The shaft as capsules that get thicker away from the tip, and a block that holds it."""
     cos, sin = math.cos(HEADING), math.sin(HEADING)
     pitch = math.atan(SLOPE)
-    # Turns a capsule's z onto the shaft: about y by what is left to the horizontal, then about z to the heading.
+    # Turns a capsule's z onto the shaft: about y by the rest to the horizontal, then about z to the heading.
     half_tilt, half_turn = (math.pi / 2 - pitch) / 2, HEADING / 2
     orientation = (
         math.cos(half_turn) * math.cos(half_tilt),
@@ -189,7 +189,7 @@ def _slide() -> tuple[Geom, ...]:
 DESCRIPTION: Final = RobotDescription(
     name="micromanipulator",
     label="Micromanipulator (simulated)",
-    watchdog=0.25,  # nobody is hurt by a simulation, and busy machines hold it up
+    watchdog=0.25,  # a simulation hurts no person, and busy machines hold it up
     axes=(
         _axis("probe.vx", "Forward", 60 * MICRO),
         _axis("probe.vy", "Left", 60 * MICRO),

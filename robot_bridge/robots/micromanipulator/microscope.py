@@ -71,7 +71,7 @@ class Microscope:
         return self._empty
 
     def _lay(self, picture: Picture, needle: Outline, light: float) -> None:
-        """Put the needle over what is there: steel, bright along its middle, as dark as the lens makes the corners."""
+        """Draw the needle over the picture: steel, bright along its middle, as dark as the lens makes the corners."""
         window, cover, across = needle
         part = np.s_[window.top : window.bottom, window.left : window.right]
         shade = self._slide.vignette[part] * np.float32(min(light, 115.0) / 100)
@@ -86,7 +86,7 @@ class Microscope:
 
 
 def blur_at(away: Plane | np.float32) -> Plane:
-    """m of unsharpness of what is that far out of focus."""
+    """m of unsharpness at this distance from the focus."""
     beyond = np.maximum(np.abs(away) - np.float32(DEPTH_OF_FIELD / 2), np.float32(0.0))
     soft: Plane = beyond * np.float32(APERTURE)
     return soft

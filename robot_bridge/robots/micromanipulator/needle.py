@@ -1,7 +1,7 @@
-"""The needle: a cantilever whose tip rests where its bending balances what it touches. Quasi-static, no clock.
+"""The needle: a cantilever whose tip rests where its bending balances the contact. Quasi-static, no clock.
 
-Soft samples push back as Hertz has it for a blunt tip: F = 4/3 E* √R δ^1.5, along the surface's normal. Besides, the
-surface sticks to the tip and is dragged along, until friction gives way.
+Soft samples push back as Hertz has it for a blunt tip: F = 4/3 E* √R δ^1.5, along the surface's normal. The surface
+also sticks to the tip and is dragged along, until friction gives way.
 """
 
 import math
@@ -31,7 +31,7 @@ class Contact(NamedTuple):
 
 
 class Needle:
-    """`move` the holder, then read where the tip is and what it feels.
+    """`move` the holder, then read the tip's place and force.
 
     Attributes:
         tip: m, lowest point of the tip

@@ -1,4 +1,4 @@
-"""The micromanipulator: stepping drives, a needle that bends, and what the microscope sees of them."""
+"""The micromanipulator: stepping drives, a needle that bends, and the microscope's view of them."""
 
 import math
 from collections.abc import Sequence
@@ -44,7 +44,7 @@ class Micromanipulator(Robot):
         self._needle = Needle(self._holder())
         self._light = MicromanipulatorState().light
         self._values: list[float] = [0.0] * len(DESCRIPTION.axes)
-        self._stopped = False  # no drive is told to step
+        self._stopped = False  # no drive has a command to step
         self._draughtsman = Draughtsman()
         self._sound = Sound()
         self._sources: tuple[MediaSource, ...] = (

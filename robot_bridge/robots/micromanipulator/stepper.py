@@ -10,7 +10,7 @@ TIME_CONSTANT: Final = 0.04  # s over which the speed is measured: single steps 
 
 
 class Stepper:
-    """Velocities in, whole steps out; what is less than a step waits for the next tick.
+    """Velocities in, whole steps out; a fraction of a step waits for the next tick.
 
     Attributes:
         steps: where the drive is, in steps from its zero

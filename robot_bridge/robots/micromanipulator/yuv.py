@@ -25,7 +25,7 @@ class Picture:
 
 
 def picture_of(red: Plane, green: Plane, blue: Plane) -> Picture:
-    """Values from 0 to 1; what is beyond is cut off."""
+    """Values from 0 to 1; values beyond are clipped."""
     height, width = red.shape
     picture = Picture(width, height)
     luma = 0.299 * red + 0.587 * green + 0.114 * blue

@@ -1,7 +1,7 @@
-"""Which stick, key and button drives which axis: a binding for a robot that nobody has made one for.
+"""Which stick, key and button drives which axis: the bindings of a model that has none.
 
-Each layer has four axes on the two sticks, which pads, keys and fingers have alike. What inputs a pad and the keys have
-besides go to the axes of the layers that follow, so that seven axes need no change of layer with them.
+Each layer has four axes on the two sticks, which pads, keys and fingers all have. Further inputs of a pad and of the
+keys go to the axes of the layers that follow, so that seven axes need no change of layer with them.
 """
 
 from collections.abc import Sequence

@@ -23,7 +23,7 @@ FASTEST_TURN: Final = 1.5  # rad/s
 FASTEST_UNBOUND: Final = 1.0  # rad/s, without a range
 SHARE_OF_EXTENT: Final = 0.15  # of the model's size per second, for slides without a range
 FURTHEST_LEAD: Final = 0.25  # of the range, or rad, that a servo's goal may be ahead of a blocked joint
-HOLD_RATE: Final = 2 * math.pi * 3.0  # rad/s, how stiffly a motor at rest holds, free of what it moves
+HOLD_RATE: Final = 2 * math.pi * 3.0  # rad/s, how stiffly a motor at rest holds, independent of its load
 SLOW: Final = 0.05  # rad/s, or of the model's size per second: below it a motor at rest holds instead of braking
 
 
@@ -43,7 +43,7 @@ class Drive(ABC):
         """The axis' value as it is."""
 
     def release(self, data: Any) -> None:
-        """The state was put back to its beginning: forget what was held."""
+        """The state was put back to its beginning: forget the held places."""
 
 
 class _JointDrive(Drive):
@@ -84,14 +84,14 @@ class PositionDrive(_JointDrive):
     def drive(self, data: Any, value: float, seconds: float) -> None:
         if value:
             goal = min(max(self._goal + value * seconds, self._low), self._high)
-            # A blocked joint is not pushed ever harder, and what it could not do is not made good later.
+            # A blocked joint is not pushed ever harder, and a missed motion is not made good later.
             if abs(goal - self._position(data)) < max(self._lead, abs(self._goal - self._position(data))):
                 self._goal = goal
         data.ctrl[self.actuator.number] = self._goal * self.actuator.gear
 
 
 class VelocityDrive(_JointDrive):
-    """The axis is the velocity that the servo is told."""
+    """The axis is the servo's commanded velocity."""
 
     def drive(self, data: Any, value: float, seconds: float) -> None:
         data.ctrl[self.actuator.number] = value * self.actuator.gear

@@ -1,4 +1,4 @@
-"""Reads a model's file, and says in one sentence what is wrong with it."""
+"""Reads a model's file, and names its fault in one sentence."""
 
 import math
 from pathlib import Path
@@ -46,7 +46,7 @@ def _compiled(path: Path) -> Any:
 
 
 def _reason(path: Path, text: str) -> str:
-    """MuJoCo's own words on one line, after what they mean."""
+    """MuJoCo's own words on one line, after their meaning."""
     words = " ".join(text.split()).removeprefix("Error: ")[:LONGEST_REASON]
     if "Error opening file" in words:
         return f"{path} names a file that is missing: {words}"

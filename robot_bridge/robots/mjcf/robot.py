@@ -31,7 +31,7 @@ __all__ = ["MjcfRobot"]
 TICK: Final = 0.004  # s, about
 BUSIEST: Final = 0.6  # share of a tick that the simulation may take
 TRIED_TICKS: Final = 25
-WATCHDOG: Final = 0.25  # s; nobody is hurt by a simulation, and busy machines hold it up
+WATCHDOG: Final = 0.25  # s; a simulation hurts no person, and busy machines hold it up
 REST_SPEED: Final = 0.02  # rad/s, or of the model's size per second
 MARGIN: Final = 0.01  # of a joint's range, that servos run on
 LATENCY: Final = 0.03  # s that servos follow late
@@ -62,7 +62,7 @@ class MjcfRobot(Robot):
         cameras = cameras_of(model)
         self._rest_values = [drive.axis.rest for drive in self._drives]
         self._values = self._rest_values
-        self._stopped = False  # every drive holds its place, whatever is applied
+        self._stopped = False  # every drive holds its place, at any applied value
         self._moving = self._moving_dofs()
         self._description = self._describe(path.stem, tuple(cameras))
         step = float(model.opt.timestep)
@@ -172,7 +172,7 @@ class MjcfRobot(Robot):
         return slowness
 
     def _moving_dofs(self) -> npt.NDArray[np.float64]:
-        """By degree of freedom: 0 for what no actuator moves, else what makes its speed comparable."""
+        """By degree of freedom: 0 where no actuator moves it, else the scale of its speed."""
         weights = np.zeros(self.model.nv)
         for drive in self._drives:
             joint = drive.actuator.joint
@@ -237,5 +237,5 @@ def warn(text: str) -> None:
 
 
 def short(value: float) -> float:
-    """Six significant digits, whatever the scale; keeps messages small. Never -0."""
+    """Six significant digits at any scale; keeps messages small. Never -0."""
     return float(f"{value:.6g}") + 0.0

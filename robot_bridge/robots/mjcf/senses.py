@@ -181,5 +181,5 @@ def _sensors(model: Any, kind: int) -> list[int]:
 
 
 def _guess(model: Any) -> float:
-    """Half of what the heaviest thing that moves weighs, for sensors that do not say how far they reach."""
+    """Half the weight of the heaviest moving part, for sensors without a range."""
     return max(0.5 * float(model.body_mass[1:].sum()) * GRAVITY, LEAST_FORCE) if model.nbody > 1 else 1.0

@@ -68,7 +68,7 @@ class ArmDrive:
             held = min(max(place + velocity * seconds, joint - lead), joint + lead)
             held = min(max(held, lower), upper)
             posture.append(held)
-            # A servo follows a moving target with its lag; aiming ahead by that makes the arm stop where it is told.
+            # A servo follows a moving target with its lag; aiming ahead by that makes the arm stop at its target.
             aims.append(held + velocity * lag)
         self._posture = posture
         self._aims[:] = aims

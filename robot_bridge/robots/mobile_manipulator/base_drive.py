@@ -13,13 +13,13 @@ __all__ = ["BaseDrive"]
 
 Array = npt.NDArray[np.float64]
 
-PARKING_SPEED: Final = 0.02  # m/s and rad/s below which a base that is told to rest is parked
+PARKING_SPEED: Final = 0.02  # m/s and rad/s below which a base with a command to rest is parked
 PARKING_SLIP: Final = np.array((0.01, 0.01, 0.02))  # m, m, rad: pushed farther, a parked base gives way
 PARKING_STIFFNESS: Final = np.array((30000.0, 30000.0, 2500.0))  # N/m, N/m, N m/rad
 
 
 class BaseDrive:
-    """Velocity motors while driving. At rest a brake holds the place, else what the arm pushes would push it away."""
+    """Velocity motors while driving. At rest a brake holds the place, else the arm's push would move the base."""
 
     def __init__(self) -> None:
         self._parked: Array | None = None  # pose that the brake holds; None while driving

@@ -39,7 +39,7 @@ class ContactSense:
         self._mount = model.body(MOUNT).id
         moving = model.body_treeid >= 0
         masses = np.bincount(model.body_treeid[moving], model.body_mass[moving], model.ntree)
-        self._weights = masses * float(np.linalg.norm(model.opt.gravity))  # N, of each thing that moves by itself
+        self._weights = masses * float(np.linalg.norm(model.opt.gravity))  # N, of each free body
         self._asleep = b""  # which of them slept at the last look
         self._resting = 0.0  # N, what those weigh
         self.wrench: Array = np.zeros(6)

@@ -28,7 +28,7 @@ WRENCH: Final = WrenchSensor(
     name="contact", body=MOUNT, threshold_force=3.0, full_scale_force=150.0, full_scale_torque=80.0
 )
 
-# A push at the wrist is seldom more than a tenth of what the sensor can take: it is felt early.
+# A push at the wrist is seldom more than a tenth of the sensor's range: it is felt early.
 FEELING: Final = ForceFeeling(threshold_newtons=3.0, full_newtons=80.0, curve=0.6)
 TOOL_TWIST: Final = BodyTwist(
     body="tool",
@@ -59,7 +59,7 @@ def describe(model: Any) -> RobotDescription:
         planar_base=BASE_ON_FLOOR,
         geofences=GEOFENCES,
         hold=0.3,
-        watchdog=0.25,  # nobody is hurt by a simulation, and busy machines hold it up
+        watchdog=0.25,  # a simulation hurts no person, and busy machines hold it up
         max_event_age=2.0,
         max_event_rate=25.0,
     )

@@ -47,7 +47,7 @@ class MobileManipulator(Robot):
         self._sound = Sound(MICROPHONE.sample_rate, round(MICROPHONE.sample_rate * SEGMENT_SECONDS))
         self._rest_values = [0.0] * len(self._description.axes)
         self._values: Sequence[float] = self._rest_values
-        self._stopped = False  # the base is parked and the arm holds its posture, whatever is applied
+        self._stopped = False  # the base is parked and the arm holds its posture, at any applied value
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)
         self._sources: tuple[MediaSource, ...] = (
             *(CameraSource(each, self._renderer.drawing(each), self.simulation.snapshot) for each in CAMERAS),

@@ -1,4 +1,4 @@
-"""Sound of the robot out of what the physics let hear: motors, rubbing, knocks, and a fan that never stops.
+"""The robot's sound, from the events of the physics: motors, rubbing, knocks, and a fan that never stops.
 
 Every voice keeps its phase and lets its level and pitch glide, so that segments join without a click. Samples are
 single precision: sines are several times cheaper so, and the error is far below the last of sixteen bits.
@@ -43,7 +43,7 @@ MOTORS: Final = (Motor(55.0, 190.0, 0.16, 0.6, 4), Motor(150.0, 420.0, 0.10, 1.5
 
 
 class Motors:
-    """All motors at once: what they cost is the number of calls, not that of samples."""
+    """All motors at once: the cost is in the number of calls, not of samples."""
 
     def __init__(self, motors: Sequence[Motor], steps: Signal, seconds: float) -> None:
         """`steps`: the part of a segment that has passed at each of its samples."""
@@ -115,7 +115,7 @@ def fan(rate: int) -> Signal:
 
 
 class Sound:
-    """Makes one segment after the other; each takes what was heard during it."""
+    """Makes one segment after the other; each takes the sounds of its time."""
 
     def __init__(self, rate: int, samples: int) -> None:
         self._samples = samples

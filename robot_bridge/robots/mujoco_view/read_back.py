@@ -37,6 +37,6 @@ def _attach(context: Any, kind: int, width: int, height: int, *, stencil: bool) 
 def read_rgba(pixels: npt.NDArray[np.uint8], viewport: mujoco.MjrRect) -> None:
     """Fill `pixels` (height, width, 4) with the rows of the picture just drawn, the lowest first.
 
-    Four bytes a pixel are what is stored: three, which `mjr_readPixels` gives, are packed one by one.
+    The framebuffer stores four bytes a pixel: three, which `mjr_readPixels` gives, are packed one by one.
     """
     GL.glReadPixels(0, 0, viewport.width, viewport.height, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, pixels)

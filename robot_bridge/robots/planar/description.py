@@ -159,5 +159,5 @@ DESCRIPTION = RobotDescription(
             polygon=((_LEFT, _LOW), (_RIGHT, _LOW), (_RIGHT, _HIGH), (_LEFT, _HIGH)),
         ),
     ),
-    watchdog=0.25,  # nobody is hurt by a simulation, and busy machines hold it up
+    watchdog=0.25,  # a simulation hurts no person, and busy machines hold it up
 )

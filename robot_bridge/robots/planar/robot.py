@@ -28,7 +28,7 @@ class PlanarState(NamedTuple):
     vx: float = 0.0  # m/s, in the robot's frame
     vy: float = 0.0  # m/s
     wz: float = 0.0  # rad/s
-    fx: float = 0.0  # N, what the room does to the robot, in the robot's frame
+    fx: float = 0.0  # N, the force of the room on the robot, in the robot's frame
     fy: float = 0.0  # N
 
 

@@ -24,7 +24,7 @@ class BaseState(NamedTuple):
 
 
 def base_state(odometry: Any) -> BaseState:
-    """From nav_msgs/Odometry. Raises ValueError when a number is missing or the orientation is none."""
+    """From nav_msgs/Odometry. Raises ValueError when a number is missing or the orientation is not a quaternion."""
     position, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
     speed, spin = odometry.twist.twist.linear, odometry.twist.twist.angular
     length = turn.w * turn.w + turn.x * turn.x + turn.y * turn.y + turn.z * turn.z

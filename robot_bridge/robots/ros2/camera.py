@@ -41,7 +41,7 @@ class CameraSource(MediaSource):
 
     @property
     def newest(self) -> Newest[Any]:
-        """What came, and what was wrong with it."""
+        """The newest picture, and the faults of the topic."""
         return self._shots
 
     def faults(self, now: float) -> list[str]:

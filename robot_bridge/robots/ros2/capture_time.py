@@ -7,7 +7,7 @@ from typing import Literal
 
 __all__ = ["ClockMismatch", "captured_at"]
 
-OLDEST = 10.0  # s; what seems older has a clock that is not ours
+OLDEST = 10.0  # s; a picture that seems older has another clock
 
 
 class ClockMismatch(ValueError):

@@ -1,9 +1,9 @@
 """When values go out to a command topic. No I/O, no clock.
 
-While the values move something they are repeated at a fixed rate, so that a base with a timeout of its own keeps
-going; the bridge's `hold` bounds how long. When they come to rest, for whatever reason, that is said exactly once.
-Then the topic is silent, and belongs to whoever else drives the robot. When the robot's side is lost, nothing is
-driven until it is back and the values have been at rest once.
+While the values move the robot they are repeated at a fixed rate, so that a base with its own timeout keeps going; the
+bridge's `hold` bounds how long. When they come to rest, for any reason, exactly one zero is published. Then the topic
+is silent, and free for other drivers of the robot. When the robot's side is lost, no value is sent until it is back and
+the values have been at rest once.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class Said(Enum):
 
 class Step(NamedTuple):
     said: Said  # to be published now
-    values: list[float]  # what the robot does during this tick, published or not
+    values: list[float]  # the robot's motion during this tick, published or not
 
 
 class CommandStream:

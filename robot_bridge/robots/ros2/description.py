@@ -1,4 +1,4 @@
-"""From the settings of a ROS 2 robot to what a console is told about it."""
+"""From the settings of a ROS 2 robot to its description for a console."""
 
 import math
 from typing import Final
@@ -43,7 +43,7 @@ def describe(settings: Ros2Settings) -> RobotDescription:
     for number, camera in enumerate(settings.cameras):
         if settings.use_sim_time and camera.captured == "header":
             keys = ("cameras", number, "captured")
-            raise SettingsPlace(keys, "simulated time does not pass as ours does: set captured: arrival, and a latency")
+            raise SettingsPlace(keys, "simulated time is not the bridge's time: set captured: arrival, and a latency")
     base_axes = () if base is None else _base_axes(base, settings.hold)
     arm_axes = () if arm is None else tuple(_arm_axis(arm, number, settings.hold) for number in range(len(arm.joints)))
     layers: tuple[ControlLayer, ...] = ()

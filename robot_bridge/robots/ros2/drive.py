@@ -34,7 +34,7 @@ class Drive(ABC):
         self._stream = CommandStream(rate, [0.0] * size, tick_seconds)
         self._owes_zero = False  # the last word that got out was not zero
         self._stopped = False
-        self._heard = False  # whether somebody listens
+        self._heard = False  # whether a node listens
         self._looked = float("-inf")  # s, when that was looked up
 
     @property
@@ -81,7 +81,7 @@ class Drive(ABC):
         """What keeps this part from being driven, for a person."""
         found = self.sensor_faults(now)
         if not self._heard:
-            found.append(f"{self._topic}: nobody listens for {self._kind.__name__}")
+            found.append(f"{self._topic}: no subscriber for {self._kind.__name__}")
         if self._stream.withheld and not self._stopped and not found:
             found.append(f"{self._topic}: let go once; the robot's side was lost while it was driven")
         return found

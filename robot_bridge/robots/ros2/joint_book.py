@@ -8,7 +8,7 @@ __all__ = ["BadJointState", "JointBook", "JointKnown", "JointStateMessage"]
 
 
 class BadJointState(ValueError):
-    """A message that contradicts itself; the text names what is wrong, to be counted by."""
+    """A message that contradicts itself; the text names the fault, for counting."""
 
 
 class JointStateMessage(Protocol):
@@ -38,7 +38,7 @@ class JointBook:
         self._joints = (JointKnown(),) * len(names)
 
     def take(self, message: JointStateMessage, header: int, now: float) -> None:
-        """Joints of others are passed over, and so are repeats of what is known.
+        """Other joints are passed over, and so are repeated positions.
 
         Raises:
             BadJointState: the message contradicts itself.

@@ -13,7 +13,7 @@ MAX_RAYS = 100_000
 
 
 class BadScan(ValueError):
-    """A scan that contradicts itself; the text names what is wrong, without figures, to be counted by."""
+    """A scan that contradicts itself; the text names the fault, without figures, for counting."""
 
 
 class Scan(Protocol):

@@ -26,9 +26,9 @@ class Newest(Generic[Value]):
     def __init__(self, topic: str, timeout: float) -> None:
         self.topic = topic
         self.timeout = timeout
-        self.bad: Counter[str] = Counter()  # by what was wrong
+        self.bad: Counter[str] = Counter()  # by fault
         self._last: Arrived[Value] | None = None
-        self._bad: tuple[str, float] | None = None  # the last bad one: what was wrong with it, and when
+        self._bad: tuple[str, float] | None = None  # the last bad one: its fault, and its time
 
     def put(self, value: Value, now: float, header: int = 0) -> bool:
         """False when it only repeats the last one."""

@@ -33,7 +33,7 @@ _YUV422: Final = {
 
 
 class BadPicture(ValueError):
-    """A picture that cannot be used; the text names what is wrong, without figures, to be counted by."""
+    """A picture that cannot be used; the text names the fault, without figures, for counting."""
 
 
 class ImageMessage(Protocol):

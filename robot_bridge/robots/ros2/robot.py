@@ -18,7 +18,7 @@ __all__ = ["Ros2Robot"]
 
 
 class Ros2Robot(Robot):
-    """Drives its parts, and gathers what they and the sensors say."""
+    """Drives its parts, and gathers their measurements and those of the sensors."""
 
     tick_seconds = 0.01
     rests_from_thread = True
@@ -108,7 +108,7 @@ class Ros2Robot(Robot):
 
 
 def call_all(calls: Sequence[Callable[[], None]]) -> None:
-    """Makes every call, also when one raises; raises what the first of those raised."""
+    """Makes every call, also when one raises; raises the first exception."""
     errors: list[Exception] = []
     for call in calls:
         try:

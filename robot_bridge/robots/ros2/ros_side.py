@@ -100,7 +100,7 @@ class RosSide:
         return self._duration.Duration(seconds=seconds).to_msg()
 
     def flush(self) -> None:
-        """Wait shortly until those who listen have what was published."""
+        """Wait shortly until the subscribers have the published message."""
         for publisher in self._publishers:
             with suppress(Exception):
                 publisher.wait_for_all_acked(self._duration.Duration(seconds=FLUSH_SECONDS))

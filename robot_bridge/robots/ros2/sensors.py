@@ -78,7 +78,7 @@ class LockoutTopic:
         self._heard.wait(FIRST_WORD)
 
     def reason(self, now: float) -> str:
-        """Why nobody may drive; "" when everybody may. Who is not heard of may have locked it."""
+        """Why the robot is locked; "" while it is not. A silent switch may have locked it."""
         said = self._said.fresh(now)
         if said is None:
             return f"nothing is heard of the lock-out ({self._topic})"

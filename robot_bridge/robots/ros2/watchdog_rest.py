@@ -1,6 +1,5 @@
-"""Says zero to a ROS 2 base from the watchdog's process: by a node of its own, also when the bridge was killed.
-
-An arm gets none: it is told positions, and the last of them is where it stays (docs/ros2.md).
+"""Publishes zero to a ROS 2 base from the watchdog's process: by its own node, also when the bridge was killed. An arm
+gets no zero: it gets positions, and stays at the last one (docs/ros2.md).
 """
 
 import msgspec

@@ -301,7 +301,7 @@ async def test_nobody_who_listens_is_a_fault_that_names_the_message(tmp_path: Pa
     ):
         operator = Driver(link)
         await operator.next(Feedback)
-        fault = ["/nobody: nobody listens for TwistStamped"]
+        fault = ["/nobody: no subscriber for TwistStamped"]
         await operator.until(lambda feedback: (feedback.unknown, feedback.faults) == ([], fault))
         await operator.drive([0.4])
         assert operator.feedback.axes == [0.0]
