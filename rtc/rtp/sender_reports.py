@@ -61,6 +61,11 @@ class SenderReports(Stage):
             self._report(now)
         super().handle_timer(now)
 
+    def report_early(self, now: float) -> None:
+        """Another stream of the same peer reports now: one packet has room for both, if this one's turn is near."""
+        if self._due is not None and now >= self._due - self.interval / 2:
+            self._report(now)
+
     def goodbye(self, now: float) -> None:
         """The stream ends (RFC 3550 6.6); nothing when it never began."""
         if self._due is not None:

@@ -96,8 +96,12 @@ class Streams:
         return earliest(*(stream.timer() for stream in self._all()))
 
     def handle_timer(self, now: float) -> None:
+        dues = [stream.reports.due() for stream in self.outgoing.values()]
+        one_reports = any(due is not None and now >= due for due in dues)
         for stream in self._all():
             stream.handle_timer(now)
+        for stream in self.outgoing.values() if one_reports else ():
+            stream.reports.report_early(now)
 
     def close(self, now: float) -> None:
         """Say goodbye for every stream that was sent."""

@@ -28,7 +28,6 @@ class Delivery(NamedTuple):
 
 
 REPORTS_OFTEN = 1 / 3  # s
-REPORTS_ELSE = 1.0  # s
 
 
 class PeerMedia:
@@ -54,6 +53,7 @@ class PeerMedia:
         self._on_connected = on_connected
         self._on_paced = on_paced
         self._turns = turns
+        self._report_seconds = 1.0  # between two sender reports, unless it comes first
         self._has_left = False
         self._has_failed = False
         self._tell_failed: Callable[[str, Exception], None] = _log_failure
@@ -132,17 +132,23 @@ class PeerMedia:
             self._turns.drives = holds_seat
         self._set_pace()
 
-    def _set_pace(self) -> None:
-        """How often reports go out, and whose datagrams leave first.
+    def report_every(self, seconds: float) -> None:
+        """Send sender reports as often, unless this peer comes first."""
+        if seconds != self._report_seconds:
+            self._report_seconds = seconds
+            self._set_pace()
 
-        A round trip tells of the queue that the last report met, so whoever the operator's pictures depend on gets
-        them three times as often: a queue of a few hundred milliseconds is to be seen before it has grown to a second.
+    def _set_pace(self) -> None:
+        """How often reports go out, and which peers' datagrams leave first.
+
+        A round trip tells of the queue that the last report met, so a peer on whom the operator's pictures depend gets
+        three reports a second: a queue of a few hundred milliseconds is to be seen before it has grown to a second.
         Over the narrowest paths that is a hundredth of what passes; RTCP may take a twentieth (RFC 4585 3.4).
         """
         quality = self.quality
         comes_first = quality.drives or quality.operator or quality.relays
         self._connection.urgent = quality.drives or quality.operator
-        self._connection.peer.report_every(REPORTS_OFTEN if comes_first else REPORTS_ELSE)
+        self._connection.peer.report_every(REPORTS_OFTEN if comes_first else self._report_seconds)
 
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
         """Call `tell` when something else was decided for this peer's pictures."""

@@ -42,6 +42,7 @@ from server.token_bucket import TokenBucket
 __all__ = ["MediaPlan", "MediaPlane", "MediaSettings", "PeerMedia"]
 
 NOT_DRIVING_RATE = 1000.0  # Hz, datagrams of all together who may drive and do not, before they wait as observers' do
+REPORTED = 50  # peers that get sender reports in a second
 MAX_LINK_TIME = 1e9  # s; no monotonic clock gets there, and NaN is not below it
 
 AnyStream = VideoStream | AudioStream
@@ -310,7 +311,13 @@ class MediaPlane:
         ]
         if peer.quality.cameras or peer.quality.sounds:
             self._quality.join(peer.quality)
+        self._spread_reports()
         return peer
+
+    def _spread_reports(self) -> None:
+        """A crowd gets its sender reports more rarely (RFC 3550 6.2)."""
+        for peer in self._peers:
+            peer.report_every(float(max(1, -(-len(self._peers) // REPORTED))))
 
     def _gives_h264(self, stream: AnyStream) -> bool:
         """Whether the camera may encode by itself, as far as is known now; then its peers had better take that."""
@@ -348,6 +355,7 @@ class MediaPlane:
     def _detached(self, peer: PeerMedia) -> None:
         self._peers.pop(peer, None)
         self._quality.leave(peer.quality)
+        self._spread_reports()
 
     def _delivery(self, connection: Connection, peer: PeerMedia, planned: PlannedStream, priority: bool) -> Delivery:
         mid, stream, codecs, carrier = planned

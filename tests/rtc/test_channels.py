@@ -302,3 +302,29 @@ def test_limits_are_checked_where_they_are_given() -> None:
     for wrong in ({"max_retransmits": 1, "lifetime": 1.0}, {"max_retransmits": -1}, {"lifetime": 66.0}):
         with pytest.raises(ValueError, match=r"max_retransmits|lifetime|limit"):
             Reliability(**wrong)
+
+
+def test_the_owner_is_told_once_when_nothing_waits_on_a_channel_any_more() -> None:
+    both = world(SctpSettings(initial_window=1, window_floor=1))
+    channel = both.ends[0].open("a", 0.0)
+    both.run(1.0)
+    both.ends[0].events()
+    assert not both.ends[0].has_waiting(channel)
+    both.ends[0].send(channel, "x" * 10_000, both.now)
+    both.ends[0].packets_to_send()
+    assert both.ends[0].has_waiting(channel)
+    both.ends[0].tell_when_empty(channel)
+    both.run(both.now + 5.0)
+    assert [each for each in both.ends[0].events() if isinstance(each, ChannelWritable)] == [ChannelWritable(channel)]
+    assert not both.ends[0].has_waiting(channel)
+
+
+def test_why_the_association_has_ended_is_known_before_its_channels_close() -> None:
+    both = world()
+    both.ends[0].open("a", 0.0)
+    both.run(1.0)
+    assert both.ends[1].closed is None
+    both.ends[0].abort(both.now, "done")
+    both.run(both.now + 1.0)
+    assert both.ends[0].closed == Closed("done")
+    assert both.ends[1].closed == Closed("peer_aborted")

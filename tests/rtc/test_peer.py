@@ -408,3 +408,21 @@ def test_nothing_that_comes_from_anywhere_raises_or_ends_a_session(
     peer.receive_datagram(data, path, attacked.now)
     assert not [each for each in peer.events() if isinstance(each, PeerEnded)]
     peer.datagrams_to_send()
+
+
+def test_a_frame_that_is_sent_by_itself_needs_nothing_else_to_be_drained() -> None:
+    pair = connected()
+    offerer, answerer = pair.peers
+    for frame in range(3):
+        sent = offerer.frame_to_send("camera", [b"%d" % frame], frame * 3000, pair.now)
+        for datagram in sent:
+            answerer.receive_datagram(datagram.data, Path(datagram.remote, datagram.local), pair.now)
+        assert offerer.media_timer is not None
+    pair.run(0.1)
+    packets = [each.packet.payload for each in pair.of(1, PacketReceived) if isinstance(each, PacketReceived)]
+    assert packets == [b"0", b"1", b"2"]
+    pair.run(2.0)
+    assert any(isinstance(each, MediaEvent) for each in pair.of(0, MediaEvent)), "reports go out by their timer"
+    offerer.close(pair.now)
+    with pytest.raises(PeerNotReady):
+        offerer.frame_to_send("camera", [b"x"], 0, pair.now)

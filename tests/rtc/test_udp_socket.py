@@ -234,3 +234,12 @@ def test_a_port_that_is_taken_is_said_at_once(bind: Bind) -> None:
     first = bind("127.0.0.1")
     with pytest.raises(OSError, match="in use"):
         UdpSocket.bind("127.0.0.1", first.address[1])
+
+
+def test_a_socket_is_full_from_when_the_kernel_takes_no_more_until_it_does() -> None:
+    here, _ = with_kernel(errno.EAGAIN)
+    here.queue(numbered(1))
+    here.flush()
+    assert here.is_full
+    here.flush()
+    assert not here.is_full

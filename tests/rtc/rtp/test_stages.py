@@ -23,6 +23,7 @@ from rtc.rtp.stage import (
     BandwidthEstimate,
     KeyframeRequested,
     PacketsGone,
+    PacketsLeft,
     Reception,
     RoundTrip,
     Sink,
@@ -197,6 +198,20 @@ def test_a_burst_leaves_at_once_and_the_rest_by_and_by_in_order() -> None:
         left += numbers(sink)
     assert left == [2, 3, 4, 5]
     assert 0.1 <= now < 0.2
+
+
+def test_the_pacer_says_when_the_last_packet_that_it_held_back_has_left() -> None:
+    stage, sink, _ = pacer(burst=1, free_rate=8_000)
+    held = []
+    for number in (1, 2):
+        stage.rtp(packet(number, bytes(500)), 0)
+        held.append(stage.holds)
+    assert sink.drain_events() == []
+    due = stage.timer()
+    assert due is not None
+    stage.handle_timer(due)
+    assert [*held, stage.holds] == [False, True, False]
+    assert sink.drain_events() == [PacketsLeft()]
 
 
 def test_a_retransmission_overtakes_what_waits() -> None:

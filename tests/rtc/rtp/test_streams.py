@@ -199,3 +199,20 @@ def test_with_each_report_the_sender_is_told_how_much_it_may_send_at_most() -> N
     told = [each for each in path.sender.events() if isinstance(each, BandwidthEstimate)]
     assert told
     assert all(each.bitrate <= 1_000_000 < 1.01 * each.bitrate and each.ssrcs == {7} for each in told)
+
+
+def test_streams_of_one_peer_report_together_and_as_often_as_they_are_asked_to() -> None:
+    codec = Codec(96, "VP8", 90_000, feedback=("nack",))
+    media = [
+        NegotiatedMedia(MediaSection("video", f"m{number}", codecs=(codec,)), "sendonly", 100 + number, 200 + number)
+        for number in range(3)
+    ]
+    streams = Streams(media, Identity("name", 1), PathShare(0.0), Random(1))
+    for number in range(3):  # each begins at another time
+        streams.outgoing[f"m{number}"].send([b"x"], 0, number / 10)
+        streams.outgoing[f"m{number}"].reports.interval = 2.0
+    streams.rtcp_to_send()
+    streams.handle_timer(1.0)
+    [compound] = streams.rtcp_to_send()
+    assert sum(isinstance(each, SenderReport) for each in parse_rtcp(compound)) == 3
+    assert streams.timer() == 3.0

@@ -3,7 +3,7 @@
 import asyncio
 
 from server.loop_turns import LoopTurns
-from server.media.receive_turns import ReceiveTurns
+from server.media.receive_turns import DriverTurns, ReceiveTurns
 
 
 class Peer:
@@ -65,3 +65,16 @@ async def test_who_is_added_again_has_one_place() -> None:
     turns.add(peer)
     await turns_of_the_loop(2)
     assert world.handled == ["a", "a"]
+
+
+async def test_what_a_driver_sends_is_handled_at_once_and_of_others_who_may_drive_so_much() -> None:
+    world = World()
+    may_go = [True, False]
+    turns = DriverTurns(ReceiveTurns(LoopTurns(lambda: world.now, 1.0)), lambda: may_go.pop(0))
+    assert turns.may_go_at_once()
+    assert not turns.may_go_at_once()
+    turns.drives = True
+    assert turns.may_go_at_once(), "the bound is for those who do not drive"
+    turns.add(Peer("a", 1, world))
+    await turns_of_the_loop(2)
+    assert world.handled == ["a"]
