@@ -19,9 +19,9 @@ from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription, V
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse
 
+from bench.aioice_hosts import use_hosts
 from robot_bridge.link_client import RobotLink
 from robot_bridge.protocol.messages import Media
-from server.media.aiortc_private import restrict_ice_hosts
 from server.serve import bind, running, wait_for_signal
 
 __all__ = ["main"]
@@ -69,7 +69,7 @@ class BaselineServer:
         self._opened = 0
 
     async def run(self) -> None:
-        restrict_ice_hosts([self._host])
+        use_hosts([self._host])
         listener = bind(self._host, 0)
         async with self._link, running(self._app(), listener), asyncio.TaskGroup() as tasks:
             feeding = tasks.create_task(self._feed())

@@ -4,8 +4,8 @@ import asyncio
 
 from aiortc import RTCPeerConnection, RTCSessionDescription
 
+from bench.aioice_hosts import use_hosts
 from client.peer import Route
-from server.media.aiortc_private import restrict_ice_hosts
 
 __all__ = ["connect_through"]
 
@@ -21,7 +21,7 @@ async def connect_through(route: Route, asking: RTCPeerConnection, answering: RT
         if asking.connectionState == "connected":
             connected.set()
 
-    restrict_ice_hosts(["127.0.0.1"])
+    use_hosts(["127.0.0.1"])
     await asking.setLocalDescription(await asking.createOffer())
     offer = route.offer(asking.localDescription.sdp)
     await answering.setRemoteDescription(RTCSessionDescription(offer, "offer"))

@@ -69,7 +69,7 @@ class ChannelMessage(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ChannelWritable:
-    """A channel whose queue was full has room again."""
+    """A channel whose queue was full has room again, or nothing waits any more on one that `tell_when_empty` named."""
 
     channel: int
 
@@ -120,12 +120,14 @@ class DataChannels:
         self.association = Association(settings, random_bytes, peer_port=peer_port, peer_max_message=peer_max_message)
         self.counts: Counter[str] = self.association.counts
         self.is_client = client
+        self.closed: Closed | None = None  # why the association has ended; None: it has not
         self._parity = 0 if client else 1
         self._streams = settings.max_streams
         self._is_up = False
         self._channels: dict[int, _Channel] = {}
         self._closing: set[int] = set()  # whose streams are to be reset when nothing waits on them
         self._full: set[int] = set()
+        self._watched: set[int] = set()  # of which the owner is told when nothing waits on them
         self._half_full = settings.send_queue // 2
         self._events: list[ChannelEvent] = []
 
@@ -206,6 +208,15 @@ class DataChannels:
         """Bytes that wait on a channel, newest-wins messages apart."""
         return self.association.buffered(channel)
 
+    def has_waiting(self, channel: int) -> bool:
+        """Whether a message, or a part of one, has not left yet."""
+        return self.association.has_waiting(channel)
+
+    def tell_when_empty(self, channel: int) -> None:
+        """`ChannelWritable` follows when nothing waits on it; once."""
+        if channel in self._channels:
+            self._watched.add(channel)
+
     def close(self, channel: int, now: float) -> None:
         """Close it when its waiting messages have left. `ChannelClosed` follows. No effect on a channel that does not
         exist."""
@@ -228,7 +239,7 @@ class DataChannels:
         packets = self.association.packets_to_send()
         if self._closing and self._reset_closing(self.association.now):
             packets += self.association.packets_to_send()
-        if self._full:
+        if self._full or self._watched:
             self._find_writable()
         return packets
 
@@ -250,6 +261,11 @@ class DataChannels:
         """End at once; `Closed` with this reason is next."""
         self.association.abort(now, reason)
         self._take_events(now)
+
+    @property
+    def has_events(self) -> bool:
+        """Whether `events` has something."""
+        return bool(self._events)
 
     def events(self) -> list[ChannelEvent]:
         """What has happened; drained."""
@@ -284,10 +300,12 @@ class DataChannels:
                 self._opened(channel)
 
     def _ended(self, event: Closed) -> None:
+        self.closed = event
         self._events += [ChannelClosed(stream) for stream in self._channels]
         self._channels.clear()
         self._closing.clear()
         self._full.clear()
+        self._watched.clear()
         self._events.append(event)
 
     def _opened(self, channel: _Channel) -> None:
@@ -376,11 +394,15 @@ class DataChannels:
     def _remove(self, stream: int) -> None:
         del self._channels[stream]
         self._full.discard(stream)
+        self._watched.discard(stream)
         self._events.append(ChannelClosed(stream))
 
     def _find_writable(self) -> None:
         for stream in [each for each in self._full if self.association.buffered(each) <= self._half_full]:
             self._full.remove(stream)
+            self._events.append(ChannelWritable(stream))
+        for stream in [each for each in self._watched if not self.association.has_waiting(each)]:
+            self._watched.remove(stream)
             self._events.append(ChannelWritable(stream))
 
 

@@ -43,6 +43,7 @@ __all__ = ["Connection", "Endpoint", "EndpointSettings", "TooManyPeers", "Turns"
 Listener = Callable[[PeerEvent], None]
 CLOCK_RESOLUTION = 0.001  # s, by which a loop may call too early
 SLOWEST = 4  # times as long as STUN over UDP: an address by TCP and TLS takes five round trips
+UNSENT = 64 * 1024  # bytes on a TCP path, above which pictures had better wait where newer ones replace them
 PORT_TRIES = 8  # a free port of one address may be taken at another
 
 
@@ -99,7 +100,7 @@ class Connection:
         self._telling = False  # the listener, which may use this connection meanwhile
         self._turns = turns
         self._later: deque[tuple[bytes, Path]] = deque()  # datagrams that wait for their turn
-        self._has_failed = False
+        self.fault: Exception | None = None  # what serving it has raised, after PeerEnded("failed")
         self._waiting: deque[PeerEvent] = deque()
         self._arrived = asyncio.Event()
         self._ended = False  # PeerEnded waits, or was read
@@ -168,12 +169,21 @@ class Connection:
         captured_at: float | None = None,
     ) -> None:
         now = self._loop.time()
-        self.peer.send_frame(mid, payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
-        self.flush()
+        datagrams = self.peer.frame_to_send(
+            mid, payloads, media_time, now, marker=marker, values=values, captured_at=captured_at
+        )
+        self._endpoint.send(datagrams, urgent=self.urgent)
+        self._set_timer_by(self.peer.media_timer)
 
     def send_rtcp(self, packet: bytes) -> None:
         self.peer.send_rtcp(packet)
         self.flush()
+
+    @property
+    def is_blocked(self) -> bool:
+        """Whether what is sent now would only wait for the network. True too while there is no path."""
+        path = self.peer.ice.path
+        return path is None or self._endpoint.is_blocked(path)
 
     def request_keyframe(self, mid: str) -> None:
         self.peer.request_keyframe(mid, self._loop.time())
@@ -184,11 +194,19 @@ class Connection:
 
     def close(self) -> None:
         """Say goodbye. The events end with PeerEnded("closed")."""
-        if not self._has_failed:
-            self.peer.close(self._loop.time())
-            self.flush()
+        if self.fault is None:
+            try:
+                self.peer.close(self._loop.time())
+            except Exception as error:
+                self._fail(error)
+            self.settle()
 
     # Events
+
+    def listen(self, listener: Listener) -> None:
+        """Tell `listener` what happens from now on, and what has happened and nobody has read. Only once."""
+        self._listener = listener
+        self._tell(listener, ())
 
     def __aiter__(self) -> Self:
         return self
@@ -252,11 +270,15 @@ class Connection:
             self._fail(error)
 
     def _fail(self, error: Exception) -> None:
-        """A peer has sent something unexpected: a fault of this package, which other peers must not feel."""
-        if self._has_failed:
+        """A peer has sent something unexpected: a fault of this package, which other peers must not feel.
+
+        A listener finds it in `fault`; without a listener, the loop's exception handler is told.
+        """
+        if self.fault is not None:
             return
-        self._has_failed = True
-        self._loop.call_exception_handler({"message": "serving a WebRTC peer failed", "exception": error})
+        self.fault = error
+        if self._listener is None:
+            self._loop.call_exception_handler({"message": "serving a WebRTC peer failed", "exception": error})
         with suppress(Exception):
             self.peer.ice.close()
         self._later.clear()
@@ -267,10 +289,13 @@ class Connection:
 
     def flush(self) -> None:
         """Send the due datagrams, hand out the events, and set the timer anew. Call it after you used `peer` itself."""
-        if self._has_failed:
+        if self.fault is not None:
             return
         self._hand_out(self.peer.events())
         self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
+        if self.peer.has_events:  # a channel is empty now
+            self._hand_out(self.peer.events())
+            self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
         self._set_timer()
         if self._ended:
             self._later.clear()
@@ -321,13 +346,18 @@ class Connection:
     def _set_timer(self) -> None:
         """A timer that fires too early is left: the next datagram puts off most of them, and no code waits for them."""
         due = self.peer.timer()
-        if self._timer is not None:
-            if due is not None and self._timer_at <= due:
-                return
+        if due is None and self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if due is not None:
-            self._timer, self._timer_at = self._loop.call_at(due, self._due), due
+        self._set_timer_by(due)
+
+    def _set_timer_by(self, due: float | None) -> None:
+        """At the latest then."""
+        if due is None or (self._timer is not None and self._timer_at <= due):
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer, self._timer_at = self._loop.call_at(due, self._due), due
 
     def _due(self) -> None:
         self._timer = None
@@ -410,6 +440,11 @@ class Endpoint:
             self._tcp.bind(host, self._number)
 
     @property
+    def connections(self) -> int:
+        """Those that have not ended."""
+        return len(self._connections)
+
+    @property
     def dropped(self) -> Counter[str]:
         """What came and was not used, by reason, since the start: here, and of every connection."""
         found = Counter(self.counts) + self._dropped_before
@@ -418,6 +453,11 @@ class Endpoint:
         return found
 
     # Where peers reach us
+
+    @property
+    def sockets(self) -> list[UdpSocket]:
+        """For an application that wants to know when something has come, by `fileno`."""
+        return list(self._sockets.values())
 
     @property
     def candidates(self) -> list[LocalCandidate]:
@@ -574,7 +614,7 @@ class Endpoint:
     # For connections
 
     def send(self, datagrams: Sequence[Datagram], *, urgent: bool) -> None:
-        """They leave with all others of this turn of the loop."""
+        """They leave with all others of this turn of the loop; urgent ones now."""
         for datagram in datagrams:
             if self._tcp is not None and datagram.path.transport == "tcp":
                 self._tcp.send(datagram, urgent=urgent)
@@ -584,9 +624,18 @@ class Endpoint:
                 self._send_relayed(datagram)
             else:
                 found.queue((datagram,), urgent=urgent)
-        if datagrams and not self._flush_is_due:
+        if urgent and datagrams:
+            self._flush()
+        elif datagrams and not self._flush_is_due:
             self._flush_is_due = True
-            self._loop.call_soon(self._flush)
+            self._loop.call_soon(self._flush_later)
+
+    def is_blocked(self, path: Path) -> bool:
+        """Whether what is sent on this path now would only wait for the network."""
+        if path.transport == "tcp":
+            return self._tcp is not None and self._tcp.unsent(path) > UNSENT
+        found = self._sockets.get(path.local)
+        return found is not None and found.is_full
 
     def _send_relayed(self, datagram: Datagram) -> None:
         link = next((each for each in self._relays if each.relayed == datagram.local), None)
@@ -641,8 +690,11 @@ class Endpoint:
         if connection is not None:
             connection.path_closed(path)
 
-    def _flush(self) -> None:
+    def _flush_later(self) -> None:
         self._flush_is_due = False
+        self._flush()
+
+    def _flush(self) -> None:
         for found in self._sockets.values():
             found.flush()
             if found.wants_write:

@@ -38,7 +38,7 @@ from rtc.peer_events import (
     PlainRtp,
 )
 from rtc.rtp.incoming import IncomingStream
-from rtc.rtp.outgoing import PathShare
+from rtc.rtp.outgoing import OutgoingStream, PathShare
 from rtc.rtp.stage import earliest
 from rtc.rtp.streams import Identity, NegotiatedMedia, Streams
 from rtc.sctp import SctpSettings
@@ -142,6 +142,9 @@ class Peer:
         self._unprotect: SrtpReceiver | None = None
         self._plain_packets = False
         self._tagged: MediaSection | None = None  # whose transport is that of the bundle; None until negotiated
+        # What streams have: most datagrams are about something else, and each stream is a chain of stages.
+        self._media_unsent = self._media_untold = self._media_untimed = False
+        self._media_due: float | None = None  # when their timer is, as far as that is known
         self._out: list[Datagram] = []
         self._events: list[PeerEvent] = []
         self._now = 0.0
@@ -244,6 +247,11 @@ class Peer:
     def cancel_restart(self) -> None:
         """The path before it stays. Nothing without one."""
         self.ice.cancel_restart()
+
+    @property
+    def is_up(self) -> bool:
+        """Whether DTLS is connected and the session has not ended; a path may be missing during a restart."""
+        return not self._ended and self._dtls is not None and self._dtls.state is DtlsState.CONNECTED
 
     def _check_alive(self) -> MediaSection:
         if self._ended:
@@ -372,6 +380,21 @@ class Peer:
         self._now = now
         self._need_channels().send(channel, data, now)
 
+    def open_negotiated_channel(
+        self, channel: int, label: str, *, protocol: str = "", reliability: Reliability | None = None
+    ) -> None:
+        """As `DataChannels.open_negotiated`. Raises PeerNotReady as well."""
+        self._need_channels().open_negotiated(channel, label, protocol=protocol, reliability=reliability)
+
+    def has_waiting(self, channel: int) -> bool:
+        """As of `DataChannels`; False when there are none."""
+        return self.channels is not None and self.channels.has_waiting(channel)
+
+    def tell_when_empty(self, channel: int) -> None:
+        """As of `DataChannels`."""
+        if self.channels is not None:
+            self.channels.tell_when_empty(channel)
+
     def close_channel(self, channel: int, now: float) -> None:
         self._now = now
         self._need_channels().close(channel, now)
@@ -388,16 +411,73 @@ class Peer:
         captured_at: float | None = None,
     ) -> None:
         """As `OutgoingStream.send`, in section `mid`. Raises PeerNotReady: it is not up, or we do not send there."""
-        stream = self.streams.outgoing.get(mid) if self.streams is not None else None
-        if stream is None or self._protect is None:
-            raise PeerNotReady(f"nothing can be sent in section {mid!r}")
+        self._now = now
+        self._need_outgoing(mid).send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
+        self._stir_media()
+
+    def frame_to_send(
+        self,
+        mid: str,
+        payloads: Sequence[bytes],
+        media_time: int,
+        now: float,
+        *,
+        marker: bool = True,
+        values: Mapping[str, bytes] | None = None,
+        captured_at: float | None = None,
+    ) -> list[Datagram]:
+        """As `send_frame`, and what is due because of it: nothing else has to be drained. `timer` may be earlier."""
+        stream = self._need_outgoing(mid)
         self._now = now
         stream.send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
+        self._media_due = earliest(self._media_due, stream.timer())
+        sent, path = self._drained(stream), self.ice.path
+        return [] if path is None else [Datagram(data, path) for data in sent]
+
+    @property
+    def media_timer(self) -> float | None:
+        """When `handle_timer` is due for the sake of what we send."""
+        return None if self._ended else self._media_due
+
+    def _drained(self, stream: OutgoingStream) -> list[bytes]:
+        if self._protect is None or self.streams is None:
+            return []
+        sent = list(self._protected(self._protect.protect, stream.packets_to_send()))
+        if controls := stream.controls_to_send():
+            sent += self._protected(self._protect.protect_rtcp, self.streams.compounds(controls))
+        return sent
+
+    def _need_outgoing(self, mid: str) -> OutgoingStream:
+        stream = self.streams.outgoing.get(mid) if self.streams is not None else None
+        if stream is None or self._protect is None or self._ended:
+            raise PeerNotReady(f"nothing can be sent in section {mid!r}")
+        return stream
+
+    def _stir_media(self) -> None:
+        """Streams may have something to send and to tell, and another timer."""
+        self._media_unsent = self._media_untold = self._media_untimed = True
+
+    def holds_back(self, mid: str) -> bool:
+        """Whether packets of the stream that we send in section `mid` wait for its pacer. `PacketsLeft` follows."""
+        stream = self.streams.outgoing.get(mid) if self.streams is not None else None
+        return stream is not None and stream.pacer is not None and stream.pacer.holds
+
+    def pace(self, bitrate: float | None) -> None:
+        """Spread pictures over a path that is believed to carry `bitrate` (bit/s). None: no limit was seen."""
+        if self.streams is not None:
+            self.streams.share.bucket.limit(bitrate)
+
+    def report_every(self, seconds: float) -> None:
+        """Send reports of what we send as often (RFC 3550 6.2). From the report after the next on."""
+        if self.streams is not None:
+            for stream in self.streams.outgoing.values():
+                stream.reports.interval = seconds
 
     def request_keyframe(self, mid: str, now: float) -> None:
         """Raises PeerNotReady: we do not receive in section `mid`."""
         self._now = now
         self._need_incoming(mid).request_keyframe(now)
+        self._stir_media()
 
     def limit(self, mid: str, bitrate: int) -> None:
         """Ask the peer to send at most so many bit/s in this section (REMB). Raises PeerNotReady likewise."""
@@ -426,6 +506,7 @@ class Peer:
         self._now = now
         if self.streams is not None:
             self.streams.close(now)
+            self._stir_media()
         if self.channels is not None:
             self.channels.abort(now)
         self._collect()
@@ -469,18 +550,26 @@ class Peer:
             due = core.timer() if core is not None else None
             if core is not None and due is not None and now >= due:
                 core.handle_timer(now)
+        self._stir_media()
         self._settle(now)
 
     def timer(self) -> float | None:
         if self._ended:
             return None
-        cores = (self.ice, self._dtls, self.channels, self.streams)
-        return earliest(*(core.timer() for core in cores if core is not None))
+        if self._media_untimed and self.streams is not None:
+            self._media_due, self._media_untimed = self.streams.timer(), False
+        cores = (self.ice, self._dtls, self.channels)
+        return earliest(self._media_due, *(core.timer() for core in cores if core is not None))
 
     def datagrams_to_send(self) -> list[Datagram]:
         self._collect()
         out, self._out = self._out, []
         return out
+
+    @property
+    def has_events(self) -> bool:
+        """Whether sending has made some: `events` has more."""
+        return bool(self._events) or (self.channels is not None and self.channels.has_events)
 
     def events(self) -> list[PeerEvent]:
         self._settle(self._now)
@@ -505,12 +594,14 @@ class Peer:
                 self._events.append(PlainRtp(plain))
             elif plain is not None:
                 self.streams.receive_rtp(plain, now)
+                self._stir_media()
         else:
             plain = self._unprotect.unprotect_rtcp(data)
             if plain is not None and self._plain_packets:
                 self._events.append(PlainRtcp(plain))
             elif plain is not None:
                 self.streams.receive_rtcp(plain, now)
+                self._stir_media()
 
     def _settle(self, now: float) -> None:
         """Pass the cores' events to one another, and to the application."""
@@ -532,7 +623,8 @@ class Peer:
             return
         if self.channels is not None:
             self._events += self.channels.events()
-        if self.streams is not None:
+        if self.streams is not None and self._media_untold:
+            self._media_untold = False
             self._events += [PacketReceived(mid, packet) for mid, packet in self.streams.packets()]
             self._events += [MediaEvent(mid, event) for mid, event in self.streams.events()]
 
@@ -587,7 +679,8 @@ class Peer:
                 if dtls.state is DtlsState.CONNECTED:  # it may end with any of them
                     dtls.send(packet, self._now)
         sent = dtls.datagrams_to_send()
-        if self.streams is not None and self._protect is not None:
+        if self.streams is not None and self._protect is not None and self._media_unsent:
+            self._media_unsent = False
             sent += self._protected(self._protect.protect_rtcp, self.streams.rtcp_to_send())
             sent += self._protected(self._protect.protect, self.streams.rtp_to_send())
         if path is not None:  # without a path every packet is as good as lost, and repeated as such

@@ -79,6 +79,11 @@ class TcpPort:
         elif not found.send(datagram.data, self.settings.unsent_urgent if urgent else self.settings.unsent):
             self.counts["backlog"] += 1
 
+    def unsent(self, path: Path) -> int:
+        """Bytes that wait for the network on this path."""
+        found = self._connections.get(path)
+        return 0 if found is None else found.unsent
+
     def close(self) -> None:
         """What was sent still leaves. Idempotent."""
         for listener in self._listeners.values():
@@ -187,9 +192,13 @@ class _TcpPath(asyncio.Protocol):
             self._look.cancel()
         self._port.ended(self)
 
+    @property
+    def unsent(self) -> int:
+        return self._transport.get_write_buffer_size()
+
     def send(self, data: bytes, most: int) -> bool:
         """False: too much waits."""
-        if self._transport.get_write_buffer_size() > most:
+        if self.unsent > most:
             return False
         self._transport.write(frame(data))
         return True

@@ -63,6 +63,7 @@ class UdpSocket:
         self._others: deque[Datagram] = deque()
         self._any_address = host in ("0.0.0.0", "::") and _tells_local_addresses(sock)
         self._segments = segments and _supports_segments(sock)
+        self.is_full = False  # the kernel took no more, and has not since
         self._alone = 0  # so many of the next leave uncombined: the kernel has refused to cut them
         self._paths: dict[tuple[object, bytes], Path] = {}  # by sender and packet information
         self._origins: dict[str, list[Ancillary]] = {}  # by the address to leave from
@@ -177,12 +178,14 @@ class UdpSocket:
                 self._socket.sendto(datagrams[0], path.remote)
         except OSError as error:
             if error.errno in FULL:
+                self.is_full = True
                 return False
             if len(datagrams) > 1 and error.errno in UNCUT:
                 self.counts["segments_refused"] += 1
                 self._alone = len(datagrams)
                 return True
             self._count(error)
+        self.is_full = False
         for _ in datagrams:
             (self._urgent or self._others).popleft()
         self._alone = max(0, self._alone - len(datagrams))

@@ -1,17 +1,18 @@
 """Data channels that an offer names (RFC 8864), so that neither side waits for a message that opens them. No I/O."""
 
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
+from rtc.sctp import SctpSettings
 from server.channels import CHANNELS, ChannelName, channel_name
 from server.errors import BadSdp, ChannelError
 
-__all__ = ["CHANNEL_LINE", "AgreedChannel", "agreed_channels"]
+__all__ = ["AgreedChannel", "agreed_channels"]
 
-CHANNEL_LINE = "a=dcmap:"
-MAX_ID = 65534  # RFC 8832 4
+MAX_ID = SctpSettings().max_streams - 1
 MAX_RETRANSMITS = 65535  # RFC 8832 5.1: 16 bits carry it
-LINE = re.compile(r'a=dcmap:(\d{1,5}) ([^;"=]+="?[^;"]*"?(?:;[^;"=]+="?[^;"]*"?)*)')
+MAP = re.compile(r'(\d{1,5}) ([^;"=]+="?[^;"]*"?(?:;[^;"=]+="?[^;"]*"?)*)')
 
 
 class AgreedChannel(NamedTuple):
@@ -23,26 +24,22 @@ class AgreedChannel(NamedTuple):
     max_retransmits: int | None  # None: as often as it takes
 
 
-def agreed_channels(offer: str) -> list[AgreedChannel]:
-    """Those of `offer`; empty when the peer opens its channels by itself.
+def agreed_channels(maps: Sequence[str]) -> list[AgreedChannel]:
+    """Those that an offer names by `a=dcmap`; empty when the peer opens its channels by itself.
 
     Raises:
         BadSdp: a line that is none, a channel that we have not, or one twice.
     """
-    found: list[AgreedChannel] = []
-    for line in offer.splitlines():
-        if not line.startswith(CHANNEL_LINE):
-            continue
-        if len(found) == len(CHANNELS):
-            raise BadSdp(f"more data channels than the {len(CHANNELS)} that there are")
-        found.append(_channel(line))
+    if len(maps) > len(CHANNELS):
+        raise BadSdp(f"more data channels than the {len(CHANNELS)} that there are")
+    found = [_channel(each) for each in maps]
     if len({each.id for each in found}) < len(found) or len({each.name for each in found}) < len(found):
         raise BadSdp("a=dcmap: a data channel that is there already")
     return found
 
 
-def _channel(line: str) -> AgreedChannel:
-    parsed = LINE.fullmatch(line)
+def _channel(text: str) -> AgreedChannel:
+    parsed = MAP.fullmatch(text)
     if parsed is None or int(parsed[1]) > MAX_ID:
         raise BadSdp("an a=dcmap line that is not valid (RFC 8864 5.1)")
     options = dict(each.split("=", 1) for each in parsed[2].split(";"))

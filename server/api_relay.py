@@ -6,7 +6,7 @@ import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from server.access import Right
-from server.relay.tickets import JanusTicket, LiveKitTicket, RelayAnswer, without_key
+from server.relay.tickets import RelayAnswer, RelayTicket, without_key
 from server.services import authorized, services
 
 __all__ = ["router"]
@@ -26,7 +26,7 @@ async def relay(
     Only such a one gets what lets it in, so everyone who watches is a participant. `lost`: RELAY-FEED, which it lost.
     """
     here = services(request)
-    ticket: JanusTicket | LiveKitTicket | None = None
+    ticket: RelayTicket | None = None
     if caller.role == "observer":
         known = here.console.peers.by_id(peer) if peer else None
         own = known if known is not None and known.identity.token_id == caller.token_id and known.connected else None

@@ -19,8 +19,6 @@ from server.front_door import FrontDoor, HostNames
 from server.guard import Guard
 from server.house import House, HouseMetrics
 from server.known_tokens import KnownTokens
-from server.media.aiortc_private import restrict_ice_hosts
-from server.media_addresses import media_hosts
 from server.media_endpoint import MediaEndpoint
 from server.rate_limits import RateLimits
 from server.security import SAFE_METHODS, SecurityHeaders, check_origin
@@ -75,9 +73,10 @@ def open_house(
     """To be called when the lifespan of `app` begins; `state` stands in for what the settings name."""
     asyncio.get_running_loop().set_exception_handler(metrics.faults.uncaught)
     opened = state or open_state(settings)
-    if settings.ice_hosts or settings.bound_to_loopback:
-        restrict_ice_hosts(media_hosts(settings))
-    house = House(opened, Guard(settings), metrics, MediaEndpoint(settings), max_peers, reserved)
+    endpoint = MediaEndpoint(settings)
+    if settings.media_port:  # which somebody else might take meanwhile
+        endpoint.open()
+    house = House(opened, Guard(settings), metrics, endpoint, max_peers, reserved)
     app.state.house = house
     log.info("audit and recordings are signed", public_key=opened.signer.public_key)
     return house

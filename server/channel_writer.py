@@ -1,28 +1,29 @@
 """Writes to one data channel without ever filling it: what the channel does not take at once waits in an outbox."""
 
-from collections.abc import Callable
-
-from aiortc import RTCDataChannel
-
+from rtc.channels import ChannelNotOpen
+from rtc.endpoint import Connection
+from rtc.peer import PeerNotReady
+from rtc.sctp import AssociationClosed, MessageTooLarge
 from server.outbox import ChannelOutbox
 
 __all__ = ["ChannelWriter"]
 
+ENDED = (ChannelNotOpen, AssociationClosed, PeerNotReady)
+
 
 class ChannelWriter:
-    """Bytes are handed to the channel only while it has nothing buffered, so feedback is never queued behind feedback.
+    """A message is handed to the channel only while none waits there, so feedback is never queued behind feedback.
 
     Attributes:
-        too_large: messages that the remote's max-message-size (RFC 8841 6) forbids
+        too_large: messages that the peer's max-message-size (RFC 8841 6) forbids
     """
 
-    def __init__(self, channel: RTCDataChannel, on_failed: Callable[[Exception], None] | None = None) -> None:
-        """`on_failed` hears what the channel raised while nobody here called it; without, aiortc hears it."""
+    def __init__(self, connection: Connection, channel: int) -> None:
+        """Call `flush` with `ChannelWritable`."""
+        self._connection = connection
         self._channel = channel
-        self._on_failed = on_failed
         self.outbox = ChannelOutbox()
         self.too_large = 0
-        channel.on("bufferedamountlow", self._try_flush)
 
     @property
     def lost(self) -> int:
@@ -31,26 +32,24 @@ class ChannelWriter:
 
     def send(self, text: str) -> None:
         self.outbox.put(text)
-        self._flush()
+        self.flush()
 
     def send_newest(self, text: str) -> None:
         self.outbox.put_newest(text)
-        self._flush()
+        self.flush()
 
-    def _try_flush(self) -> None:
-        try:
-            self._flush()
-        except Exception as error:
-            if self._on_failed is None:
-                raise
-            self._on_failed(error)
-
-    def _flush(self) -> None:
-        while self._channel.readyState == "open" and self._channel.bufferedAmount == 0:
+    def flush(self) -> None:
+        """Hand on what waits in the outbox, as far as the channel takes it at once."""
+        peer = self._connection.peer
+        while not peer.has_waiting(self._channel):
             text = self.outbox.take()
             if text is None:
                 return
             try:
-                self._channel.send(text)
-            except ValueError:
+                self._connection.send(self._channel, text)
+            except MessageTooLarge:
                 self.too_large += 1
+            except ENDED:
+                return  # the peer's end follows
+        if not self.outbox.empty:
+            peer.tell_when_empty(self._channel)

@@ -46,7 +46,7 @@ from server.fleet.simulated import own_event_log, own_state_dir, simulated_robot
 from server.heap import share_arenas
 from server.link_access import link_access
 from server.logs import LogFormat, configure_logs
-from server.media_addresses import NoSuchAddress, check_media_addresses
+from server.media_addresses import MediaAddressUnusable, check_media_addresses
 from server.run_console import ConsoleFailed, run_console, say
 from server.serve import PortTaken, bind
 from server.settings import Settings
@@ -83,6 +83,18 @@ IceHosts = Annotated[
 Advertise = Annotated[
     list[str] | None,
     typer.Option(help="Outer address of this machine behind a one-to-one NAT, as in a cloud; may be given again."),
+]
+MediaPort = Annotated[
+    int | None,
+    typer.Option(
+        min=0, max=65535, help="UDP port for pictures, sound and commands of everybody; 0: any free one, as unless set."
+    ),
+]
+MediaTcp = Annotated[
+    bool | None,
+    typer.Option(
+        "--media-tcp/--no-media-tcp", help="Let browsers come to that port by TCP too, where a network lets no UDP out."
+    ),
 ]
 Quality = Annotated[
     Switch | None, typer.Option(help="Whether bitrate, rate and size of pictures follow the network; on unless set.")
@@ -121,6 +133,8 @@ def up(
     port: Port = None,
     ice_host: IceHosts = None,
     advertise: Advertise = None,
+    media_port: MediaPort = None,
+    media_tcp: MediaTcp = None,
     camera: Cameras = None,
     microphone: Microphones = None,
     whip: Whip = None,
@@ -151,6 +165,8 @@ def up(
         port=port,
         ice_hosts=ice_host,
         advertise=advertise,
+        media_port=media_port,
+        media_tcp=media_tcp,
         media=_media(quality),
         cameras=_words(camera),
         microphones=_words(microphone),
@@ -212,6 +228,8 @@ def serve(
     port: Port = None,
     ice_host: IceHosts = None,
     advertise: Advertise = None,
+    media_port: MediaPort = None,
+    media_tcp: MediaTcp = None,
     camera: Cameras = None,
     microphone: Microphones = None,
     whip: Whip = None,
@@ -248,6 +266,8 @@ def serve(
         port=port,
         ice_hosts=ice_host,
         advertise=advertise,
+        media_port=media_port,
+        media_tcp=media_tcp,
         media=_media(quality),
         cameras=_words(camera),
         microphones=_words(microphone),
@@ -318,7 +338,7 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     raise_file_limit()
     try:
         _check_files(settings)
-        check_media_addresses(settings.ice_hosts)
+        check_media_addresses(settings)
         check_board(settings, settings.public_url)
         if settings.is_fleet:
             robot_settings(settings)
@@ -330,7 +350,7 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     except PortTaken as error:
         say(f"{error}; choose another with --port")
         raise typer.Exit(EXIT_PORT_TAKEN) from error
-    except (StateDirUnusable, BadFleet, BoardUnusable, NoSuchAddress) as error:
+    except (StateDirUnusable, BadFleet, BoardUnusable, MediaAddressUnusable) as error:
         raise _usage(str(error)) from error
     except ssl.SSLError as error:
         raise _usage(f"tls_cert and tls_key are no certificate chain and its key: {error}") from error

@@ -93,9 +93,9 @@ Whip = Annotated[
 Relay = Annotated[
     list[str] | None,
     typer.Option(
-        help="Observers beyond --observers-direct watch through it: janus:ws://host:8188/ROOM, or "
-        "livekit:wss://host?room=NAME; may be given again, then the first feeds the others. docs/relay.md",
-        metavar="janus:URL|livekit:URL",
+        help="Observers beyond --observers-direct watch through it: janus:ws://host:8188/ROOM; "
+        "may be given again, then the first feeds the others. docs/relay.md",
+        metavar="janus:URL",
     ),
 ]
 ObserversDirect = Annotated[

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import Any
 
 import structlog
-from aiortc import InvalidStateError
 from prometheus_client import Counter
 
 from server.rate_limits import RateLimits
@@ -35,8 +34,6 @@ class Faults:
     def uncaught(self, loop: object, context: dict[str, Any]) -> None:
         """For `loop.set_exception_handler`: what nobody awaited, and what a callback of the loop raised."""
         error = context.get("exception")
-        if isinstance(error, InvalidStateError) and "future" in context:
-            return  # aiortc goes on connecting a peer that has ended, in a task that nobody can await; it is no fault
         if not isinstance(error, BaseException):
             error = RuntimeError(str(context.get("message", "")))
         self.caught("loop", error, what=str(context.get("message", "")))

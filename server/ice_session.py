@@ -2,55 +2,23 @@
 
 import secrets
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
 
 from rtc.endpoint import Connection
-from rtc.ice.candidates import CandidateError, parse_candidate
-from rtc.sdp import Fragment as RtcFragment
-from rtc.sdp import FragmentCandidate as RtcCandidate
-from server.errors import BadSdpFragment
-from server.offer import Fragment, FragmentCandidate
+from rtc.peer import PeerNotReady
+from rtc.sdp import Fragment, FragmentCandidate
+from server.errors import BadSdpFragment, NotConnected
+from server.offer import MAX_CANDIDATES
 
-__all__ = ["IceSession", "LocalSession", "PatchedSession"]
-
-MAX_CANDIDATES = 100  # of the peer, in one session
-
-
-class LocalSession(NamedTuple):
-    """Our side of a session that a restart has begun."""
-
-    username: str
-    password: str
-    candidates: list[str]  # "candidate:…"
-
-
-class PatchedSession(Protocol):
-    """What a PATCH of WHEP and WHIP is about."""
-
-    @property
-    def tag(self) -> str:
-        """Entity tag of the newest ICE session (RFC 9725 4.3.1); a restart changes it."""
-
-    @property
-    def username(self) -> str:
-        """The peer's, of the newest session."""
-
-    @property
-    def connected(self) -> bool: ...
-
-    @property
-    def section(self) -> tuple[str, str]:
-        """Kind and mid of the section that candidates are for."""
-
-    async def add(self, candidates: Sequence[FragmentCandidate]) -> None:
-        """Raises BadSdpFragment: one cannot be used, or they are too many."""
-
-    async def restart(self, fragment: Fragment) -> LocalSession:
-        """Raises BadSdpFragment; ConnectionError when the session has ended."""
+__all__ = ["IceSession"]
 
 
 class IceSession:
-    """As `PatchedSession`."""
+    """What a PATCH of WHEP and WHIP is about.
+
+    Attributes:
+        tag: entity tag of the newest ICE session (RFC 9725 4.3.1); a restart changes it
+        username: the peer's, of the newest session
+    """
 
     def __init__(self, connection: Connection, username: str) -> None:
         """`username`: the offer's."""
@@ -61,35 +29,35 @@ class IceSession:
 
     @property
     def connected(self) -> bool:
+        """Whether it is, or was until consent expired while a restart looks for another path."""
+        return self._connection.peer.is_up
+
+    @property
+    def has_path(self) -> bool:
         return self._connection.peer.ice.path is not None
 
     @property
     def section(self) -> tuple[str, str]:
+        """Kind and mid of the section that candidates are for."""
         tagged = self._connection.peer.tagged
         return tagged.kind, tagged.mid
 
-    async def add(self, candidates: Sequence[FragmentCandidate]) -> None:
-        lines = [_usable(each) for each in candidates]
-        self._candidates += len(lines)
-        if self._candidates > MAX_CANDIDATES:
+    def add(self, candidates: Sequence[FragmentCandidate]) -> None:
+        """Raises BadSdpFragment: they are too many."""
+        if self._candidates + len(candidates) > MAX_CANDIDATES:
             raise BadSdpFragment("too many candidates for one session")
-        for line in lines:
-            self._connection.add_candidate(line)
+        self._candidates += len(candidates)
+        for each in candidates:
+            self._connection.add_candidate(each.line)
 
-    async def restart(self, fragment: Fragment) -> LocalSession:
-        theirs = tuple(RtcCandidate(each.mid, _usable(each)) for each in fragment.candidates)
-        ours = self._connection.answer_restart(RtcFragment(fragment.username, fragment.password, theirs))
-        self.tag, self.username, self._candidates = _new_tag(), fragment.username, len(theirs)
-        return LocalSession(ours.ufrag, ours.password, [each.line for each in ours.candidates])
-
-
-def _usable(each: FragmentCandidate) -> str:
-    try:
-        if parse_candidate(each.line).is_ip_address:
-            return each.line
-    except CandidateError:
-        pass
-    raise BadSdpFragment("a candidate that is not valid")
+    def restart(self, fragment: Fragment) -> Fragment:
+        """Our side of the session that the peer begins with `fragment`. Raises NotConnected."""
+        try:
+            ours = self._connection.answer_restart(fragment)
+        except PeerNotReady as error:
+            raise NotConnected("the ICE session has ended") from error
+        self.tag, self.username, self._candidates = _new_tag(), fragment.ufrag, len(fragment.candidates)
+        return ours
 
 
 def _new_tag() -> str:

@@ -35,7 +35,6 @@ def configure_logs(level: int = logging.INFO, form: LogFormat = LogFormat.TEXT) 
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_formatter(form, rendered))
     logging.basicConfig(handlers=[handler], level=logging.WARNING)
-    logging.getLogger("aioice").setLevel(logging.ERROR)
 
 
 def _text_lines() -> list[Processor]:

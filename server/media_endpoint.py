@@ -9,8 +9,10 @@ import structlog
 
 from rtc.endpoint import Connection, Endpoint, Listener, Turns
 from rtc.ice.gathering import Advertised
+from rtc.peer import PeerSettings
 from rtc.turn import servers as turn
 from server.ice_servers import IceServer
+from server.loop_turns import turns_of_loop
 from server.media_addresses import MediaHostSettings, media_hosts
 
 __all__ = ["MediaEndpoint"]
@@ -26,11 +28,12 @@ class EndpointSettings(MediaHostSettings, Protocol):
 
 
 class MediaEndpoint:
-    """Opens with the first peer. Whoever has it calls `close`."""
+    """Opens with the first peer, unless it is opened before. Whoever has it calls `close`."""
 
     def __init__(self, settings: EndpointSettings) -> None:
         self._settings = settings
         self._endpoint: Endpoint | None = None
+        self._turns = turns_of_loop()  # work for observers ends as soon as something has come
         self._asking = asyncio.Lock()  # what servers have told one negotiation is not given back by the next
 
     @property
@@ -38,38 +41,60 @@ class MediaEndpoint:
         """What came and was not used, by reason, since the start."""
         return Counter() if self._endpoint is None else self._endpoint.dropped
 
+    @property
+    def connections(self) -> int:
+        """Those that have not ended."""
+        return 0 if self._endpoint is None else self._endpoint.connections
+
     async def connect(
-        self, listener: Listener, *, turns: Turns | None = None, servers: Sequence[IceServer] = ()
+        self,
+        listener: Listener | None = None,
+        *,
+        turns: Turns | None = None,
+        servers: Sequence[IceServer] = (),
+        settings: PeerSettings | None = None,
+        controlling: bool = False,
     ) -> Connection:
-        """A connection that answers an offer, at the addresses that this machine has now.
+        """A connection at the addresses that this machine has now.
 
         Args:
-            listener: as of `Endpoint.connect`; `turns` too
+            listener: as of `Endpoint.connect`; `turns`, `settings` and `controlling` too
             servers: STUN and TURN servers that are asked for addresses of the console's own
 
         Raises:
             TooManyPeers: the endpoint has as many as it may.
         """
-        endpoint = self._open()
+        endpoint = self.open()
         async with self._asking:
             if servers:
                 asked = [turn.IceServer(x.urls, x.username or None, x.credential or None) for x in servers]
                 for refusal in await endpoint.ask(asked):
                     log.warning("a TURN server gave no address", detail=str(refusal))
-            return endpoint.connect(controlling=False, listener=listener, turns=turns)
+            return endpoint.connect(controlling=controlling, settings=settings, listener=listener, turns=turns)
 
     def close(self) -> None:
         """With all connections. Idempotent."""
         if self._endpoint is not None:
             self._endpoint.close()
 
-    def _open(self) -> Endpoint:
-        hosts = media_hosts(self._settings)
+    def open(self) -> Endpoint:
+        """Bind the sockets of the addresses that this machine has now, as far as they are not bound yet.
+
+        Raises:
+            OSError: the port that was set cannot be bound.
+        """
+        settings = self._settings
+        hosts = media_hosts(settings)
         if self._endpoint is None:
-            advertised = [Advertised(each) for each in self._settings.advertise]
+            advertised = [Advertised(each) for each in settings.advertise]
             try:
-                self._endpoint = Endpoint(hosts, advertised=advertised)
-            except OSError:  # an address that has just come may not be ready yet: without it
-                self._endpoint = Endpoint([], advertised=advertised)
+                self._endpoint = Endpoint(hosts, settings.media_port, tcp=settings.media_tcp, advertised=advertised)
+            except OSError:
+                if settings.media_port:
+                    raise
+                # An address that has just come may not be ready yet: without it.
+                self._endpoint = Endpoint([], tcp=settings.media_tcp, advertised=advertised)
         self._endpoint.use_hosts(hosts)
+        for each in self._endpoint.sockets:
+            self._turns.yield_to(each)
         return self._endpoint

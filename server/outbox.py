@@ -19,6 +19,10 @@ class ChannelOutbox:
         self.dropped = 0
         self.superseded = 0
 
+    @property
+    def empty(self) -> bool:
+        return not self._waiting and self._newest is None
+
     def put(self, text: str) -> None:
         if len(self._waiting) == self._max_waiting:
             self._waiting.popleft()

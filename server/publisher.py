@@ -150,6 +150,8 @@ class Publisher:
         elif isinstance(event, Connected):
             self._connected.set()
         elif isinstance(event, PeerEnded):
+            if self._connection is not None and self._connection.fault is not None:
+                raise self._connection.fault
             self.end(ENDS.get(event.reason, "connection closed"))
 
     def _packet(self, packet: RtpPacket) -> None:

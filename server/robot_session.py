@@ -23,7 +23,7 @@ from server.recording.settings import recordings_directory
 from server.recording.shelf import Shelf
 from server.recording.signature import RecordingSigning
 from server.relay.desk import RelayDesk, RelayedMedia
-from server.relay.engines import relay_engines
+from server.relay.janus_engine import JanusEngine
 from server.scene import SceneView
 from server.services import Services
 from server.settings import Settings
@@ -116,8 +116,8 @@ async def _session(
         signing,
         lambda what, detail: console.audit.record("recording", what=what, detail=detail),
     )
-    engines = relay_engines(settings, media, house.state.signing_key(settings) + robot)
-    relays = RelayDesk(settings, engines, lambda: console.peers, house.state.invitations.has_ended)
+    engine = JanusEngine(settings, house.endpoint, media, house.state.signing_key(settings) + robot)
+    relays = RelayDesk(settings, engine, lambda: console.peers, house.state.invitations.has_ended)
     console = Console(
         settings,
         metrics,

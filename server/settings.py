@@ -42,6 +42,8 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     link_tls_ca: Path | None = None  # signed the bridge's certificate; None: one that this machine trusts
     ice_hosts: NameList = ()  # of this machine, for media; empty: all interfaces, and loopback when bound to it
     advertise: NameList = ()  # outer addresses of this machine, where it is behind a one-to-one NAT
+    media_port: Annotated[int, Field(ge=0, le=65535)] = 0  # UDP, for the media of all peers; 0: any free port
+    media_tcp: bool = False  # peers may come to the same port by TCP too (RFC 6544)
     allowed_origins: NameList = ()  # other origins whose pages may use the HTTP API, "https://example.org"
     log_format: LogFormat = LogFormat.TEXT
     state_dir: Path | None = None  # signing key, invitations, audit log; None: ~/.local/state/lockstep

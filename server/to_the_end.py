@@ -12,10 +12,7 @@ Result = TypeVar("Result")
 
 
 async def to_the_end(coroutine: Coroutine[Any, Any, object]) -> None:
-    """Await it. Whoever is cancelled meanwhile, as by a timeout, is cancelled when it has ended.
-
-    aioice that is cancelled while it gathers forgets the sockets that it has opened until then.
-    """
+    """Await it. A caller that is cancelled meanwhile, as by a timeout, is cancelled when it has ended."""
     task = asyncio.ensure_future(coroutine)
     try:
         await asyncio.shield(task)

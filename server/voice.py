@@ -10,8 +10,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge
 from robot_bridge.protocol.console import Role, Voice
 from server.media.speaker.speaker import Speaker
 from server.media.speaker.speaker_url import SpeakerSpec
-from server.media.voice_private import VoicePacket
-from server.voice_desk import SPEAKS_FOR, VoiceDesk
+from server.voice_desk import SPEAKS_FOR, VoiceDesk, VoicePacket
 
 if TYPE_CHECKING:
     from server.peer import Peer

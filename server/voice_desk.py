@@ -10,19 +10,25 @@
 """
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from robot_bridge.protocol.console import Voice
-from server.media.voice_private import VoicePacket
 from server.token_bucket import TokenBucket
 
-__all__ = ["SPEAKS_FOR", "VoiceDesk", "VoiceOutcome"]
+__all__ = ["SPEAKS_FOR", "VoiceDesk", "VoiceOutcome", "VoicePacket"]
 
 MAX_PACKET = 1275  # bytes, RFC 6716 3.4: the most of one frame
 RATE, BURST = 110.0, 20.0  # packets a second; the shortest are 10 ms
 SPEAKS_FOR = 0.4  # s after the last packet
 
 VoiceOutcome = Literal["played", "no_seat", "too_large", "late", "too_often"]
+
+
+class VoicePacket(NamedTuple):
+    """One Opus packet."""
+
+    sequence_number: int  # 16 bits
+    payload: bytes
 
 
 class VoiceDesk:

@@ -1,42 +1,70 @@
 """A peer on WebRTC: its connection and its data channels."""
 
 import secrets
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
-from aiortc import RTCDataChannel, RTCPeerConnection
-
+from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened, ChannelWritable
+from rtc.dcep import Reliability
+from rtc.endpoint import Connection
+from rtc.peer_events import Answered, Connected, MediaEvent, PacketReceived, PeerEnded, PeerEvent
+from rtc.rtp.stage import StreamEvent
+from rtc.sctp import Closed
 from server.access import Identity
 from server.agreed_channels import AgreedChannel
 from server.channel_writer import ChannelWriter
-from server.channels import MessageBudget, channel_name
+from server.channels import ChannelName, MessageBudget, channel_name
 from server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
-from server.ice_restart_private import IceSession
-from server.media.aiortc_private import close_or_force
+from server.ice_session import IceSession
 from server.peer import Peer, PeerHost, PeerLimits, PeerStreams
+from server.voice_desk import VoicePacket
 
 __all__ = ["WebRtcPeer"]
 
 MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
+# Why a connection ends; all other reasons of `PeerEnded` are "connection closed".
+ENDS = {
+    "consent_expired": "consent expired",
+    "no_path": "connection failed",
+    "dtls_protocol": "connection failed",
+    "dtls_fingerprint": "connection failed",
+    "dtls_timeout": "connection failed",
+    "dtls_too_much_handshake": "connection failed",
+}
+# Ends of an association that are nobody's fault.
+ORDINARY = ("closed", "aborted", "peer_closed", "peer_aborted")
+
+
+class PeerMediaStreams(PeerStreams, Protocol):
+    """The media that it gets, as far as its connection has something to tell."""
+
+    def connected(self) -> None: ...
+    def heard(self, mid: str, event: StreamEvent) -> None: ...
 
 
 class WebRtcPeer(Peer):
+    """Give it every event of its connection: `connection.listen(peer.heard)`."""
+
     def __init__(
         self,
-        pc: RTCPeerConnection,
-        media: PeerStreams,
+        connection: Connection,
+        media: PeerMediaStreams,
         ice: IceSession,
         identity: Identity,
         host: PeerHost,
         limits: PeerLimits,
+        *,
+        take_voice: Callable[[VoicePacket], None] | None = None,
     ) -> None:
         super().__init__(media, identity, host, limits)
         self.resource = secrets.token_urlsafe(16)  # secret: the path of the WHEP resource
-        self.pc = pc
         self.ice = ice
-        ice.on_expired = lambda: self.end("consent expired")
+        self._connection = connection
+        self._streams = media
+        self._take_voice = take_voice
         self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
-        pc.on("datachannel", self._channel_offered)
-        pc.on("connectionstatechange", self._connection_changed)
+        self._names: dict[int, ChannelName] = {}  # of data channels, by number
+        self._channel_writers: dict[int, ChannelWriter] = {}
 
     def take_request(self) -> None:
         """Count a PATCH. Raises TooManyRequests."""
@@ -47,42 +75,75 @@ class WebRtcPeer(Peer):
 
     def agree_on(self, channels: Sequence[AgreedChannel]) -> None:
         """Data channels that open with the association, without a message that says so."""
-        for each in channels if self.pc.sctp is not None else ():
-            channel = self.pc.createDataChannel(
-                each.name, ordered=each.ordered, maxRetransmits=each.max_retransmits, negotiated=True, id=each.id
-            )
-            channel.once("open", lambda channel=channel: self._channel_offered(channel))
+        for each in channels:
+            reliability = Reliability(ordered=each.ordered, max_retransmits=each.max_retransmits)
+            self._connection.peer.open_negotiated_channel(each.id, each.name, reliability=reliability)
 
-    async def _close_transport(self) -> None:
-        try:
-            with self.contained("close"):
-                await self.ice.close()
-        finally:  # also where that took longer than an end may
-            await close_or_force(self.pc)
+    def heard(self, event: PeerEvent) -> None:
+        """An event of its connection."""
+        if isinstance(event, PeerEnded):
+            if self._connection.fault is not None:
+                self.failed("connection", self._connection.fault)
+            self.end(ENDS.get(event.reason, "connection closed"))
+        elif not self.ended:
+            self._hear(event)
 
-    # aiortc's events
-
-    def _connection_changed(self) -> None:
-        state = self.pc.connectionState
-        if state == "connected":
+    def _hear(self, event: PeerEvent) -> None:
+        if isinstance(event, ChannelMessage):
+            if (name := self._names.get(event.channel)) is not None:
+                self._received(name, event.data)
+        elif isinstance(event, MediaEvent):
+            with self.contained("rtcp"):
+                self._streams.heard(event.mid, event.event)
+        elif isinstance(event, PacketReceived):
+            self._voice(event)
+        elif isinstance(event, ChannelWritable):
+            with self.contained("message out"):
+                self._channel_writers[event.channel].flush()
+        elif isinstance(event, Connected):
+            with self.contained("answer"):
+                self._streams.connected()
             self._connection_made()
-        elif state in ("failed", "closed"):
-            self.end(f"connection {state}")
+        elif isinstance(event, Answered):
+            self._connection.peer.note_round_trip(event.seconds)
+        else:
+            self._hear_of_channels(event)
 
-    def _channel_offered(self, channel: RTCDataChannel) -> None:
-        with self.contained("channel"):
-            self._open_channel(channel)
+    def _hear_of_channels(self, event: PeerEvent) -> None:
+        if isinstance(event, ChannelOpened):
+            with self.contained("channel"):
+                self._open_channel(event)
+        elif isinstance(event, ChannelClosed) and event.channel in self._names:
+            self._channel_closed()
+        elif isinstance(event, Closed) and event.reason not in ORDINARY:  # before a channel was opened
+            self.transport_refused(event.reason)
 
-    def _open_channel(self, channel: RTCDataChannel) -> None:
+    def _channel_closed(self) -> None:
+        """By the peer; or with the association, for a reason."""
+        channels = self._connection.peer.channels
+        closed = None if channels is None else channels.closed
+        if closed is None or closed.reason in ORDINARY:
+            self.end("channel closed")
+        else:
+            self.transport_refused(closed.reason)
+
+    def _voice(self, event: PacketReceived) -> None:
+        packet = event.packet
+        if self._take_voice is not None and event.mid == self.voice and packet.payload:
+            self._take_voice(VoicePacket(packet.sequence_number, packet.payload))
+
+    def _open_channel(self, opened: ChannelOpened) -> None:
         try:
-            name = channel_name(channel.label)
+            name = channel_name(opened.label)
             if name in self._writers:
                 raise DuplicateChannel(name)
         except ChannelError as error:
             self._refused("other", error)
-            channel.close()
+            self._connection.close_channel(opened.channel)
             return
-        writer = ChannelWriter(channel, lambda error: self.failed("message out", error))
-        channel.on("message", lambda data: self._received(name, data))
-        channel.on("close", lambda: self.end("channel closed"))
+        self._names[opened.channel] = name
+        writer = self._channel_writers[opened.channel] = ChannelWriter(self._connection, opened.channel)
         self._open(name, writer)
+
+    async def _close_transport(self) -> None:
+        self._connection.close()

@@ -14,7 +14,6 @@ from rtc.sdp import (
     MediaSection,
     SdpError,
     SessionDescription,
-    parse_description,
     write_description,
 )
 from rtc.sdp.codecs import common_codecs, is_same_format
@@ -34,7 +33,7 @@ from server.errors import (
 from server.ice_servers import link_headers
 from server.media.published.depacketise import PictureCodec
 from server.media.published.published_camera import PublishedCamera
-from server.offer import MAX_SECTIONS, prepare_offer
+from server.offer import parse_offer
 from server.publisher import Publisher
 from server.services import Services, authorized, services
 from server.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, patched
@@ -76,7 +75,7 @@ async def create(
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(caller.token_id)  # before it costs anything
     text = await read_text(request, SDP, here.settings.max_sdp_bytes)
-    offer = _parsed(prepare_offer(text, MAX_SECTIONS))
+    offer = _parsed(text)
     section = _pictures(offer)
     ice = servers_for(here.settings, caller.identity)
     with here.publishers.place(caller.identity, camera) as wanted:
@@ -136,10 +135,7 @@ async def delete(resource: str, request: Request, caller: Annotated[Right, Depen
 
 
 def _parsed(text: str) -> SessionDescription:
-    try:
-        offer = parse_description(text)
-    except SdpError as error:
-        raise BadSdp(str(error)) from error
+    offer = parse_offer(text)
     if any(section.sctp_port is not None for section in offer.sections):
         raise BadSdp("a publisher has no data channels")
     return offer

@@ -13,10 +13,10 @@ from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessi
 from aiortc.rtp import RtcpReceiverInfo, RtcpRrPacket, RtpPacket
 from aiortc.sdp import SessionDescription
 
+from bench.aioice_hosts import use_hosts
 from bench.hostile.target import Target
 from robot_bridge.protocol.console import decode_server_message, encode_console_message
 from robot_bridge.protocol.messages import Command, Feedback, Ping, Reset, Rest
-from server.media.aiortc_private import restrict_ice_hosts
 
 __all__ = [
     "forged_commands",
@@ -87,7 +87,7 @@ class Peer:
 
 
 async def offer_of(pc: RTCPeerConnection) -> str:
-    restrict_ice_hosts(["127.0.0.1"])
+    use_hosts(["127.0.0.1"])
     await pc.setLocalDescription(await pc.createOffer())
     return pc.localDescription.sdp
 

@@ -6,29 +6,34 @@ only: two packets each, keyframes of six, at 30 Hz, as of 640x480 at about 500 k
 
 import heapq
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import count
 
 from bench.quality.freezes import freezes
 from client.frame_assembler import MediaPacket, VideoAssembler
-from rtc.rtp.feedback import Nack
+from rtc.rtp.feedback import Nack, PictureLoss
+from rtc.rtp.history import RepairStream
 from rtc.rtp.losses import Losses
+from rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
 from rtc.rtp.packet import RtpPacket
 from rtc.rtp.repairs import Repairs
-from rtc.rtp.stage import RoundTrip, Sink
-from server.media.frame import EncodedFrame
-from server.media.header_extensions import ExtensionWriter
+from rtc.rtp.stage import KeyframeRequested, RoundTrip, Sink
 from server.media.keyframes import KeyframeScheduler
-from server.media.packet_stream import PacketStream, StreamParameters
 
 __all__ = ["Repaired", "simulate"]
 
 FRAME_RATE = 30
 PACKETS, KEYFRAME_PACKETS = 2, 6
 MEDIA, AGAIN = 97, 98  # payload types
-PARAMETERS = StreamParameters(
-    ssrc=1, rtx_ssrc=2, payload_type=MEDIA, rtx_payload_type=AGAIN, clock_rate=90_000, cname="", trailer=False
+PARAMETERS = OutgoingParameters(
+    ssrc=1,
+    payload_type=MEDIA,
+    clock_rate=90_000,
+    cname="",
+    first_sequence_number=0,
+    timestamp_offset=0,
+    repair=RepairStream(2, AGAIN, 0),
 )
 
 
@@ -75,8 +80,7 @@ class _Simulation:
         self._retransmit = retransmit
         self._agenda: list[tuple[float, int, Callable[[float], None]]] = []
         self._order = count()
-        self._server = PacketStream(PARAMETERS, ExtensionWriter({}, ""))
-        self._server.stats.round_trip_ms = round_trip * 1000
+        self._server = OutgoingStream(PARAMETERS, PathShare(0.0, RoundTrip(round_trip, measured=True)), paced=False)
         self._keyframes = KeyframeScheduler(10.0, 0.3)
         self._client = VideoAssembler(lambda data: data[:1] == b"K")
         self._client.round_trip = round_trip
@@ -91,8 +95,8 @@ class _Simulation:
         while self._agenda:
             now, _, action = heapq.heappop(self._agenda)
             action(now)
-        self._found.packets = self._server.stats.packets
-        self._found.repeated = self._server.stats.retransmitted
+        self._found.packets = self._server.reports.packets
+        self._found.repeated = 0 if self._server.history is None else self._server.history.retransmitted
         return self._found
 
     def _at(self, when: float, action: Callable[[float], None]) -> None:
@@ -113,32 +117,39 @@ class _Simulation:
         keyframe = self._keyframes.take(now)
         size = KEYFRAME_PACKETS if keyframe else PACKETS
         kind = b"K" if keyframe else b"D"
-        frame = EncodedFrame(
-            b"",
-            lambda data, trailer: [kind] * size,
-            keyframe=keyframe,
-            marker=True,
-            stamp=1,
-            capture_time=now,
-            media_time=round(now * 90_000),
-        )
         self._found.pictures += 1
         self._found.keyframes += keyframe
-        for packet in self._server.packets(frame, now):
+        self._server.send([kind] * size, round(now * 90_000), now)
+        self._serve(now)
+
+    def _serve(self, now: float) -> None:
+        """What the console's core has to send and to tell."""
+        for packet in self._server.packets_to_send():
             self._send(packet, now)
+        self._server.controls_to_send()
+        for event in self._server.events():
+            if isinstance(event, KeyframeRequested):
+                self._keyframes.request()
 
     def _send(self, packet: bytes, now: float) -> None:
         self._pass("down", now, lambda then: self._arrived(packet, then))
 
-    def _nacked(self, missing: Sequence[int], now: float) -> None:
-        for sequence in missing if self._retransmit else ():
-            packet = self._server.retransmission(sequence, now)
-            if packet is not None:
-                self._send(packet, now)
+    def _nacked(self, nack: Nack, now: float) -> None:
+        if self._retransmit:
+            self._server.rtcp(nack, now)
+            self._serve(now)
 
     def _asked_for_keyframe(self, now: float) -> None:
         self._found.keyframe_requests += 1
-        self._at(now + self._server.repair_time(now), lambda then: self._keyframes.request())
+        self._server.rtcp(PictureLoss(0, PARAMETERS.ssrc), now)
+        self._serve(now)
+        due = self._server.requests.due()
+        if due is not None:
+            self._at(due, self._request_is_due)
+
+    def _request_is_due(self, now: float) -> None:
+        self._server.handle_timer(now)
+        self._serve(now)
 
     # at the client
 
@@ -167,4 +178,4 @@ class _Simulation:
         self._look_again()
 
     def _nacking(self, nack: Nack) -> Callable[[float], None]:
-        return lambda then: self._nacked(nack.lost, then)
+        return lambda then: self._nacked(nack, then)

@@ -21,6 +21,7 @@ from robot_bridge.protocol.description import Camera, RobotDescription
 from robot_bridge.protocol.messages import Media
 from rtc.addresses import Path as NetworkPath
 from rtc.demux import DatagramKind, datagram_kind
+from rtc.endpoint import Connection, Endpoint
 from server.media.plane import MediaPlane, MediaSettings
 from server.relay.janus_publishing import publish
 from server.relay.janus_room import JanusRoom, RoomKeys
@@ -70,6 +71,16 @@ async def subscribe(ticket: RelayTicket, counts: list[int]) -> RelayMedia:
     return media
 
 
+class _Connect:
+    """What publishing needs of the console's endpoint."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self._endpoint = endpoint
+
+    async def connect(self, *, controlling: bool) -> Connection:
+        return self._endpoint.connect(controlling=controlling)
+
+
 async def measure(host: str, pid: int) -> list[tuple[int, float]]:
     """Packets and seconds of processor time, for each number of subscribers."""
     camera = Camera(name="noise", label="Noise", width=WIDTH, height=HEIGHT, frame_rate=RATE)
@@ -78,8 +89,11 @@ async def measure(host: str, pid: int) -> list[tuple[int, float]]:
     url, counts, found = f"ws://{host}:{PORT}", [0], []
     watchers: list[RelayMedia] = []
     async with (
+        Endpoint([host]) as endpoint,
         open_janus(url) as session,
-        publish(session, lambda each: JanusRoom(each, ROOM, KEYS), plane, FEED, "VP8") as publication,
+        publish(
+            session, lambda each: JanusRoom(each, ROOM, KEYS), _Connect(endpoint), plane, FEED, "VP8"
+        ) as publication,
     ):
         feeding = [asyncio.create_task(feed(plane, camera.name)), asyncio.create_task(_talk(publication))]
         ticket = RelayTicket(

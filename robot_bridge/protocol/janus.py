@@ -90,7 +90,7 @@ def _number(value: object) -> int:
 
 def complete_description(sdp: str) -> str:
     """What Janus 1.1 leaves out: the largest data channel message (RFC 8841 6.1), and H.264's format when the feed
-    came from another Janus. aiortc starts no data channel without the one, and takes no H.264 without the other."""
+    came from another Janus. Without a format, H.264 means packetization-mode 0, which nobody sends (RFC 6184 8.1)."""
     lines: list[str] = []
     for line in sdp.splitlines():
         lines.append(line)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rtc.rtp.packet import RtpPacket
-from rtc.rtp.stage import Stage
+from rtc.rtp.stage import PacketsLeft, Stage
 
 __all__ = ["Pacer", "PacerSettings", "TokenBucket"]
 
@@ -59,6 +59,11 @@ class Pacer(Stage):
         self._packets: deque[RtpPacket] = deque()
         self._due: float | None = None
 
+    @property
+    def holds(self) -> bool:
+        """Whether packets wait here; `PacketsLeft` follows."""
+        return self._due is not None
+
     def rtp(self, packet: RtpPacket, now: float) -> None:
         if len(self._repairs) + len(self._packets) >= self._bucket.settings.waiting:
             self.dropped += 1
@@ -72,6 +77,8 @@ class Pacer(Stage):
     def handle_timer(self, now: float) -> None:
         if self._due is not None and now >= self._due:
             self._let_out(now)
+            if not self.holds:
+                self.event(PacketsLeft())
         super().handle_timer(now)
 
     def _let_out(self, now: float) -> None:

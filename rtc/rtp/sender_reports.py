@@ -40,6 +40,7 @@ class SenderReports(Stage):
         self._epoch = epoch
         self._round_trip = round_trip
         self._settings = settings or SenderReportSettings()
+        self.interval = self._settings.interval  # s
         self._last: tuple[int, float] | None = None  # RTP timestamp, and when its sample was captured
         self._due: float | None = None
         self._sent: dict[int, float] = {}  # middle of a report's NTP time, to when it was sent; the oldest first
@@ -70,7 +71,7 @@ class SenderReports(Stage):
     def _report(self, now: float) -> None:
         if self._last is None:
             return
-        self._due = now + self._settings.interval
+        self._due = now + self.interval
         timestamp, captured_at = self._last
         ntp_time = round((now + self._epoch + NTP_EPOCH) * 2**32) & (1 << 64) - 1
         at = (timestamp + round((now - captured_at) * self._clock_rate)) & 0xFFFFFFFF

@@ -20,6 +20,7 @@ __all__ = [
     "BandwidthEstimate",
     "KeyframeRequested",
     "PacketsGone",
+    "PacketsLeft",
     "Reception",
     "RoundTrip",
     "Sink",
@@ -72,13 +73,18 @@ class PacketsGone:
 
 
 @dataclass(frozen=True, slots=True)
+class PacketsLeft:
+    """The last packet that the pacer held back has left."""
+
+
+@dataclass(frozen=True, slots=True)
 class StreamEnded:
     """The peer said goodbye."""
 
     ssrc: int
 
 
-StreamEvent = KeyframeRequested | Reception | BandwidthEstimate | Arrivals | PacketsGone | StreamEnded
+StreamEvent = KeyframeRequested | Reception | BandwidthEstimate | Arrivals | PacketsGone | PacketsLeft | StreamEnded
 
 
 @dataclass(slots=True)

@@ -110,7 +110,10 @@ class Streams:
 
     def rtcp_to_send(self) -> list[bytes]:
         """Compound packets, before encryption."""
-        controls = [packet for stream in self._all() for packet in stream.controls_to_send()]
+        return self.compounds([packet for stream in self._all() for packet in stream.controls_to_send()])
+
+    def compounds(self, controls: Sequence[RtcpPacket]) -> list[bytes]:
+        """`controls` as compound packets, before encryption."""
         return list(_compounds(controls, self._identity)) if controls else []
 
     def packets(self) -> Iterator[tuple[str, RtpPacket]]:

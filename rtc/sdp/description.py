@@ -127,6 +127,7 @@ class MediaSection:
     reduced_size: bool = False  # RTCP packets that are not compound (RFC 5506)
     sctp_port: int | None = None  # of data channels (RFC 8841 5)
     max_message_size: int | None = None  # bytes; None: the 65536 of RFC 8841 6.1; 0: any
+    channel_maps: tuple[str, ...] = ()  # a=dcmap of data channels that need no opening message (RFC 8864 5.1)
 
     @property
     def is_media(self) -> bool:

@@ -23,6 +23,7 @@ from rtc.sdp.errors import SdpError
 
 __all__ = ["LocalMedia", "answer_to", "check_answer", "data_section", "media_section", "offer_of"]
 
+MAX_REASON = 500  # characters
 RESERVED_ID = 15  # of header extensions; ends the list in the one-byte form (RFC 8285 4.2), so it is never chosen
 
 
@@ -67,7 +68,7 @@ def answer_to(
         _answered(section, media.get(section.mid), chosen, data, max_message_size) for section in offer.sections
     ]
     if all(section.rejected for section in sections):
-        raise SdpError("nothing in common: no codec that we have, and no data channels")
+        raise SdpError("; ".join(f"section {each.mid}: no codec in common" for each in sections)[:MAX_REASON])
     return SessionDescription(
         transport=replace(transport, setup=_own_setup(offer.transport.setup, transport.setup)),
         sections=tuple(sections),

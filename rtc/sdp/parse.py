@@ -50,6 +50,7 @@ class SdpLimits:
     candidates: int = 100  # of one section; a host with many networks has some thirty
     sources: int = 64  # of one section; simulcast with retransmission has six
     fingerprints: int = 16  # of one section; one for each hash and certificate
+    channel_maps: int = 64  # of one section
 
 
 @dataclass(slots=True)
@@ -179,7 +180,10 @@ def _section(lines: _Lines, session: _Lines, place: int, limits: SdpLimits) -> M
         max_message_size=_number(lines.first("max-message-size"), "max-message-size", 1 << 53, name)
         if is_data
         else None,
+        channel_maps=tuple(lines.all("dcmap")) if is_data else (),
     )
+    if len(section.channel_maps) > limits.channel_maps:
+        raise SdpError(f"more than {limits.channel_maps} data channels", name)
     if is_data and section.sctp_port is None:
         raise SdpError("needs a=sctp-port (RFC 8841 5)", name)
     if is_media and not section.rtcp_mux:

@@ -49,6 +49,8 @@ def _section(section: MediaSection) -> Iterator[str]:
         yield f"a=sctp-port:{section.sctp_port}"
         if section.max_message_size is not None:
             yield f"a=max-message-size:{section.max_message_size}"
+        for channel in section.channel_maps:
+            yield f"a=dcmap:{channel}"
 
 
 def _media(section: MediaSection) -> Iterator[str]:

@@ -3,7 +3,6 @@
 What serving a target raises is that target's: it is told so, gets nothing more, and all others are served.
 """
 
-import asyncio
 from collections import deque
 from collections.abc import Iterable
 from typing import Protocol
@@ -12,9 +11,6 @@ from server.loop_turns import LoopTurns
 from server.media.frame import EncodedFrame
 
 __all__ = ["FanOut", "Target"]
-
-
-PACE_SECONDS = 0.004  # between two looks at the pacers
 
 
 class Target(Protocol):
@@ -26,10 +22,6 @@ class Target(Protocol):
 
     def put(self, frame: EncodedFrame) -> None:
         """Queue a frame; never blocks."""
-
-    @property
-    def paced(self) -> bool:
-        """Whether part of a frame waits for the pacer."""
 
     def send_next(self) -> bool:
         """Send one queued frame if there is one and the socket takes it; whether another can follow."""
@@ -46,8 +38,6 @@ class FanOut:
         self._waiting: dict[Target, None] = {}  # observers with frames, in the order they are served
         self._order: deque[Target] = deque()
         self._asked = False  # for a turn of the loop
-        self._paced: dict[Target, None] = {}  # that wait for their pacers
-        self._pace = asyncio.Event()
 
     def publish(self, frame: EncodedFrame, targets: Iterable[Target]) -> None:
         """Hand a frame to its targets. Returns when the operator's is sent and the others are queued."""
@@ -74,17 +64,17 @@ class FanOut:
         self.forget(target)
         target.failed(error)
 
-    def pace(self, target: Target) -> None:
-        """Serve a target again when its pacer may let something through."""
-        self._paced[target] = None
-        self._pace.set()
+    def serve_again(self, target: Target) -> None:
+        """What its pacer held back has left: the next frame may follow."""
+        if target.priority:
+            self._send_all(target)
+        else:
+            self._enqueue(target)
 
     def _send_all(self, target: Target) -> None:
         try:
             while target.send_next():
                 pass
-            if target.paced:
-                self.pace(target)
         except Exception as error:
             self._failed(target, error)
 
@@ -96,7 +86,6 @@ class FanOut:
 
     def forget(self, target: Target) -> None:
         """A target is gone. Idempotent."""
-        self._paced.pop(target, None)
         if target in self._waiting:
             del self._waiting[target]
             self._order = deque(each for each in self._order if each is not target)
@@ -113,21 +102,6 @@ class FanOut:
         finally:
             self._ask()
 
-    async def run_paced(self) -> None:
-        """Come back to those whose pacers held packets back, until cancelled; the operator first, observers queue."""
-        while True:
-            await self._pace.wait()
-            self._pace.clear()
-            while self._paced:
-                await asyncio.sleep(PACE_SECONDS)
-                waiting, self._paced = self._paced, {}
-                for target in waiting:
-                    if target.priority:
-                        self._send_all(target)
-                for target in waiting:
-                    if not target.priority:
-                        self._enqueue(target)
-
     def serve(self) -> None:
         """Serve observers in turn, one frame each, until the slice is over."""
         while self._order:
@@ -140,8 +114,6 @@ class FanOut:
             if target.send_next() and target in self._waiting:
                 self._order.append(target)
                 return
-            if target.paced:
-                self.pace(target)
         except Exception as error:
             self._failed(target, error)
         self._waiting.pop(target, None)

@@ -24,10 +24,9 @@ class MediaMetrics:
         self.tier_frames = counter("tier_frames_encoded", "The same, by what they are made for", "stream", "tier")
         self.dropped = counter("frames_dropped", "Frames that went no further than a stage", "stream", "stage")
         self.packets = counter("packets_sent", "RTP packets sent", "stream", "carrier")
-        self.octets = counter("bytes_sent", "Bytes of SRTP packets sent", "stream", "carrier")
+        self.octets = counter("bytes_sent", "Bytes of payload of RTP packets sent", "stream", "carrier")
         self.keyframe_requests = counter("keyframe_requests", "Asked by peers", "stream", "cause")
         self.keyframes = counter("keyframes", "Keyframes encoded", "stream", "codec")
-        self.malformed = counter("malformed_from_peers", "Datagrams of peers that were not used", "kind")
         self.encode_seconds = Histogram(
             "lockstep_media_encode_seconds",
             "Time to encode one frame",

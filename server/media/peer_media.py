@@ -2,26 +2,20 @@
 
 import logging
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from robot_bridge.protocol.console import Quality, Report, StreamInfo, Tier
-from server.media.packet_stream import SenderStats
+from rtc.endpoint import Connection
+from rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsLeft, Reception, StreamEvent
 from server.media.peer_stream import PeerStream
 from server.media.quality.peer_quality import PeerQuality
+from server.media.receive_turns import DriverTurns
+from server.media.rtp_sender import RtpSender, SenderStats
 from server.media.stream import Stream
 
-__all__ = ["Delivery", "DeliverySender", "PeerMedia"]
+__all__ = ["Delivery", "PeerMedia"]
 
 logger = logging.getLogger(__name__)
-
-
-class DeliverySender(Protocol):
-    """What it needs of what sends a stream."""
-
-    @property
-    def stats(self) -> SenderStats: ...
-    def report(self) -> None: ...
-    async def stop(self) -> None: ...
 
 
 class Delivery(NamedTuple):
@@ -30,36 +24,54 @@ class Delivery(NamedTuple):
     info: StreamInfo
     stream: Stream  # type: ignore[type-arg]  # the job type does not matter here
     target: PeerStream
-    sender: DeliverySender
+    sender: RtpSender
+
+
+REPORTS_OFTEN = 1 / 3  # s
+REPORTS_ELSE = 1.0  # s
 
 
 class PeerMedia:
-    """Ends with `close`, or by itself when the peer connection closes."""
+    """Its connection tells it `connected`, and `heard` what is about a stream. It ends with `close`."""
 
     def __init__(
-        self, deliveries: list[Delivery], quality: PeerQuality, on_close: Callable[["PeerMedia"], None]
+        self,
+        connection: Connection,
+        deliveries: list[Delivery],
+        quality: PeerQuality,
+        *,
+        on_close: Callable[["PeerMedia"], None],
+        on_connected: Callable[[], None] = lambda: None,
+        on_paced: Callable[[PeerStream], None] = lambda target: None,
+        turns: DriverTurns | None = None,
     ) -> None:
+        """`on_paced` hears that a stream may send more; `turns` are told whether this peer drives."""
         self.quality = quality
         self.voice = ""  # mid of the section in which the peer's own sound is taken; "" when it is not
-        self._deliveries = deliveries
+        self.deliveries = deliveries
+        self._connection = connection
         self._on_close = on_close
+        self._on_connected = on_connected
+        self._on_paced = on_paced
+        self._turns = turns
+        self._has_left = False
         self._has_failed = False
         self._tell_failed: Callable[[str, Exception], None] = _log_failure
 
     @property
     def streams(self) -> list[StreamInfo]:
         """The negotiated streams, in the order of the answer's sections. Inactive sections have none."""
-        return [delivery.info for delivery in self._deliveries]
+        return [delivery.info for delivery in self.deliveries]
 
     @property
     def stats(self) -> dict[str, SenderStats]:
         """Counters and the peer's reports, by mid."""
-        return {delivery.info.mid: delivery.sender.stats for delivery in self._deliveries}
+        return {delivery.info.mid: delivery.sender.stats for delivery in self.deliveries}
 
     @property
     def dropped(self) -> int:
         """Frames that this peer did not get because it could not keep up."""
-        return sum(delivery.target.dropped for delivery in self._deliveries)
+        return sum(delivery.target.dropped for delivery in self.deliveries)
 
     @property
     def tier(self) -> Tier | None:
@@ -85,16 +97,52 @@ class PeerMedia:
         """Take the client's own report. `now` is on the monotonic clock."""
         self.quality.report(report, now)
 
-    @property
-    def comes_first(self) -> bool:
-        """Whether it drives, or may, or has many behind it."""
-        return self.quality.drives or self.quality.operator or self.quality.relays
+    def connected(self) -> None:
+        """The connection is up: media flow from now on."""
+        self._set_pace()
+        for delivery in () if self._has_left else self.deliveries:
+            delivery.target.sender = delivery.sender
+            encoded_as = self.quality.encoded_as if delivery.info.kind == "video" else self.quality.hears_as
+            delivery.stream.join(delivery.info.codec, delivery.target, encoded_as)
+        if self.quality.cameras and not self._has_left:
+            self._on_connected()
+
+    def heard(self, mid: str, event: StreamEvent) -> None:
+        """What the peer says about the stream in section `mid`, or what became of it."""
+        delivery = next((each for each in self.deliveries if each.info.mid == mid), None)
+        if delivery is None or self._has_left:
+            return
+        if isinstance(event, KeyframeRequested):
+            delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
+        elif isinstance(event, Reception):
+            delivery.sender.reported(event)
+            self.quality.reception(event.lost, event.expected, event.round_trip)
+        elif isinstance(event, BandwidthEstimate):
+            delivery.sender.estimated(event.bitrate)
+            self.quality.bandwidth(event.bitrate, event.ssrcs)
+        elif isinstance(event, PacketsLeft):
+            self._on_paced(delivery.target)
 
     def drives(self, holds_seat: bool) -> None:
         """Whether this peer holds the control seat: the operator's tier is made for who does."""
         self.quality.drives = holds_seat
-        for delivery in self._deliveries:
+        for delivery in self.deliveries:
             delivery.target.priority = holds_seat
+        if self._turns is not None:
+            self._turns.drives = holds_seat
+        self._set_pace()
+
+    def _set_pace(self) -> None:
+        """How often reports go out, and whose datagrams leave first.
+
+        A round trip tells of the queue that the last report met, so whoever the operator's pictures depend on gets
+        them three times as often: a queue of a few hundred milliseconds is to be seen before it has grown to a second.
+        Over the narrowest paths that is a hundredth of what passes; RTCP may take a twentieth (RFC 4585 3.4).
+        """
+        quality = self.quality
+        comes_first = quality.drives or quality.operator or quality.relays
+        self._connection.urgent = quality.drives or quality.operator
+        self._connection.peer.report_every(REPORTS_OFTEN if comes_first else REPORTS_ELSE)
 
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
         """Call `tell` when something else was decided for this peer's pictures."""
@@ -102,7 +150,7 @@ class PeerMedia:
 
     def request_keyframe(self, mid: str) -> None:
         """Somebody behind this peer cannot decode."""
-        for delivery in self._deliveries:
+        for delivery in self.deliveries:
             if delivery.info.mid == mid:
                 delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
 
@@ -117,14 +165,6 @@ class PeerMedia:
             self._leave_all()
             self._tell_failed(stage, error)
 
-    def send_reports(self) -> None:
-        """Send a sender report for each stream. Raises nothing."""
-        for delivery in self._deliveries:
-            try:
-                delivery.sender.report()
-            except Exception as error:
-                self.failed("rtcp", error)
-
     def detach(self) -> None:
         """Take no more frames. Idempotent; raises nothing."""
         error = self._leave_all()
@@ -133,8 +173,9 @@ class PeerMedia:
 
     def _leave_all(self) -> Exception | None:
         """Every stream is left, and the plane knows it, whatever one of them raises."""
+        self._has_left = True
         first: Exception | None = None
-        for delivery in self._deliveries:
+        for delivery in self.deliveries:
             delivery.target.sender = None
             try:
                 delivery.stream.leave(delivery.target)
@@ -147,13 +188,8 @@ class PeerMedia:
         return first
 
     async def close(self) -> None:
-        """Stop sending to this peer. Idempotent; safe before and after the peer connection closes."""
+        """Stop sending to this peer. Idempotent; its connection is somebody else's to close."""
         self.detach()
-        for delivery in self._deliveries:
-            try:
-                await delivery.sender.stop()
-            except Exception as error:
-                self.failed("close", error)
 
 
 def _log_failure(stage: str, error: Exception) -> None:

@@ -19,11 +19,8 @@ class FrameSender(Protocol):
     def paced(self) -> bool:
         """Whether packets wait for the pacer."""
 
-    def flush(self) -> tuple[int, int]:
-        """Send what the pacer lets through of those: packets and bytes handed to the network."""
-
     def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
-        """Send a frame: packets and bytes handed to the network. None, and nothing sent, while the socket is full.
+        """Send a frame: packets and bytes of payload. None, and nothing is sent, while the network takes nothing.
 
         What the pacer holds back of it waits; call only when nothing waits.
         """
@@ -75,12 +72,8 @@ class PeerStream:
 
     def send_next(self) -> bool:
         sender = self.sender
-        if sender is None:
+        if sender is None or sender.paced:
             return False
-        if sender.paced:
-            self._count(*sender.flush())
-            if sender.paced:
-                return False
         frame = self._outbox.peek()
         if frame is None:
             return False

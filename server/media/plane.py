@@ -4,55 +4,65 @@ import asyncio
 import re
 import time
 from collections.abc import Callable, Container, Iterator, Sequence
+from dataclasses import replace
 from itertools import count
+from typing import NamedTuple
 
-from aiortc import RTCPeerConnection, RTCRtpTransceiver
 from prometheus_client import CollectorRegistry
 
-from robot_bridge.protocol.carriers import Carrier
+from robot_bridge.protocol.carriers import PLAYOUT_DELAY_URI, Carrier
 from robot_bridge.protocol.console import StreamInfo, StreamOffer
 from robot_bridge.protocol.description import Camera, Microphone, RobotDescription
 from robot_bridge.protocol.messages import Media
+from rtc.endpoint import Connection, Turns
+from rtc.peer import OfferedMedia
+from rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SessionDescription
 from server.loop_turns import turns_of_loop
-from server.media.aiortc_private import (
-    MediaSender,
-    install_sender,
-    keep_extensions,
-    offered_direction,
-    offered_extensions,
-)
 from server.media.audio_stream import AudioStream
 from server.media.capture_clock import CaptureClock
-from server.media.codec_choice_private import keep_codec, negotiated_h264
+from server.media.codec_choice import OPUS, chosen_codecs, h264_profile, known_codecs, offered_codecs
+from server.media.extensions import choose_carrier, wanted_uris
 from server.media.fanout import FanOut
-from server.media.h264 import profile_of_fmtp
-from server.media.handover import FrameSink, HandedOverStream, HandoverSender
-from server.media.header_extensions import choose_carrier, wanted_uris
 from server.media.metrics import MediaMetrics
 from server.media.outbox import Outbox
 from server.media.peer_media import Delivery, PeerMedia
 from server.media.peer_stream import PeerStream
-from server.media.publishing_private import H264_PROFILE, offer_section
 from server.media.quality.desk import QualityDesk
 from server.media.quality.metrics import QualityMetrics
 from server.media.quality.path import RateLimits
 from server.media.quality.peer_quality import CameraLink, PeerQuality, SoundLink
-from server.media.receive_guard_private import guard_transports
-from server.media.receive_turns import ReceiveTurns
+from server.media.receive_turns import DriverTurns, ReceiveTurns
 from server.media.recorded_output import FrameTaker, RecordedOutput
-from server.media.sender_reports import SenderReports
+from server.media.rtp_sender import RtpSender
 from server.media.settings import MediaSettings
 from server.media.sources.source_url import SourceSpec
 from server.media.video_stream import VideoStream
-from server.media.voice_private import VoicePacket, take_voice
 from server.token_bucket import TokenBucket
 
-__all__ = ["MediaPlane", "MediaSettings", "PeerMedia"]
+__all__ = ["MediaPlan", "MediaPlane", "MediaSettings", "PeerMedia"]
 
 NOT_DRIVING_RATE = 1000.0  # Hz, datagrams of all together who may drive and do not, before they wait as observers' do
 MAX_LINK_TIME = 1e9  # s; no monotonic clock gets there, and NaN is not below it
 
 AnyStream = VideoStream | AudioStream
+
+
+class PlannedStream(NamedTuple):
+    """One stream in the section of an answer, or of an offer to a relay."""
+
+    mid: str
+    stream: AnyStream
+    codecs: tuple[Codec, ...]  # the one to send, and what repairs it
+    carrier: Carrier
+
+
+class MediaPlan(NamedTuple):
+    """What a peer is given, before it is answered."""
+
+    media: dict[str, LocalMedia]  # by mid
+    streams: list[PlannedStream]
+    voice: str = ""  # mid of the section in which the peer's own sound is taken; "" when it is not
+    thumbnail: bool = False
 
 
 class MediaPlane:
@@ -114,9 +124,7 @@ class MediaPlane:
         loop = asyncio.get_running_loop()
         self._stream_tasks = [loop.create_task(stream.run()) for stream in self._streams.values()]
         if not self._service_tasks:
-            reports = SenderReports(lambda: list(self._peers))
-            services = (fan_out.run_paced(), reports.run(), self._quality.run())
-            self._service_tasks = [loop.create_task(service) for service in services]
+            self._service_tasks = [loop.create_task(self._quality.run())]
 
     def feed(self, media: Media, now: float) -> None:
         """Take a picture or sound from the robot link. Called on the loop, never blocks; newest wins.
@@ -188,97 +196,107 @@ class MediaPlane:
         """The streams that a peer can ask for, in the order of an offer's sections of their kind."""
         return [StreamOffer(stream=each.name, label=each.label, kind=each.kind) for each in self._streams.values()]
 
-    def attach(
-        self,
-        pc: RTCPeerConnection,
-        offer_sdp: str,
-        *,
-        priority: bool,
-        waits: bool = False,
-        trailer: bool,
-        thumbnail: bool = False,
-        voice: Callable[[VoicePacket], None] | None = None,
-    ) -> PeerMedia:
-        """Give a peer its streams. Call after setRemoteDescription(offer), before createAnswer.
+    def plan(
+        self, offer: SessionDescription, *, trailer: bool, thumbnail: bool = False, voice: bool = False
+    ) -> MediaPlan:
+        """What an offer gets.
 
         The i-th video section gets the i-th camera, the i-th audio section the i-th microphone; sections without
-        one, or without a codec in common, are answered inactive. `priority` is for the operator: served first and at
-        once. `waits`: its datagrams take observers' turns; without it those do that are too many, unless it drives.
-        `trailer` asks for the trailer carrier; otherwise the offer's header extensions decide. `thumbnail`: the first
-        camera alone, in the lowest tier. `voice` takes the peer's own sound, from the first audio section in which it
-        would only send.
+        one, or without a codec that it has, are answered inactive. `trailer` asks for the trailer carrier; otherwise
+        the offer's header extensions decide. `thumbnail`: the first camera alone, in the lowest tier. `voice`: the
+        first audio section in which the peer would only send is for its own sound.
         """
-        extensions = offered_extensions(offer_sdp)
         sources: dict[str, Iterator[AnyStream]] = {
             kind: iter([stream for stream in self._streams.values() if stream.kind == kind][: 1 if thumbnail else None])
             for kind in (("video",) if thumbnail else ("video", "audio"))
         }
-        deliveries: list[Delivery] = []
-        peer = PeerMedia(deliveries, self._peer_quality(pc, priority), self._detached)
-        self._guard(pc, None if waits else lambda: peer.quality.drives or self._may_go_at_once())
-        if thumbnail and self._settings.quality:
-            peer.quality.stay_low()
-        for transceiver in pc.getTransceivers():
-            if offered_direction(transceiver) == "recvonly":  # it would send
-                transceiver.direction = "inactive"
-                wanted = voice is not None and transceiver.kind == "audio" and not peer.voice
-                if wanted and voice is not None and take_voice(transceiver, voice):
-                    peer.voice = transceiver.mid or ""
+        plan = MediaPlan({}, [], thumbnail=thumbnail)
+        for section in offer.sections:
+            if not section.is_media:
                 continue
-            stream = next(sources.get(transceiver.kind, iter(())), None)
-            codec = None
-            if stream is not None and offered_direction(transceiver) in ("sendonly", "sendrecv"):
-                codec = keep_codec(transceiver, stream.codecs, h264_first=self._gives_h264(stream))
-            if stream is None or codec is None:
-                transceiver.direction = "inactive"
+            if section.direction == "sendonly":
+                if voice and not plan.voice and chosen_codecs(section, (OPUS.name,)):
+                    plan = plan._replace(voice=section.mid)
+                    plan.media[section.mid] = LocalMedia((OPUS,), "recvonly", (MID_URI,))
+                else:
+                    plan.media[section.mid] = _inactive(section)
                 continue
-            offered = extensions.get(transceiver.mid or "", {})
-            carrier = choose_carrier(offered, trailer)
-            ids = {uri: offered[uri] for uri in wanted_uris(stream.kind, carrier) if uri in offered}
-            keep_extensions(transceiver, ids)
-            transceiver.direction = "sendonly"
-            deliveries.append(self._deliver(peer, transceiver, stream, codec, carrier, priority))
-        return self._joined(peer, deliveries)
+            planned = self._planned(section, next(sources.get(section.kind, iter(())), None), trailer)
+            plan.media[section.mid] = _inactive(section) if planned is None else _sent(planned)
+            plan.streams.extend([] if planned is None else [planned])
+        return plan
 
-    def publish(self, pc: RTCPeerConnection, camera_codec: str = "") -> PeerMedia:
-        """Offer every stream to a relay, each in one codec, with trailers. Call before createOffer.
+    def _planned(self, section: MediaSection, stream: AnyStream | None, trailer: bool) -> PlannedStream | None:
+        if stream is None or section.direction not in ("recvonly", "sendrecv"):
+            return None
+        codecs = chosen_codecs(section, stream.codecs, h264_first=self._gives_h264(stream))
+        if not codecs:
+            return None
+        carrier = choose_carrier({each.uri for each in section.extensions}, trailer)
+        return PlannedStream(section.mid, stream, codecs, carrier)
+
+    def attach(
+        self, connection: Connection, plan: MediaPlan, *, priority: bool, turns: Turns | None = None
+    ) -> PeerMedia:
+        """Give a peer the streams that were planned, once `connection` has answered with the plan's media.
+
+        `priority` is for the operator: served first and at once. `turns`: those that its datagrams wait for.
+        """
+        cameras = sum(each.stream.kind == "video" for each in plan.streams)
+        peer = self._peer_of(connection, plan, self._quality_of(cameras, priority), priority=priority, turns=turns)
+        peer.voice = plan.voice
+        if plan.thumbnail and self._settings.quality:
+            peer.quality.stay_low()
+        return self._joined(peer)
+
+    def plan_publication(self, camera_codec: str = "") -> tuple[MediaPlan, list[OfferedMedia]]:
+        """Every stream for a relay, each in one codec, with trailers; and what to offer.
 
         `camera_codec`: "" is what is being encoded already for somebody, so that it costs no encoder.
         """
-        sections = [
-            (stream, codec, offer_section(pc, stream.kind, codec))
-            for stream in self._streams.values()
-            for codec in [stream.codec_in_use(camera_codec if stream.kind == "video" else "")]
-        ]
-        self._guard(pc)
-        deliveries: list[Delivery] = []
-        peer = PeerMedia(deliveries, self._peer_quality(pc, priority=False), self._detached)
-        peer.quality.relays = True
-        for stream, codec, transceiver in sections:
-            deliveries.append(self._deliver(peer, transceiver, stream, codec, "trailer", priority=False))
-        return self._joined(peer, deliveries)
+        plan, offered = MediaPlan({}, []), []
+        for number, stream in enumerate(self._streams.values()):
+            name = stream.codec_in_use(camera_codec if stream.kind == "video" else "")
+            planned = PlannedStream(str(number), stream, offered_codecs(stream.kind, name), "trailer")
+            plan.streams.append(planned)
+            # A relay hands playout-delay on, and browsers show pictures at once.
+            uris = (MID_URI, PLAYOUT_DELAY_URI) if stream.kind == "video" else (MID_URI,)
+            offered.append(OfferedMedia(planned.mid, stream.kind, replace(_sent(planned), extensions=uris)))
+        return plan, offered
 
-    def hand_over(self, sink_of: Callable[[HandedOverStream], FrameSink], camera_codec: str = "") -> PeerMedia:
-        """Give every stream, each in one codec, to what sends it by its own means; `camera_codec` as for `publish`."""
-        deliveries: list[Delivery] = []
-        cameras = sum(isinstance(stream, VideoStream) for stream in self._streams.values())
-        peer = PeerMedia(deliveries, self._quality_of(cameras, priority=False), self._detached)
+    def publish(self, connection: Connection, plan: MediaPlan) -> PeerMedia:
+        """Give a relay the streams that were planned, once `connection` is up. Call it with the offer."""
+        cameras = sum(each.stream.kind == "video" for each in plan.streams)
+        peer = self._peer_of(connection, plan, self._quality_of(cameras, priority=False), priority=False)
         peer.quality.relays = True
-        for index, stream in enumerate(self._streams.values()):
-            video = isinstance(stream, VideoStream)
-            codec = stream.codec_in_use(camera_codec if video else "")
-            size, rate = (stream.size, stream.frame_rate) if isinstance(stream, VideoStream) else ((0, 0), 0.0)
-            bitrate = self._settings.video_bitrate_bps if video else 0
-            sink = sink_of(HandedOverStream(stream.name, stream.kind, codec, size, rate, bitrate))
-            target = self._target(peer, stream, codec, "trailer", priority=False)
-            target.h264 = profile_of_fmtp(H264_PROFILE) if codec == "H264" else None
-            sender = HandoverSender(sink)
-            deliveries.append(Delivery(_info(stream, str(index), codec, "trailer"), stream, target, sender))
-            target.sender = sender
-            stream.join(codec, target, peer.quality.encoded_as if video else "operator")
-        return self._joined(peer, deliveries)
+        return self._joined(peer)
 
-    def _joined(self, peer: PeerMedia, deliveries: list[Delivery]) -> PeerMedia:
+    def _peer_of(
+        self,
+        connection: Connection,
+        plan: MediaPlan,
+        quality: PeerQuality,
+        *,
+        priority: bool,
+        turns: Turns | None = None,
+    ) -> PeerMedia:
+        deliveries: list[Delivery] = []
+        peer = PeerMedia(
+            connection,
+            deliveries,
+            quality,
+            on_close=self._detached,
+            on_connected=self._quality.tick if self._settings.quality else lambda: None,
+            on_paced=self._fan_out.serve_again,
+            turns=turns if isinstance(turns, DriverTurns) else None,
+        )
+        deliveries += [self._delivery(connection, peer, each, priority) for each in plan.streams]
+        if self._settings.quality:
+            quality.pace = connection.peer.pace
+        return peer
+
+    def _joined(self, peer: PeerMedia) -> PeerMedia:
+        deliveries = peer.deliveries
         self._peers[peer] = None
         peer.quality.cameras = [
             CameraLink(each.stream, each.info.codec, each.target, each.sender)
@@ -309,22 +327,15 @@ class MediaPlane:
         """Those of observers, in which publishers have theirs too."""
         return self._turns
 
-    def _guard(self, pc: RTCPeerConnection, at_once: Callable[[], bool] | None = None) -> None:
-        """Without `at_once` everything that this peer sends waits for its turn."""
-        on_socket = None if at_once is None else self._loop_turns.yield_to
-        on_error = self._metrics.malformed.labels
-        guard_transports(pc, lambda kind: on_error(kind).inc(), self._turns, on_socket, at_once)
+    def turns_of(self, *, waits: bool) -> ReceiveTurns | DriverTurns:
+        """For a new peer. `waits`: its datagrams take observers' turns; else only those that are too many, unless it
+        drives.
+        """
+        return self._turns if waits else DriverTurns(self._turns, self._may_go_at_once)
 
     def _may_go_at_once(self) -> bool:
         """Whether one more datagram of those who may drive and do not is handled before all that waits."""
         return self._not_driving.take(time.monotonic())
-
-    def _peer_quality(self, pc: RTCPeerConnection, priority: bool) -> PeerQuality:
-        cameras = min(
-            sum(transceiver.kind == "video" for transceiver in pc.getTransceivers()),
-            sum(isinstance(stream, VideoStream) for stream in self._streams.values()),
-        )
-        return self._quality_of(cameras, priority)
 
     def _quality_of(self, cameras: int, priority: bool) -> PeerQuality:
         settings = self._settings
@@ -338,40 +349,14 @@ class MediaPlane:
         self._peers.pop(peer, None)
         self._quality.leave(peer.quality)
 
-    def _deliver(
-        self,
-        peer: PeerMedia,
-        transceiver: RTCRtpTransceiver,
-        stream: AnyStream,
-        codec: str,
-        carrier: Carrier,
-        priority: bool,
-    ) -> Delivery:
-        video = stream.kind == "video"
-        quality = peer.quality
+    def _delivery(self, connection: Connection, peer: PeerMedia, planned: PlannedStream, priority: bool) -> Delivery:
+        mid, stream, codecs, carrier = planned
+        codec = next(name for name in stream.codecs if name.lower() == codecs[0].name.lower())
         target = self._target(peer, stream, codec, carrier, priority)
-        target.h264 = negotiated_h264(transceiver)
-
-        def ready() -> None:
-            target.sender = sender
-            stream.join(codec, target, quality.encoded_as if video else quality.hears_as)
-            if video and self._settings.quality:
-                self._quality.tick()
-
-        sender = MediaSender(
-            transceiver,
-            _msid(stream.name),
-            trailer=carrier == "trailer",
-            on_ready=ready,
-            on_keyframe_request=lambda: stream.request_keyframe(codec, target, "pli"),
-            on_stopped=peer.detach,
-            on_failed=peer.failed,
-            listener=quality,
-            pacer=quality.pacer if video and self._settings.quality else None,
-            on_paced=lambda: self._fan_out.pace(target),
-        )
-        install_sender(transceiver, sender)
-        return Delivery(_info(stream, transceiver.mid or "", codec, carrier), stream, target, sender)
+        target.h264 = h264_profile(codecs[0])
+        epoch = self._wall_clock() - asyncio.get_running_loop().time()
+        sender = RtpSender(connection, mid, carrier, video=stream.kind == "video", wall_clock=epoch)
+        return Delivery(_info(stream, mid, codec, carrier), stream, target, sender)
 
     def _target(self, peer: PeerMedia, stream: AnyStream, codec: str, carrier: Carrier, priority: bool) -> PeerStream:
         video = stream.kind == "video"
@@ -405,6 +390,16 @@ class MediaPlane:
         for task in self._service_tasks:
             task.cancel()
         await asyncio.gather(*self._ending, *self._service_tasks, return_exceptions=True)
+
+
+def _inactive(section: MediaSection) -> LocalMedia:
+    return LocalMedia(known_codecs(section.kind), "inactive")
+
+
+def _sent(planned: PlannedStream) -> LocalMedia:
+    name = _msid(planned.stream.name)
+    uris = wanted_uris(planned.stream.kind, planned.carrier)
+    return LocalMedia(planned.codecs, "sendonly", uris, msid=f"{name} {name}")
 
 
 def _info(stream: AnyStream, mid: str, codec: str, carrier: Carrier) -> StreamInfo:

@@ -1,11 +1,12 @@
 """Observers' datagrams wait for their turn; operators and the robot never wait for them."""
 
 from collections import deque
+from collections.abc import Callable
 from typing import Protocol
 
 from server.loop_turns import LoopTurns
 
-__all__ = ["ReceiveTurns", "Waiting"]
+__all__ = ["DriverTurns", "ReceiveTurns", "Waiting"]
 
 
 class Waiting(Protocol):
@@ -52,3 +53,19 @@ class ReceiveTurns:
                 break
         if self._order:
             self._schedule()
+
+
+class DriverTurns:
+    """Of one peer that may drive: what it sends is handled at once while it does, and else within a bound."""
+
+    def __init__(self, turns: ReceiveTurns, may_go_at_once: Callable[[], bool]) -> None:
+        """`turns`: where datagrams wait; `may_go_at_once`: the bound for all that may drive and do not, together."""
+        self.drives = False  # whether it holds the control seat
+        self._turns = turns
+        self._bound = may_go_at_once
+
+    def may_go_at_once(self) -> bool:
+        return self.drives or self._bound()
+
+    def add(self, waiting: Waiting) -> None:
+        self._turns.add(waiting)

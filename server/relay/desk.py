@@ -4,8 +4,7 @@ import asyncio
 import math
 import secrets
 import time
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractAsyncContextManager
+from collections.abc import Callable, Iterable
 from typing import NamedTuple, Protocol
 
 import structlog
@@ -18,11 +17,10 @@ from server.backoff import Backoff
 from server.media.errors import MediaError
 from server.relay.errors import RelayError
 from server.relay.handout import Handout
-from server.relay.publication import Engine, Publication, Watched
+from server.relay.publication import Engine, Publication
 from server.relay.relay_settings import RelaySettings
-from server.relay.relay_url import EngineName
 from server.relay.station import Station
-from server.relay.tickets import JanusTicket, LiveKitTicket
+from server.relay.tickets import RelayTicket
 
 __all__ = ["RelayDesk", "RelayedMedia", "RelayedPeer"]
 
@@ -66,7 +64,7 @@ class RelayDesk:
     def __init__(
         self,
         settings: RelaySettings,
-        engines: Mapping[EngineName, Engine],
+        engine: Engine,
         peers: Callable[[], Iterable[RelayedPeer]],
         has_ended: Callable[[str, float], bool],
         clock: Callable[[], float] = time.monotonic,
@@ -76,7 +74,7 @@ class RelayDesk:
             Station(str(number), url, settings.relay_public[number] if settings.relay_public else url.address)
             for number, url in enumerate(settings.relay_urls)
         ]
-        self._engines = engines
+        self._engine = engine
         self._peers = peers
         self._has_ended = has_ended
         self._clock = clock
@@ -106,7 +104,7 @@ class RelayDesk:
 
     # What observers ask
 
-    async def ticket(self, peer: RelayedPeer | None, lost: str) -> JanusTicket | LiveKitTicket | None:
+    async def ticket(self, peer: RelayedPeer | None, lost: str) -> RelayTicket | None:
         """Where one more observer watches; None: directly. It holds a key, see `key`.
 
         Args:
@@ -127,9 +125,9 @@ class RelayDesk:
                 watching[each.relay] += 1
         choice = self._handout.choose(now, direct, watching)
         station = next((each for each in usable if each.name == choice), None)
-        return None if station is None else self._engine(station).ticket(station)
+        return None if station is None else self._engine.ticket(station)
 
-    def key(self, peer: RelayedPeer) -> JanusTicket | LiveKitTicket | None:
+    def key(self, peer: RelayedPeer) -> RelayTicket | None:
         """What lets `peer` into the relay that it was admitted for; None: that does not carry the session now.
 
         Its link is remembered: when that ends, the key is good no more.
@@ -138,7 +136,7 @@ class RelayDesk:
         if station is None:
             return None
         self._holders[peer.identity.token_id] = _Holder(peer.identity.expires, self._clock())
-        return self._engine(station).ticket(station)
+        return self._engine.ticket(station)
 
     def arrived(self, relay: str) -> bool:
         """A peer that watches there is connected to the console; False: there is no such relay."""
@@ -158,9 +156,6 @@ class RelayDesk:
             except TimeoutError:
                 continue
 
-    def _engine(self, station: Station) -> Engine:
-        return self._engines[station.url.engine]
-
     # Its own life
 
     async def run(self) -> None:
@@ -178,7 +173,7 @@ class RelayDesk:
             except (RelayError, MediaError, OSError, ConnectionError) as error:
                 self._lost(origin, str(error))
             except Exception as error:
-                # What aiortc raises here has no common base; a relay never ends the console.
+                # A fault of the console's own; a relay never ends the console.
                 log.exception("publishing failed", relay=origin.url.address)
                 self._lost(origin, type(error).__name__)
             if self._clock() - began > HEALTHY_SECONDS:
@@ -197,7 +192,7 @@ class RelayDesk:
 
     async def _carry(self, origin: Station) -> None:
         """From here into one relay, and from there into the others; returns when it ended or nobody watches."""
-        async with self._engine(origin).publish(origin, secrets.randbits(52) | 1) as publication:
+        async with self._engine.publish(origin, secrets.randbits(52) | 1) as publication:
             self._publication = publication
             self._holders.clear()
             self._published_at = self._clock()
@@ -218,7 +213,7 @@ class RelayDesk:
         tasks = [
             loop.create_task(self._extend(origin, station, publication), name=f"relay {station.name}")
             for station in self.stations
-            if station is not origin and station.url.engine == origin.url.engine
+            if station is not origin
         ]
         tasks += [loop.create_task(self._watch(publication)), loop.create_task(self._beat(publication))]
         try:
@@ -259,12 +254,12 @@ class RelayDesk:
             publication.send_feedback(HEARTBEAT)
 
     async def _extend(self, origin: Station, station: Station, publication: Publication) -> None:
-        """Keep one more relay fed from the first, until cancelled. Relays that are not fed that way stand by."""
+        """Keep one more relay fed from the first, until cancelled."""
         backoff = Backoff(BACKOFF, BACKOFF_CAP)
-        while (feeding := self._engine(origin).pass_on(origin, station, publication)) is not None:
+        while True:
             began = self._clock()
             try:
-                await self._feed(feeding, station, publication)
+                await self._feed(origin, station, publication)
             except RelayError as error:
                 self._lost(station, str(error))
             finally:
@@ -273,10 +268,8 @@ class RelayDesk:
                 backoff.healthy()
             await asyncio.sleep(backoff.next())
 
-    async def _feed(
-        self, feeding: AbstractAsyncContextManager[Watched], station: Station, publication: Publication
-    ) -> None:
-        async with feeding as link:
+    async def _feed(self, origin: Station, station: Station, publication: Publication) -> None:
+        async with self._engine.pass_on(origin, station, publication) as link:
             self._live(station, publication)
             await link.ended.wait()
             self._lost(station, link.why)

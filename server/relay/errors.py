@@ -3,11 +3,10 @@
 RelayError
 ├── RelayUnreachable   no connection, or it ended
 ├── RelaySilent        it did not answer in time
-├── RelayRefused       it said no
-└── RelayClientFailed  what speaks to it here did not work
+└── RelayRefused       it said no
 """
 
-__all__ = ["RelayClientFailed", "RelayError", "RelayRefused", "RelaySilent", "RelayUnreachable"]
+__all__ = ["RelayError", "RelayRefused", "RelaySilent", "RelayUnreachable"]
 
 
 class RelayError(Exception):
@@ -44,7 +43,3 @@ class RelayRefused(RelayError):
     def __init__(self, detail: str, code: int = 0) -> None:
         super().__init__(f"{detail} ({code})" if code else detail)
         self.code = code
-
-
-class RelayClientFailed(RelayError):
-    name = "client_failed"

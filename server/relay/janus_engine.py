@@ -5,16 +5,16 @@ import hashlib
 import hmac
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from contextlib import asynccontextmanager, suppress
 
 from server.relay.errors import RelayError
-from server.relay.janus_publishing import PublishedMedia, publish
+from server.relay.janus_publishing import Connect, PublishedMedia, publish
 from server.relay.janus_room import JanusRoom, RoomKeys
 from server.relay.janus_session import JanusSession, open_janus
 from server.relay.publication import Publication
 from server.relay.relay_settings import RelaySettings
 from server.relay.station import Station
-from server.relay.tickets import JanusTicket
+from server.relay.tickets import RelayTicket
 
 __all__ = ["JanusEngine"]
 
@@ -22,9 +22,10 @@ __all__ = ["JanusEngine"]
 class JanusEngine:
     """Its keys are made from the console's own, so that a console that was restarted can go on with its room."""
 
-    def __init__(self, settings: RelaySettings, media: PublishedMedia, key: str) -> None:
+    def __init__(self, settings: RelaySettings, endpoint: Connect, media: PublishedMedia, key: str) -> None:
         self._codec = settings.relay_codec
         self._admin_key = settings.relay_admin_key.get_secret_value()
+        self._endpoint = endpoint
         self._media = media
         self._key = key.encode()
         self._pin = ""  # of the present publication; another one with each
@@ -34,7 +35,7 @@ class JanusEngine:
         self._pin = secrets.token_urlsafe(12)
         async with (
             open_janus(station.url.address) as session,
-            publish(session, self._room_of(station), self._media, feed, self._codec) as publication,
+            publish(session, self._room_of(station), self._endpoint, self._media, feed, self._codec) as publication,
         ):
             watching = asyncio.get_running_loop().create_task(_end_with(session, publication))
             try:
@@ -42,23 +43,8 @@ class JanusEngine:
             finally:
                 watching.cancel()
 
-    def pass_on(
-        self, origin: Station, station: Station, publication: Publication
-    ) -> AbstractAsyncContextManager[JanusSession]:
-        return self._fed(origin, station, publication)
-
-    def ticket(self, station: Station) -> JanusTicket:
-        return JanusTicket(
-            relay=station.name,
-            url=station.public,
-            room=int(station.url.room),
-            pin=self._pin,
-            feed=station.feed,
-            streams=list(station.streams),
-        )
-
     @asynccontextmanager
-    async def _fed(self, origin: Station, station: Station, publication: Publication) -> AsyncIterator[JanusSession]:
+    async def pass_on(self, origin: Station, station: Station, publication: Publication) -> AsyncIterator[JanusSession]:
         """`station` gets the feed from `origin` while entered."""
         name = f"{station.name}-{secrets.token_hex(4)}"
         async with open_janus(station.url.address) as session, open_janus(origin.url.address) as there:
@@ -75,8 +61,18 @@ class JanusEngine:
                 if not session.ended.is_set():
                     await _quietly(room.forget(handle, publication.feed))
 
+    def ticket(self, station: Station) -> RelayTicket:
+        return RelayTicket(
+            relay=station.name,
+            url=station.public,
+            room=station.url.room,
+            pin=self._pin,
+            feed=station.feed,
+            streams=list(station.streams),
+        )
+
     def _room_of(self, station: Station) -> Callable[[JanusSession], JanusRoom]:
-        number = int(station.url.room)
+        number = station.url.room
         place = f"{station.url.address}/{number}"
         keys = RoomKeys(self._admin_key, self._derived("secret", place), self._derived("publisher", place), self._pin)
         return lambda session: JanusRoom(session, number, keys)

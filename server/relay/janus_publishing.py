@@ -5,37 +5,46 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Protocol
 
-from aiortc import RTCBundlePolicy, RTCConfiguration, RTCPeerConnection, RTCSessionDescription
-
-from robot_bridge.protocol.console import StreamInfo
 from robot_bridge.protocol.janus import Heard, complete_description
+from rtc.channels import ChannelWritable
+from rtc.dcep import Reliability
+from rtc.endpoint import Connection, TooManyPeers
+from rtc.peer import OfferedMedia
+from rtc.peer_events import Connected, MediaEvent, PeerEnded, PeerEvent
+from rtc.sdp import SdpError, parse_description, write_description
 from server.channel_writer import ChannelWriter
-from server.data_transport_private import tune_data_transport
-from server.ice_restart_private import keep_path
 from server.media.peer_media import PeerMedia
-from server.media.publishing_private import ask_for_no_delay, keep_answered_extensions
+from server.media.plane import MediaPlan
 from server.relay.errors import RelayRefused, RelaySilent
 from server.relay.janus_room import JanusRoom
 from server.relay.janus_session import JanusSession
 from server.relay.publication import Publication
 
-__all__ = ["PublishedMedia", "publish"]
+__all__ = ["Connect", "PublishedMedia", "publish"]
 
 CONNECT_SECONDS = 15.0
-CLOSE_SECONDS = 2.0
 FEEDBACK = "feedback"  # label of the data channel
+NEWEST_WINS = Reliability(ordered=False, max_retransmits=0)
+
+
+class Connect(Protocol):
+    """What it needs of the console's endpoint."""
+
+    async def connect(self, *, controlling: bool) -> Connection: ...
 
 
 class PublishedMedia(Protocol):
     """What it needs of the media plane."""
 
-    def publish(self, pc: RTCPeerConnection, camera_codec: str = "") -> PeerMedia: ...
+    def plan_publication(self, camera_codec: str = "") -> tuple[MediaPlan, list[OfferedMedia]]: ...
+    def publish(self, connection: Connection, plan: MediaPlan) -> PeerMedia: ...
 
 
 @asynccontextmanager
 async def publish(
     session: JanusSession,
     room_of: Callable[[JanusSession], JanusRoom],
+    endpoint: Connect,
     media: PublishedMedia,
     feed: int,
     codec: str = "",
@@ -50,67 +59,74 @@ async def publish(
 
     handle = await session.attach(heard)
     await room.prepare(handle)
-    # One transport from the start: Janus bundles everything.
-    pc = RTCPeerConnection(RTCConfiguration(iceServers=[], bundlePolicy=RTCBundlePolicy.MAX_BUNDLE))
+    try:
+        connection = await endpoint.connect(controlling=True)
+    except TooManyPeers as error:
+        raise RelayRefused("this console has as many connections as it may") from error
     given: PeerMedia | None = None
     try:
-        given = media.publish(pc, codec)
-        writer = ChannelWriter(pc.createDataChannel(FEEDBACK, ordered=False, maxRetransmits=0))
-        tune_data_transport(pc)
-        keep_path(pc)
-        offer = await pc.createOffer()
-        await pc.setLocalDescription(RTCSessionDescription(ask_for_no_delay(offer.sdp), "offer"))
-        mids = [transceiver.mid or "" for transceiver in pc.getTransceivers()]
-        streams = [_with_mid(stream, mid) for stream, mid in zip(given.streams, mids, strict=True)]
-        names = {stream.mid: stream.stream for stream in streams}
-        answer = complete_description(await room.publish(handle, feed, pc.localDescription.sdp, names))
-        publication = Publication(feed, streams, writer.send_newest)
+        plan, offered = media.plan_publication(codec)
+        given = media.publish(connection, plan)
+        offer = write_description(connection.offer(offered))
+        names = {stream.mid: stream.stream for stream in given.streams}
+        answer = complete_description(await room.publish(handle, feed, offer, names))
+        try:
+            connection.accept(parse_description(answer))
+        except SdpError as error:
+            raise RelayRefused(f"its answer cannot be used: {error}") from error
+        writer = ChannelWriter(connection, connection.open_channel(FEEDBACK, reliability=NEWEST_WINS))
+        publication = Publication(feed, given.streams, writer.send_newest)
         given.on_failed(publication.failed)
         found.append(publication)
-        await _connect(pc, answer, publication)
+        line = _Line(connection, given, writer, publication)
+        connection.listen(line.heard)
+        await _connected(line, publication)
         yield publication
     finally:
+        if given is not None:
+            await given.close()
+        connection.close()
+
+
+class _Line:
+    """Hears of the connection to the relay."""
+
+    def __init__(
+        self, connection: Connection, media: PeerMedia, writer: ChannelWriter, publication: Publication
+    ) -> None:
+        self.decided = asyncio.Event()  # whether there is a connection
+        self._connection = connection
+        self._media = media
+        self._writer = writer
+        self._publication = publication
+
+    def heard(self, event: PeerEvent) -> None:
         try:
-            async with asyncio.timeout(CLOSE_SECONDS):
-                if given is not None:
-                    await given.close()
-                await pc.close()
-        except TimeoutError:
-            pass  # what is left ends with the process
+            self._take(event)
+        except Exception as error:
+            self._publication.failed("media", error)
+            self.decided.set()
+
+    def _take(self, event: PeerEvent) -> None:
+        if isinstance(event, MediaEvent):
+            self._media.heard(event.mid, event.event)
+        elif isinstance(event, ChannelWritable):
+            self._writer.flush()
+        elif isinstance(event, Connected):
+            self._media.connected()
+            self.decided.set()
+        elif isinstance(event, PeerEnded):
+            if self._connection.fault is not None:
+                raise self._connection.fault
+            self._publication.end(f"connection ended: {event.reason}")
+            self.decided.set()
 
 
-async def _connect(pc: RTCPeerConnection, answer: str, publication: Publication) -> None:
-    connected = asyncio.Event()
-
-    def changed() -> None:
-        if pc.connectionState in ("failed", "closed"):
-            publication.end(f"connection {pc.connectionState}")
-            connected.set()
-        elif pc.connectionState == "connected":
-            connected.set()
-
-    pc.on("connectionstatechange", changed)
-    try:
-        await pc.setRemoteDescription(RTCSessionDescription(answer, "answer"))
-    except Exception as error:
-        # aiortc has no error of its own for an answer that it cannot use.
-        raise RelayRefused("its answer cannot be used") from error
-    keep_answered_extensions(pc, answer)
+async def _connected(line: _Line, publication: Publication) -> None:
     try:
         async with asyncio.timeout(CONNECT_SECONDS):
-            await connected.wait()
+            await line.decided.wait()
     except TimeoutError as error:
         raise RelaySilent("no path for media") from error
     if publication.ended.is_set():
         raise RelaySilent(publication.why)
-
-
-def _with_mid(stream: StreamInfo, mid: str) -> StreamInfo:
-    return StreamInfo(
-        mid=mid,
-        stream=stream.stream,
-        label=stream.label,
-        kind=stream.kind,
-        codec=stream.codec,
-        carrier=stream.carrier,
-    )

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from robot_bridge.protocol.console import StreamInfo
-from server.media.publishing_private import H264_PROFILE, PLAYOUT_DELAY_ID
+from server.media.codec_choice import OFFERED_PROFILE
 from server.relay.errors import RelayRefused
 from server.relay.janus_session import JanusSession
 
@@ -12,6 +12,7 @@ __all__ = ["JanusRoom", "RoomKeys"]
 
 NO_SUCH_ROOM = 426  # JANUS_VIDEOROOM_ERROR_NO_SUCH_ROOM
 ROOM_EXISTS = 427
+PLAYOUT_DELAY_ID = 2  # of the header extension in offers of the console: the second of those that it names
 CODECS = {"H264": "h264", "VP8": "vp8", "opus": "opus", "PCMU": "pcmu"}
 
 
@@ -112,7 +113,7 @@ class JanusRoom:
                         "codec": CODECS[each.codec],
                         "description": each.stream,
                         **({"playoutdelay_ext_id": PLAYOUT_DELAY_ID} if each.kind == "video" else {}),
-                        **({"h264-profile": H264_PROFILE} if each.codec == "H264" else {}),
+                        **({"h264-profile": OFFERED_PROFILE} if each.codec == "H264" else {}),
                     }
                     for index, each in enumerate(streams)
                 ]

@@ -1,4 +1,4 @@
-"""The session in one relay, and what an engine has to be able to do: Janus and LiveKit are two of them."""
+"""The session in one relay, and what `RelayDesk` needs of the engine that brings it there."""
 
 import asyncio
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import structlog
 
 from robot_bridge.protocol.console import StreamInfo
 from server.relay.station import Station
-from server.relay.tickets import JanusTicket, LiveKitTicket
+from server.relay.tickets import RelayTicket
 
 __all__ = ["Engine", "Publication", "Watched"]
 
@@ -56,15 +56,15 @@ class Publication:
 
 
 class Engine(Protocol):
-    """One kind of relay. What it raises is RelayError, MediaError or OSError."""
+    """A relay's client. What it raises is RelayError, MediaError or OSError."""
 
     def publish(self, station: Station, feed: int) -> AbstractAsyncContextManager[Publication]:
         """The session is in that relay while entered. Nobody who was told of an earlier feed gets in with that."""
 
     def pass_on(
         self, origin: Station, station: Station, publication: Publication
-    ) -> AbstractAsyncContextManager[Watched] | None:
-        """While entered, the first relay feeds another one. None: relays of this kind are not fed that way."""
+    ) -> AbstractAsyncContextManager[Watched]:
+        """While entered, the first relay feeds another one."""
 
-    def ticket(self, station: Station) -> JanusTicket | LiveKitTicket:
+    def ticket(self, station: Station) -> RelayTicket:
         """For one observer, of a station that carries the session."""

@@ -1,6 +1,5 @@
 """Settings of the relays that observers watch through."""
 
-from importlib.util import find_spec
 from typing import Annotated, Literal, Self
 from urllib.parse import urlsplit
 
@@ -12,19 +11,14 @@ from server.relay.relay_url import RelayUrl, parse_relay_url
 
 __all__ = ["RelaySettings"]
 
-SHORTEST_SECRET = 32  # bytes: HS256 asks for a key of at least 256 bits (RFC 7518 3.2)
-NO_CLIENT = "livekit: needs LiveKit's client, which is not installed: .venv/bin/python -m pip install -e '.[livekit]'"
-
 
 class RelaySettings(BaseSettings):
     """Part of `Settings`."""
 
-    # "janus:ws://host:8188/ROOM", of several, the first feeds the others; "livekit:wss://host?room=NAME"
+    # "janus:ws://host:8188/ROOM", of several, the first feeds the others
     relay: NameList = ()
     relay_public: NameList = ()  # the same relays as browsers reach them, "wss://relay.example.org"; empty: as above
     relay_admin_key: SecretStr = SecretStr("")  # that Janus' video room asks of who creates a room
-    relay_key: str = ""  # LiveKit's API key
-    relay_secret: SecretStr = SecretStr("")  # its secret, which signs tokens
     relay_codec: Literal["", "H264", "VP8"] = ""  # of cameras; "": what is being encoded already
     observers_direct: Annotated[int, Field(ge=0)] = 10  # observers that the console serves itself, when it has relays
 
@@ -52,19 +46,9 @@ class RelaySettings(BaseSettings):
 
     @model_validator(mode="after")
     def _check_pairs(self) -> Self:
-        if any(each.engine == "livekit" for each in self.relay_urls):
-            self._check_livekit()
         if self.relay_public and len(self.relay_public) != len(self.relay):
             raise ValueError("relay_public names every relay, in the same order, or none")
         return self
-
-    def _check_livekit(self) -> None:
-        if not self.relay_key or not self.relay_secret.get_secret_value():
-            raise ValueError("livekit: needs relay_key and relay_secret (LOCKSTEP_RELAY_KEY, LOCKSTEP_RELAY_SECRET)")
-        if len(self.relay_secret.get_secret_value().encode()) < SHORTEST_SECRET:
-            raise ValueError(f"relay_secret has fewer than {SHORTEST_SECRET} bytes (RFC 7518 3.2)")
-        if not client_is_installed():
-            raise ValueError(NO_CLIENT)
 
     @property
     def relay_urls(self) -> list[RelayUrl]:
@@ -74,15 +58,5 @@ class RelaySettings(BaseSettings):
     def relay_origins(self) -> tuple[str, ...]:
         """What a page may connect to besides its own server."""
         addresses = self.relay_public or tuple(each.address for each in self.relay_urls)
-        found: dict[str, None] = {}  # an ordered set
-        for address, url in zip(addresses, self.relay_urls, strict=True):
-            part = urlsplit(address)
-            found[f"{part.scheme}://{part.netloc}"] = None
-            if url.engine == "livekit":  # its client asks over HTTP why it was refused
-                found[f"{part.scheme.replace('ws', 'http')}://{part.netloc}"] = None
-        return tuple(found)
-
-
-def client_is_installed() -> bool:
-    """LiveKit's client; other packages of theirs live beside it under the same name."""
-    return find_spec("livekit") is not None and find_spec("livekit.rtc") is not None
+        parts = [urlsplit(address) for address in addresses]
+        return tuple(dict.fromkeys(f"{part.scheme}://{part.netloc}" for part in parts))

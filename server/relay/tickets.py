@@ -4,40 +4,26 @@ import msgspec
 
 from robot_bridge.protocol.console import StreamInfo
 
-__all__ = ["JanusTicket", "LiveKitTicket", "RelayAnswer", "RelayTicket", "without_key"]
+__all__ = ["RelayAnswer", "RelayTicket", "without_key"]
 
 
-class RelayTicket(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine"):
+class RelayTicket(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine", tag="janus"):
     """All that it takes to watch, and nothing that would let anybody publish or change the room."""
 
     relay: str  # its number here; for POST /whep?relay=
     url: str  # WebSocket
-    feed: int  # what to watch; another one with every publication
-    streams: list[StreamInfo]  # `mid` is the publisher's
-
-
-class JanusTicket(RelayTicket, frozen=True, kw_only=True, tag="janus"):
-    """`feed` is the publisher to subscribe to."""
-
     room: int
     pin: str  # lets in; "" for who takes no part in the session yet
-
-
-class LiveKitTicket(RelayTicket, frozen=True, kw_only=True, tag="livekit"):
-    """Every track has the name of its stream."""
-
-    token: str  # lets in for a minute, and to nothing but watching; "" for who takes no part in the session yet
-    publisher: str  # whose tracks and messages count; nobody else's
+    feed: int  # the publisher to subscribe to; another one with every publication
+    streams: list[StreamInfo]  # `mid` is the publisher's
 
 
 class RelayAnswer(msgspec.Struct, frozen=True):
     """Answer of GET /api/relay."""
 
-    relay: JanusTicket | LiveKitTicket | None  # None: connect to the console for media too
+    relay: RelayTicket | None  # None: connect to the console for media too
 
 
-def without_key(ticket: JanusTicket | LiveKitTicket) -> JanusTicket | LiveKitTicket:
+def without_key(ticket: RelayTicket) -> RelayTicket:
     """Where the relay is, and nothing that lets anybody in."""
-    if isinstance(ticket, JanusTicket):
-        return msgspec.structs.replace(ticket, pin="")
-    return msgspec.structs.replace(ticket, token="")
+    return msgspec.structs.replace(ticket, pin="")

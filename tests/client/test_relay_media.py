@@ -11,9 +11,9 @@ from client.relay import RelayMedia, RelayTicket
 
 
 async def test_a_relay_that_is_no_janus_is_refused_by_name() -> None:
-    told = {"engine": "livekit", "relay": "0", "url": "wss://host", "feed": 7, "token": "a.b.c", "streams": []}
+    told = {"engine": "mediasoup", "relay": "0", "url": "wss://host", "feed": 7, "streams": []}
     ticket = msgspec.convert(told, RelayTicket)
-    with pytest.raises(ConnectFailed, match="not through a livekit"):
+    with pytest.raises(ConnectFailed, match="not through a mediasoup"):
         RelayMedia(ticket, lambda _: None)
 
 

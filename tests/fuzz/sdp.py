@@ -1,83 +1,76 @@
-"""What WHEP must withstand, as one function of bytes: offers, fragments, and what aiortc makes of an accepted offer.
+"""What WHEP must withstand, as one function of bytes: offers, fragments, and the answer to an accepted offer.
 
 The first byte chooses. Whatever the rest is: only the documented errors come out, and what is accepted keeps the
 bounds.
 """
 
-import asyncio
-import atexit
-import contextlib
 import functools
+import random
 
-from aiortc import RTCSessionDescription
+from OpenSSL import SSL
 
-from server.data_transport_private import tune_data_transport
+from rtc.certificate import Certificate
+from rtc.dtls import dtls_context
+from rtc.peer import Peer
+from rtc.sdp import LocalMedia, SdpError, SessionDescription, parse_description, write_description, write_fragment
+from server.agreed_channels import agreed_channels
 from server.errors import BadSdp, BadSdpFragment
-from server.media.aiortc_private import create_peer_connection, offered_extensions, restrict_ice_hosts
-from server.offer import MAX_CANDIDATES, MAX_SECTIONS, format_fragment, parse_fragment, prepare_offer
-from server.whep import candidate_of
+from server.media.codec_choice import known_codecs
+from server.offer import MAX_CANDIDATES, MAX_SECTIONS, parse_fragment, parse_offer
 
 __all__ = ["try_input"]
 
-SECONDS = 5.0  # that aiortc gets; it has no sockets to wait for here
 
-
-def offer(text: str) -> str | None:
-    """What is accepted is still accepted when it is read again, and unchanged."""
+def offer(text: str) -> SessionDescription | None:
+    """What is accepted says the same when it is written and read again."""
     try:
-        prepared = prepare_offer(text)
+        found = parse_offer(text)
+        agreed_channels([each for section in found.sections for each in section.channel_maps])
     except BadSdp:
         return None
-    if prepare_offer(prepared) != prepared:
-        raise AssertionError("an accepted offer changes when it is read again")
-    if len(offered_extensions(prepared)) > MAX_SECTIONS:
+    if len(found.sections) > MAX_SECTIONS:
         raise AssertionError("more sections than the bound")
-    if ".local " in "".join(line for line in prepared.splitlines() if line.startswith("a=candidate:")):
-        raise AssertionError("an mDNS name was left in")
-    return prepared
+    again = parse_description(write_description(found))
+    if [each.mid for each in again.sections] != [each.mid for each in found.sections]:
+        raise AssertionError("an accepted offer changes when it is written and read again")
+    return found
 
 
 def fragment(text: str) -> None:
     try:
         found = parse_fragment(text, "0")
-        for each in found.candidates:
-            candidate_of(each)
     except BadSdpFragment:
         return
     if len(found.candidates) > MAX_CANDIDATES:
         raise AssertionError("more candidates than the bound")
-    if found.username and found.password:
-        again = parse_fragment(format_fragment(found.username, found.password, "video", "0", []), "")
-        if again[:2] != found[:2]:
+    if found.ufrag and found.password:
+        again = parse_fragment(write_fragment(found, "video", "0"), "0")
+        if (again.ufrag, again.password) != (found.ufrag, found.password):
             raise AssertionError("credentials change on their way")
 
 
 def negotiation(text: str) -> None:
-    """aiortc may refuse an accepted offer in its own way; it must neither hang nor end the process."""
-    prepared = offer(text)
-    if prepared is not None:
-        _runner().run(_answer(prepared))
+    """An accepted offer has an answer, or is refused by name; the peer lives on either way."""
+    accepted = offer(text)
+    if accepted is None:
+        return
+    certificate, context = _identity()
+    peer = Peer(context, certificate.fingerprint, [], controlling=False, random=random.Random(1))
+    media = {each.mid: LocalMedia(known_codecs(each.kind), "sendonly") for each in accepted.sections if each.is_media}
+    try:
+        answer = peer.answer(accepted, media, 0.0)
+    except SdpError:
+        return
+    if len(answer.sections) != len(accepted.sections):
+        raise AssertionError("an answer has a section for each of the offer's (RFC 3264 6)")
+    peer.handle_timer(1.0)
+    peer.close(2.0)
 
 
 @functools.cache
-def _runner() -> asyncio.Runner:
-    restrict_ice_hosts([])  # no sockets
-    runner = asyncio.Runner()
-    atexit.register(runner.close)
-    return runner
-
-
-async def _answer(text: str) -> None:
-    pc = create_peer_connection()
-    try:
-        async with asyncio.timeout(SECONDS):
-            # `server/whep.py` catches whatever aiortc trips over, and says bad_sdp.
-            with contextlib.suppress(Exception):
-                await pc.setRemoteDescription(RTCSessionDescription(text, "offer"))
-                tune_data_transport(pc)
-                await pc.setLocalDescription(await pc.createAnswer())
-    finally:
-        await pc.close()
+def _identity() -> tuple[Certificate, SSL.Context]:
+    certificate = Certificate.generate()
+    return certificate, dtls_context(certificate)
 
 
 SCENES = (offer, fragment, negotiation)

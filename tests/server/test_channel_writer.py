@@ -1,68 +1,81 @@
-from collections.abc import Callable
 from typing import cast
 
-from aiortc import RTCDataChannel
-
+from rtc.channels import ChannelNotOpen
+from rtc.endpoint import Connection
+from rtc.sctp import MessageTooLarge
 from server.channel_writer import ChannelWriter
 
+CHANNEL = 4
 
-class FakeChannel:
-    """A data channel that takes texts but delivers only when told."""
+
+class FakeConnection:
+    """Has one data channel, which takes texts but delivers only when told."""
 
     def __init__(self) -> None:
-        self.readyState = "open"
-        self.bufferedAmount = 0
-        self.max_message_size = 100
+        self.peer = self
+        self.is_open = True
+        self.waiting = False
+        self.told_when_empty = 0
+        self.max_message = 100
         self.taken: list[str] = []
-        self._on_low: Callable[[], None] = lambda: None
 
-    def on(self, name: str, handler: Callable[[], None]) -> None:
-        assert name == "bufferedamountlow"
-        self._on_low = handler
+    def has_waiting(self, channel: int) -> bool:
+        assert channel == CHANNEL
+        return self.waiting
 
-    def send(self, text: str) -> None:
-        if len(text) > self.max_message_size:
-            raise ValueError(text)
+    def tell_when_empty(self, channel: int) -> None:
+        assert channel == CHANNEL
+        self.told_when_empty += 1
+
+    def send(self, channel: int, text: str) -> None:
+        assert channel == CHANNEL
+        if not self.is_open:
+            raise ChannelNotOpen(channel)
+        if len(text) > self.max_message:
+            raise MessageTooLarge(text)
         self.taken.append(text)
-        self.bufferedAmount += len(text)
-
-    def drain(self) -> None:
-        self.bufferedAmount = 0
-        self._on_low()
+        self.waiting = True
 
 
-def _writer() -> tuple[ChannelWriter, FakeChannel]:
-    channel = FakeChannel()
-    return ChannelWriter(cast(RTCDataChannel, channel)), channel
+def _writer() -> tuple[ChannelWriter, FakeConnection]:
+    connection = FakeConnection()
+    return ChannelWriter(cast(Connection, connection), CHANNEL), connection
 
 
-def test_an_idle_channel_is_written_to_at_once() -> None:
-    writer, channel = _writer()
+def _drain(writer: ChannelWriter, connection: FakeConnection) -> None:
+    connection.waiting = False
+    writer.flush()
+
+
+def test_an_idle_channel_is_written_to_at_once_and_nobody_has_to_say_when_it_is_empty() -> None:
+    writer, connection = _writer()
     writer.send("hello")
-    assert channel.taken == ["hello"]
+    assert connection.taken == ["hello"]
+    assert connection.told_when_empty == 0
 
 
-def test_while_bytes_are_buffered_only_the_newest_feedback_is_kept() -> None:
-    writer, channel = _writer()
+def test_while_a_message_waits_only_the_newest_feedback_is_kept() -> None:
+    writer, connection = _writer()
     for number in range(4):
         writer.send_newest(f"feedback {number}")
     writer.send("refusal")
-    assert channel.taken == ["feedback 0"]
-    channel.drain()
-    channel.drain()
-    assert channel.taken == ["feedback 0", "refusal", "feedback 3"]
+    assert connection.taken == ["feedback 0"]
+    assert connection.told_when_empty > 0
+    _drain(writer, connection)
+    _drain(writer, connection)
+    assert connection.taken == ["feedback 0", "refusal", "feedback 3"]
 
 
 def test_a_closed_channel_takes_nothing() -> None:
-    writer, channel = _writer()
-    channel.readyState = "closed"
+    writer, connection = _writer()
+    connection.is_open = False
     writer.send("hello")
-    assert channel.taken == []
+    assert connection.taken == []
 
 
-def test_a_text_that_the_remote_cannot_take_is_counted_and_does_not_hold_up_the_next() -> None:
-    writer, channel = _writer()
+def test_a_message_that_the_peer_cannot_take_is_left_out_and_counted() -> None:
+    writer, connection = _writer()
     writer.send("x" * 101)
-    writer.send("short")
-    assert channel.taken == ["short"]
-    assert writer.too_large == 1
+    writer.send("hello")
+    assert connection.taken == ["hello"]
+    assert writer.too_large == writer.lost == 1

@@ -1,7 +1,5 @@
 """Whatever serving one peer raises ends that peer, by name, counted and logged once; nobody else notices."""
 
-import asyncio
-import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any, NoReturn, cast
@@ -67,11 +65,20 @@ async def _raise_later(*_: object, **__: object) -> NoReturn:
 
 
 def _delivery(peer: WebRtcPeer) -> Any:
-    return cast(Any, peer)._media._deliveries[0]
+    return cast(Any, peer)._media.deliveries[0]
+
+
+def _connection(peer: WebRtcPeer) -> Any:
+    return cast(Any, peer)._connection
+
+
+def _stream(peer: WebRtcPeer) -> Any:
+    """The first that it gets, with all stages on its way out."""
+    return _connection(peer).peer.streams.outgoing[_delivery(peer).info.mid]
 
 
 def _answer(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_delivery(peer).sender, "_begin", _raise)
+    patch.setattr(_delivery(peer).stream, "join", _raise)
 
 
 def _queueing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
@@ -79,19 +86,23 @@ def _queueing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _packing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_delivery(peer).sender._packets, "packets", _raise)
+    patch.setattr(_connection(peer).peer, "frame_to_send", _raise)
 
 
-def _extensions(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_delivery(peer).sender._packets._extensions, "block", _raise)
+def _stage(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(_stream(peer).reports, "rtp", _raise)
 
 
 def _reporting(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_delivery(peer).sender, "report", _raise)
+    patch.setattr(_stream(peer).reports, "_report", _raise)
+
+
+def _receiving(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(_connection(peer).peer, "receive_datagram", _raise)
 
 
 def _rtcp(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_delivery(peer).sender, "_keyframe_requested", _raise)
+    patch.setattr(_delivery(peer).stream, "request_keyframe", _raise)
 
 
 def _message_in(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
@@ -111,7 +122,7 @@ def _message_out(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _flushing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(cast(Any, peer)._writers["control"], "_flush", _raise)
+    patch.setattr(cast(Any, peer)._writers["control"], "flush", _raise)
 
 
 def _showing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
@@ -123,14 +134,8 @@ def _closing_media(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> Non
     peer.end("the test ends it")
 
 
-def _closing_ice(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(peer.ice, "close", _raise_later)
-    peer.end("the test ends it")
-
-
-def _closing_sctp(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    assert peer.pc.sctp is not None
-    patch.setattr(peer.pc.sctp, "stop", _raise_later)  # aiortc's own `close` ends there, half done
+def _closing_connection(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(_connection(peer).peer, "close", _raise)
     peer.end("the test ends it")
 
 
@@ -164,8 +169,9 @@ CASES: list[tuple[str, Role, Plant]] = [
     ("media", "observer", _queueing),
     ("media", "operator", _queueing),
     ("media", "observer", _packing),
-    ("media", "operator", _extensions),
-    ("rtcp", "observer", _reporting),
+    ("media", "operator", _stage),
+    ("connection", "observer", _reporting),
+    ("connection", "operator", _receiving),
     ("rtcp", "operator", _rtcp),
     ("message in", "operator", _message_in),
     ("message out", "observer", _message_out),
@@ -173,8 +179,7 @@ CASES: list[tuple[str, Role, Plant]] = [
     ("message out", "operator", _flushing),
     ("participant", "observer", _showing),
     ("close", "observer", _closing_media),
-    ("close", "observer", _closing_ice),
-    ("close", "observer", _closing_sctp),
+    ("connection", "observer", _closing_connection),
     ("forget", "observer", _forgetting),
     ("end", "observer", _seeing_off),
 ]
@@ -185,16 +190,6 @@ async def _nine_others() -> AsyncIterator[tuple[Rig, list[_Viewer]]]:
     async with running_rig(max_offer_rate=100.0, max_offer_burst=100) as rig, AsyncExitStack() as stack:
         roles: list[Role] = ["operator", *["observer"] * OBSERVERS]  # type: ignore[list-item]
         yield rig, [await stack.enter_async_context(_watching(rig, role)) for role in roles]
-
-
-def _sockets() -> int:
-    links = []
-    for number in os.listdir("/proc/self/fd"):
-        try:
-            links.append(os.readlink(f"/proc/self/fd/{number}"))
-        except OSError:
-            continue
-    return sum(link.startswith("socket:") for link in links)
 
 
 def _faults(rig: Rig) -> dict[str, float]:
@@ -210,29 +205,12 @@ async def _gone(rig: Rig, peer: WebRtcPeer) -> None:
     await eventually(lambda: peer not in rig.webrtc_peers)
 
 
-async def _everything_is_given_back(rig: Rig, others: list[_Viewer], sockets: int) -> None:
+async def _everything_is_given_back(rig: Rig, others: list[_Viewer]) -> None:
     await eventually(lambda: len(rig.services.console.peers) == len(others))
     assert rig.services.console.peers.taken == len(others)
-    await eventually(lambda: _sockets() <= sockets)
+    assert rig.services.house.endpoint.connections == len(others)
     for other in others:
         await other.goes_on()
-
-
-async def test_a_peer_whose_ice_takes_too_long_to_close_leaves_no_connection_open(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("server.peer.CLOSE_TIMEOUT", 0.2)
-
-    async def hang() -> None:
-        await asyncio.Event().wait()
-
-    async with running_rig() as rig, _watching(rig, "observer"):
-        (peer,) = (each for each in rig.services.console.peers if isinstance(each, WebRtcPeer))
-        monkeypatch.setattr(peer.ice, "close", hang)
-        transport = peer.pc.getTransceivers()[0].receiver.transport
-        peer.end("the test ends it")
-        await eventually(lambda: not list(rig.services.console.peers))
-        assert (peer.pc.connectionState, transport.transport.state) == ("closed", "closed")
 
 
 async def test_a_fault_in_any_stage_of_one_peer_of_ten_ends_that_one_alone() -> None:
@@ -240,7 +218,7 @@ async def test_a_fault_in_any_stage_of_one_peer_of_ten_ends_that_one_alone() -> 
         for other in others:
             await other.goes_on()
         for stage, role, plant in CASES:
-            before, sockets = _faults(rig), _sockets()
+            before = _faults(rig)
             with pytest.MonkeyPatch.context() as patch, capture_logs() as logs:
                 async with _watching(rig, role) as victim:
                     await victim.goes_on()
@@ -249,10 +227,10 @@ async def test_a_fault_in_any_stage_of_one_peer_of_ten_ends_that_one_alone() -> 
                     if plant is _message_in:
                         victim.send("control", Ping(id=1))
                     elif plant is _rtcp:
-                        await victim.ask_for_keyframe(_delivery(peer).sender._ssrc)
+                        await victim.ask_for_keyframe(_stream(peer).parameters.ssrc)
                     await _gone(rig, peer)
                     assert peer.ended in ("internal error", "the test ends it"), plant
-                await _everything_is_given_back(rig, others, sockets)
+                await _everything_is_given_back(rig, others)
             after = _faults(rig)
             assert after == before | {f"peer {stage}": before.get(f"peer {stage}", 0.0) + 1}, (plant, after)
             told = [each for each in logs if each.get("where") == f"peer {stage}"]
@@ -263,7 +241,6 @@ async def test_a_fault_in_any_stage_of_one_peer_of_ten_ends_that_one_alone() -> 
 async def test_a_fault_while_an_offer_is_answered_refuses_it_by_name_and_keeps_nothing() -> None:
     async with running_rig() as rig, _watching(rig, "operator") as other:
         await other.goes_on()
-        sockets = _sockets()
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(rig.services.media, "attach", _raise)
             refused = _Viewer()
@@ -278,12 +255,11 @@ async def test_a_fault_while_an_offer_is_answered_refuses_it_by_name_and_keeps_n
         assert (answer.status_code, answer.json()["error"]) == (500, "internal_error")
         assert FAULT not in answer.text
         assert _faults(rig) == {"peer offer": 1}
-        await _everything_is_given_back(rig, [other], sockets)
+        await _everything_is_given_back(rig, [other])
 
 
 async def test_a_fault_when_the_transport_connects_ends_that_peer_alone() -> None:
     async with running_rig() as rig, _watching(rig, "operator") as other:
-        sockets = _sockets()
         victim = _Viewer()
         try:
             with pytest.MonkeyPatch.context() as patch:
@@ -300,7 +276,7 @@ async def test_a_fault_when_the_transport_connects_ends_that_peer_alone() -> Non
             await victim.close()
         assert _faults(rig) == {"peer answer": 1}
         assert rig.count("lockstep_peers_ended_total", why="internal error") == 1
-        await _everything_is_given_back(rig, [other], sockets)
+        await _everything_is_given_back(rig, [other])
 
 
 @pytest.mark.parametrize(("number", "answered"), [(4096, True), (4351, True), (255, True), (16, True), (256, False)])

@@ -1,5 +1,4 @@
-from server.media.voice_private import VoicePacket
-from server.voice_desk import MAX_PACKET, RATE, SPEAKS_FOR, VoiceDesk
+from server.voice_desk import MAX_PACKET, RATE, SPEAKS_FOR, VoiceDesk, VoicePacket
 
 
 def packet(number: int, size: int = 80) -> VoicePacket:

@@ -1,6 +1,7 @@
 """WHEP over real HTTP."""
 
 import asyncio
+import socket
 from typing import Any
 
 import httpx
@@ -9,12 +10,12 @@ from aiortc import RTCConfiguration, RTCPeerConnection
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from bench.free_port import free_port
 from robot_bridge.protocol.console import Role
 from robot_bridge.protocol.messages import Ping, Pong
-from server.data_transport_private import tune_data_transport
 from server.offer import parse_fragment
 from tests.server.offers import offer, section
-from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_console, running_rig
+from tests.server.rig import PATIENCE, Rig, TestPeer, running_console, running_rig
 
 SDP = {"Content-Type": "application/sdp"}
 FRAGMENT = {"Content-Type": "application/trickle-ice-sdpfrag"}
@@ -133,8 +134,8 @@ async def test_an_ice_restart_is_answered_with_new_credentials_and_a_new_tag() -
         answer = await rig.http.patch(peer.location, content=RESTART, headers=headers)
         assert answer.status_code == 200
         assert answer.headers["content-type"].startswith("application/trickle-ice-sdpfrag")
-        fragment = parse_fragment(answer.text, "")
-        assert fragment.username not in peer.pc.remoteDescription.sdp
+        fragment = parse_fragment(answer.text, "0")
+        assert fragment.ufrag not in peer.pc.remoteDescription.sdp
         assert len(fragment.password) >= 22
         assert fragment.candidates
         old = await rig.http.patch(peer.location, content=CANDIDATE, headers={**headers, "If-Match": peer.tag})
@@ -277,25 +278,20 @@ async def test_only_what_an_observer_sends_waits_for_its_turn(
     role: Role, waits: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A supervisor may drive, and says STOP on a channel as an operator does."""
-    tuned: list[bool] = []
-
-    def tune(pc: RTCPeerConnection, *, observes: bool = False) -> None:
-        tuned.append(observes)
-        tune_data_transport(pc, observes=observes)
-
-    monkeypatch.setattr("server.whep.tune_data_transport", tune)
     async with running_rig() as rig:
-        attached: list[bool] = []
-        attach = rig.services.media.attach
+        connected: list[dict[str, Any]] = []
+        connect = rig.services.house.endpoint.connect
 
-        def noted(*arguments: Any, **named: Any) -> Any:
-            attached.append(named["waits"])
-            return attach(*arguments, **named)
+        async def noted(*arguments: Any, **named: Any) -> Any:
+            connected.append(named)
+            return await connect(*arguments, **named)
 
-        monkeypatch.setattr(rig.services.media, "attach", noted)
+        monkeypatch.setattr(rig.services.house.endpoint, "connect", noted)
         headers = {**rig.token(role), **SDP}
         assert (await rig.http.post("/whep", content=await _real_offer(), headers=headers)).status_code == 201
-    assert (tuned, attached) == ([waits], [waits])
+    (named,) = connected
+    assert named["turns"].may_go_at_once() is not waits
+    assert (named["settings"].sctp.acknowledgement_delay > 0) is waits
 
 
 async def test_what_may_be_posted_is_said_and_there_is_nothing_to_get() -> None:
@@ -321,7 +317,7 @@ async def test_a_section_with_an_unknown_codec_is_rejected_and_the_peer_connects
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("a=setup:actpass\r\n", "section 0: needs a=fingerprint and a=setup"),
+        ("a=setup:actpass\r\n", "section 0: needs a=setup"),
         ("a=rtcp-mux\r\n", "section 0: needs a=rtcp-mux"),
     ],
 )
@@ -347,21 +343,33 @@ async def test_whoever_wants_all_streams_is_told_when_an_offer_has_too_few_secti
         assert (await _post(rig, enough, "/whep?sections=some")).status_code == 422
 
 
-async def test_an_offer_that_cannot_be_answered_in_time_leaves_no_socket_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with running_rig() as rig:
-        loop, opened = asyncio.get_running_loop(), list[asyncio.BaseTransport]()
-        create = loop.create_datagram_endpoint
+async def test_an_offer_that_cannot_be_answered_in_time_leaves_no_connection(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The STUN server never answers, so that the console waits for an address of its own."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        stun = f"stun:127.0.0.1:{silent.getsockname()[1]}"
+        async with running_rig(stun=(stun,), relay_console=True) as rig:
+            monkeypatch.setattr("server.whep.NEGOTIATION_TIMEOUT", 0.1)
+            headers = {**rig.token("operator"), "Content-Type": "application/sdp"}
+            answer = await rig.http.post("/whep", content=offer(section("0")), headers=headers)
+            assert (answer.status_code, answer.json()["error"]) == (400, "bad_sdp")
+            assert len(rig.services.console.peers) == 0
+            monkeypatch.setattr("server.whep.NEGOTIATION_TIMEOUT", 10.0)
+            answer = await rig.http.post("/whep", content=offer(section("0")), headers=headers)
+            assert answer.status_code == 201, "what was given up holds nobody up"
 
-        async def slowly(*what: Any, **more: Any) -> Any:
-            made = await create(*what, **more)
-            opened.append(made[0])
-            await asyncio.sleep(0.2)  # a busy machine
-            return made
 
-        monkeypatch.setattr(loop, "create_datagram_endpoint", slowly)
-        monkeypatch.setattr("server.whep.NEGOTIATION_TIMEOUT", 0.1)
-        headers = {**rig.token("operator"), "Content-Type": "application/sdp"}
-        answer = await rig.http.post("/whep", content=offer(section("0")), headers=headers)
-        assert (answer.status_code, answer.json()["error"]) == (400, "bad_sdp")
-        assert opened
-        await eventually(lambda: all(each.is_closing() for each in opened))
+async def test_all_peers_come_to_the_one_port_that_was_set_by_udp_and_by_tcp() -> None:
+    port = free_port()
+    async with running_rig(ice_hosts=("127.0.0.1",), media_port=port, media_tcp=True) as rig:
+        for role in ("observer", "operator"):
+            headers = {**rig.token(role), **SDP}
+            answer = await rig.http.post("/whep", content=await _real_offer(), headers=headers)
+            found = [line.split() for line in answer.text.splitlines() if line.startswith("a=candidate:")]
+            assert {(each[2], each[4], each[5]) for each in found} == {
+                ("udp", "127.0.0.1", str(port)),
+                ("tcp", "127.0.0.1", str(port)),
+            }
+        async with rig.peer("observer") as peer:
+            peer.send("control", Ping(id=7))
+            await peer.until(lambda each: each == Pong(id=7))

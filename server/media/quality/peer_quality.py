@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from robot_bridge.protocol.console import Quality, Report, StreamQuality, Tier
 from robot_bridge.protocol.serial import event_gap
-from server.media.pacer import Pacer
-from server.media.packet_stream import SenderStats
 from server.media.peer_stream import PeerStream
 from server.media.quality.observer_tier import ObserverTier
 from server.media.quality.path import PathController, RateLimits, Reason
 from server.media.quality.plan import PictureTier
+from server.media.rtp_sender import SenderStats
 
 if TYPE_CHECKING:
-    from server.media.aiortc_private import MediaSender
     from server.media.audio_stream import AudioStream
     from server.media.video_stream import VideoStream
 
@@ -59,7 +57,7 @@ class PeerQuality:
         self.relays = False  # a relay, with many behind it
         self.cameras: list[CameraLink] = []  # the main one first
         self.sounds: list[SoundLink] = []
-        self.pacer = Pacer()
+        self.pace: Callable[[float | None], None] = lambda rate: None  # bit/s that the path carries; None: no limit
         self.path = PathController(limits, clock())
         self.choice = ObserverTier(clock())
         self.tier = tier  # what its pictures are made for
@@ -102,7 +100,7 @@ class PeerQuality:
     def stats(self) -> list[SenderStats]:
         return [camera.sender.stats for camera in self.cameras]
 
-    def reception(self, sender: "MediaSender", lost: int, expected: int, round_trip: float | None) -> None:
+    def reception(self, lost: int, expected: int, round_trip: float | None) -> None:
         """A receiver report about one of its streams, sound included: each tells of the one path."""
         self.path.received(lost, expected, round_trip, self._clock())
 
@@ -132,7 +130,7 @@ class PeerQuality:
         before = self.path.rate
         self.path.sent(sum(stats.octets for stats in self.stats()), now)
         self.path.decide(now)
-        self.pacer.limit(self.path.rate if self.path.limited else None)
+        self.pace(self.path.rate if self.path.limited else None)
         return self.path.reason if self.path.rate < before else None
 
     def tell(self, streams: list[StreamQuality], crowd: int) -> None:

@@ -1,6 +1,5 @@
 """A crowd's pictures and sound, end to end: real peers on loopback. Three observers are a crowd here."""
 
-import asyncio
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from typing import Any, cast
 
@@ -15,7 +14,7 @@ from server.media.quality.crowd import AFTER
 from tests.server.media.camera_h264 import camera_pictures
 from tests.server.media.feeding import read_stamp, value
 from tests.server.media.test_recorded_output import Taken
-from tests.server.media.viewer import TIMEOUT, Viewer, description, noise, picture, running_plane, sound, viewing
+from tests.server.media.viewer import Viewer, description, noise, picture, running_plane, sound, viewing
 
 PICTURES = 12
 
@@ -29,11 +28,17 @@ def feed(plane: MediaPlane, number: int) -> None:
 
 
 async def watching(
-    stack: AsyncExitStack, plane: MediaPlane, count: int, *, priority: bool = False, thumbnail: bool = False
+    stack: AsyncExitStack,
+    plane: MediaPlane,
+    count: int,
+    *,
+    priority: bool = False,
+    thumbnail: bool = False,
+    relays: bool = False,
 ) -> list[Viewer]:
     def one() -> AbstractAsyncContextManager[Viewer]:
         uris = {EVENT_REFERENCE_URI: 5}
-        return viewing(plane, ["video"], uris=uris, priority=priority, thumbnail=thumbnail)
+        return viewing(plane, ["video"], uris=uris, priority=priority, thumbnail=thumbnail, relays=relays)
 
     return [await stack.enter_async_context(one()) for _ in range(count)]
 
@@ -48,25 +53,6 @@ async def came(viewer: Viewer, number: int) -> None:
     await viewer.until(lambda: stamps(viewer)[-1:] == [number])
 
 
-class Relay:
-    """Keeps what it is given."""
-
-    def __init__(self) -> None:
-        self.stamps: list[int] = []
-        self._news = asyncio.Event()
-
-    def __call__(self, frame: EncodedFrame) -> bool:
-        self.stamps.append(frame.stamp)
-        self._news.set()
-        return True
-
-    async def until(self, stamp: int) -> None:
-        async with asyncio.timeout(TIMEOUT):
-            while stamp not in self.stamps:
-                self._news.clear()
-                await self._news.wait()
-
-
 async def begin(plane: MediaPlane, everybody: list[Viewer], second: int) -> None:
     """Feed pictures that come so seldom that a crowd gets them all, until everybody is in its tier."""
     for number in range(30 * second, 30 * second + 90, 30):
@@ -75,14 +61,10 @@ async def begin(plane: MediaPlane, everybody: list[Viewer], second: int) -> None
             await came(viewer, number)
 
 
-async def show(
-    plane: MediaPlane, whole: list[Viewer], crowd: list[Viewer], second: int, relay: Relay | None = None
-) -> None:
-    """Feed pictures 30 times a second: `whole` and `relay` get all of them, and `crowd` the first of every two."""
+async def show(plane: MediaPlane, whole: list[Viewer], crowd: list[Viewer], second: int) -> None:
+    """Feed pictures 30 times a second: `whole` get all of them, and `crowd` the first of every two."""
     for number in range(30 * second, 30 * second + PICTURES):
         feed(plane, number)
-        if relay is not None:
-            await relay.until(number)
         for viewer in whole if number % 2 else [*whole, *crowd]:
             await came(viewer, number)
     for viewer in crowd:
@@ -101,19 +83,17 @@ async def test_a_crowd_gets_every_second_picture_and_the_operator_and_a_relay_al
         plane = await stack.enter_async_context(running_plane(description(microphones=0), crowd_observers=2))
         (operator,) = await watching(stack, plane, 1, priority=True)
         crowd = await watching(stack, plane, 3)
-        relay = Relay()
-        relayed = plane.hand_over(lambda _: relay, "H264")
+        (relay,) = await watching(stack, plane, 1, relays=True)
         assert [viewer.media.tier for viewer in (operator, *crowd)] == ["operator", "high", "high", "high"]
-        await begin(plane, [operator, *crowd], 1)
+        await begin(plane, [operator, relay, *crowd], 1)
         before = value(plane, "tier_frames_encoded_total", stream="camera0", tier="crowd")
-        await show(plane, [operator], crowd, 10, relay)
+        await show(plane, [operator, relay], crowd, 10)
         assert value(plane, "tier_frames_encoded_total", stream="camera0", tier="crowd") == before + PICTURES / 2
         desk(plane)._whole_since = float("-inf")  # the operator's serve the high tier
         desk(plane).tick()
-        await begin(plane, [operator, *crowd], 20)
-        await show(plane, [operator], crowd, 30, relay)
+        await begin(plane, [operator, relay, *crowd], 20)
+        await show(plane, [operator, relay], crowd, 30)
         assert len(cast(Any, plane)._streams["camera0"]._encoders) == 2
-        relayed.detach()
 
 
 async def test_when_a_crowd_has_dispersed_who_stays_gets_everything_and_has_missed_nothing() -> None:
@@ -191,11 +171,10 @@ async def test_operators_thumbnails_and_relays_are_no_crowd() -> None:
         first, second = await watching(stack, plane, 2, priority=True)
         others = [second, *await watching(stack, plane, 1, thumbnail=True), *await watching(stack, plane, 2)]
         first.media.drives(True)
-        relay = plane.hand_over(lambda _: lambda frame: True)
+        others += await watching(stack, plane, 1, relays=True)
         desk(plane).tick()
         assert desk(plane)._crowd.divisor == 1
-        assert [viewer.media.quality.encoded_as for viewer in others] == ["high", "low", "high", "high"]
-        relay.detach()
+        assert [viewer.media.quality.encoded_as for viewer in others] == ["high", "low", "high", "high", "high"]
 
 
 async def test_one_of_a_crowd_who_takes_control_gets_everything() -> None:

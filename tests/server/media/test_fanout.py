@@ -13,7 +13,6 @@ class FakeTarget:
         self.name = name
         self.priority = priority
         self.blocked = False
-        self.paced = False
         self.frames: list[EncodedFrame] = []
         self.fault: Exception | None = None  # raised when it is served
         self.failures: list[Exception] = []
@@ -146,3 +145,21 @@ async def test_a_target_that_leaves_while_a_frame_is_handed_out_is_no_trouble_to
     leaving.failed = lambda error: targets.pop(leaving)  # type: ignore[method-assign]
     fan_out.publish(frame(1), targets)
     assert log == ["last:1"]
+
+
+async def test_a_stream_whose_pacer_is_empty_again_is_served_the_operators_at_once_and_an_observers_in_its_turn() -> (
+    None
+):
+    log: list[str] = []
+    clock = FakeClock()
+    operator, observer = FakeTarget(log, "operator:", clock, priority=True), FakeTarget(log, "observer:", clock)
+    fan_out = FanOut(LoopTurns(clock, 0.001))
+    operator.blocked = observer.blocked = True
+    fan_out.publish(frame(1), [operator, observer])
+    await asyncio.sleep(0)
+    operator.blocked = observer.blocked = False
+    fan_out.serve_again(observer)
+    fan_out.serve_again(operator)
+    assert log == ["operator:1"]
+    await asyncio.sleep(0)
+    assert log == ["operator:1", "observer:1"]

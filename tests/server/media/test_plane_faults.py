@@ -3,14 +3,14 @@
 import asyncio
 from typing import Any, NoReturn, cast
 
-import pylibsrtp
 import pytest
 from aiortc.rtp import RtcpPsfbPacket, RtcpRtpfbPacket
 
-from server.media.aiortc_private import MediaSender, create_peer_connection
+from rtc.endpoint import Endpoint
 from server.media.frame import EncodedFrame
 from server.media.packetise import packetise_sound
 from server.media.picture_encoder import H264Encoder
+from server.media.rtp_sender import RtpSender
 from server.media.sound_encoder import OpusEncoder
 from server.media.stream import MAX_AT_ONCE
 from tests.server.media.feeding import refused, stream, value
@@ -144,19 +144,16 @@ async def test_malformed_packets_of_a_peer_are_counted_and_media_flow_on() -> No
     async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
         await stream(plane, viewer, "video", picture, 2)
         peer = cast(Any, viewer.pc.getTransceivers()[0].receiver.transport)
-        # REMB that announces more sources than it has: aiortc's router does not expect it.
+        # REMB that announces more sources than it has
         short = RtcpPsfbPacket(fmt=15, ssrc=1, media_ssrc=0, fci=b"REMB\x05\x00\x00\x00")
         await peer._send_rtp(bytes(short))
-        theirs = cast(Any, viewer.server.getTransceivers()[0].receiver.transport).transport._connection
-        theirs._nominated[1].protocol.datagram_received(b"", ("127.0.0.1", 9))
         await peer.transport._send(b"\x80" + bytes(1600))
         await peer.transport._send(b"\x80" + bytes(40))  # not SRTP
-        sender = sender_of(viewer)
-        nack = RtcpRtpfbPacket(fmt=1, ssrc=1, media_ssrc=sender._ssrc, lost=[1, 2, 3])
+        nack = RtcpRtpfbPacket(fmt=1, ssrc=1, media_ssrc=viewer.ssrc, lost=[1, 2, 3])
         await peer._send_rtp(bytes(nack))
         await viewer.until(lambda: viewer.media.stats[viewer.media.streams[0].mid].not_retransmitted == 3)
-        assert value(plane, "malformed_from_peers_total", kind="malformed") == 1
-        assert value(plane, "malformed_from_peers_total", kind="datagram_size") == 2
+        dropped = viewer.connection.peer.dropped
+        assert (dropped["rtcp_malformed"], dropped["srtp_malformed"] + dropped["srtp_authentication"]) == (1, 2)
         await stream(plane, viewer, "video", picture, 2, first=3)
 
 
@@ -183,50 +180,14 @@ def refuse(*args: Any) -> NoReturn:
     raise ValueError("no")
 
 
-async def test_a_sender_without_a_connected_transport_sends_nothing() -> None:
+async def test_a_sender_without_a_path_sends_nothing() -> None:
     frame = EncodedFrame(b"x", packetise_sound, keyframe=True, marker=True, stamp=1, capture_time=0.0, media_time=0)
     async with running_plane() as plane:
         async with viewing(plane, ["video"]) as viewer:
             sender = sender_of(viewer)
-        assert sender.transmit(frame) == (0, 0)
-        sender.report()
-        sender._retransmit_all([1])
-        await sender._handle_rtcp_packet(RtcpRtpfbPacket(fmt=1, ssrc=1, media_ssrc=sender._ssrc, lost=[1]))
-        await sender.stop()
-        pc = create_peer_connection()
-        try:
-            new = MediaSender(
-                pc.addTransceiver("video"),
-                "camera0",
-                trailer=False,
-                on_ready=refuse,
-                on_keyframe_request=refuse,
-                on_stopped=lambda: None,
-            )
-            assert new.transmit(frame) == (0, 0)
+        assert sender.transmit(frame) is None, "its connection has ended"
+        async with Endpoint(["127.0.0.1"]) as endpoint:
+            new = RtpSender(endpoint.connect(controlling=False), "0", "none", video=True, wall_clock=0.0)
+            assert new.transmit(frame) is None, "it has no connection yet"
             assert new.stats.packets == 0
-            new.report()
-            await new._handle_rtcp_packet(RtcpPsfbPacket(fmt=1, ssrc=1, media_ssrc=1))
-            await new.stop()
-        finally:
-            await pc.close()
-
-
-async def test_what_encryption_refuses_is_counted_and_the_next_frame_passes() -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], priority=True) as viewer:
-        await stream(plane, viewer, "video", picture, 2)
-        sender = sender_of(viewer)
-        session = cast(Any, sender.transport)._tx_srtp
-        sent = viewer.received[-1].packet.sequence_number
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(session, "protect", refuse)
-            patch.setattr(session, "protect_rtcp", refuse_srtp)
-            await refused(plane, picture(3, 1.0))
-            sender._retransmit_all([sent])
-            sender.report()
-            assert sender.stats.failed == 3
-        await stream(plane, viewer, "video", picture, 2, first=60)
-
-
-def refuse_srtp(*args: Any) -> NoReturn:
-    raise pylibsrtp.Error("no")
+            assert not new.paced

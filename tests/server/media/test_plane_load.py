@@ -12,7 +12,7 @@ from aiortc.rtp import RtcpPsfbPacket
 from robot_bridge.protocol.carriers import (
     EVENT_REFERENCE_URI,
 )
-from server.media.header_extensions import ABS_SEND_TIME_URI
+from rtc.rtp.extensions import ABS_SEND_TIME_URI
 from tests.server.media.feeding import read_stamp, stream, timestamps, value
 from tests.server.media.viewer import (
     TIMEOUT,
@@ -64,9 +64,8 @@ async def test_a_joining_peer_gets_a_keyframe_with_the_next_picture() -> None:
 async def test_a_storm_of_picture_loss_indications_is_merged() -> None:
     async with running_plane(keyframe_spacing_seconds=0.3) as plane, viewing(plane, ["video"]) as viewer:
         await stream(plane, viewer, "video", picture, 2)
-        sender = sender_of(viewer)
         for i in range(3, 33):  # 0.6 s, one request per picture
-            await sender._handle_rtcp_packet(RtcpPsfbPacket(fmt=1, ssrc=1, media_ssrc=sender._ssrc))
+            viewer.tell(bytes(RtcpPsfbPacket(fmt=1, ssrc=1, media_ssrc=viewer.ssrc)))
             await stream(plane, viewer, "video", picture, 1, first=i)
         assert value(plane, "keyframe_requests_total", stream="camera0", cause="pli") == 30
         assert value(plane, "keyframes_total", stream="camera0", codec="H264") == 2
@@ -151,13 +150,12 @@ async def test_the_newest_picture_wins_and_the_newest_sound_is_kept_while_the_en
 
 def block(viewer: Viewer) -> Callable[[], None]:
     """Make the server's socket to a viewer look full; returns what makes it look free again."""
-    connection = cast(Any, viewer.server.getTransceivers()[0].receiver.transport).transport._connection
-    transport = connection._nominated[1].protocol.transport
-    original = transport.get_write_buffer_size
-    transport.get_write_buffer_size = lambda: 10**9
+    endpoint = cast(Any, viewer.connection)._endpoint  # each viewer of these tests has one of its own
+    original = endpoint.is_blocked
+    endpoint.is_blocked = lambda path: True
 
     def free() -> None:
-        transport.get_write_buffer_size = original
+        endpoint.is_blocked = original
 
     return free
 

@@ -19,7 +19,6 @@ from tests.server.media.viewer import (
     description,
     noise,
     running_plane,
-    sender_of,
     viewing,
 )
 
@@ -133,7 +132,7 @@ async def test_the_operators_tier_is_for_who_holds_the_seat() -> None:
         supervisor.media.drives(True)
         desk(plane).tick()
         assert [peer.media.tier for peer in (first, second, supervisor)] == ["high", "high", "operator"]
-        assert supervisor.media._deliveries[0].target.priority
+        assert supervisor.media.deliveries[0].target.priority
         supervisor.media.drives(False)
         desk(plane).tick()
         assert [peer.media.tier for peer in (first, second, supervisor)] == ["operator", "operator", "high"]
@@ -170,9 +169,6 @@ async def test_receiver_reports_give_loss_and_round_trip() -> None:
         assert viewer.media.loss is None
         assert viewer.media.round_trip_ms is None
         await show(plane, [viewer], 1, 3)
-        viewer.media.send_reports()
-        peer = cast(Any, viewer.pc.getTransceivers()[0].receiver)
-        await viewer.until(lambda: bool(peer._RTCRtpReceiver__lsr))
         await viewer.until(lambda: viewer.media.round_trip_ms is not None)
         assert viewer.media.loss == 0
 
@@ -184,7 +180,6 @@ async def test_with_quality_off_everybody_gets_one_tier_with_everything() -> Non
         observer = await stack.enter_async_context(viewing(plane, ["video"]))
         await show(plane, [operator, observer], 1, 3)
         assert encoders(plane) == 1
-        assert sender_of(operator)._pacer is None
 
 
 async def test_while_the_operators_path_is_paused_no_picture_is_encoded_for_it() -> None:

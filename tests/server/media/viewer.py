@@ -1,20 +1,25 @@
 """A receiving peer for tests, and a plane to feed it. The signalling is a function call."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCRtpReceiver, RTCSessionDescription
-from aiortc.codecs import depayload
+from aiortc.codecs import CODECS, depayload
+from aiortc.rtcrtpparameters import RTCRtpCodecParameters
 from aiortc.rtp import RtpPacket, unpack_header_extensions
 from prometheus_client import CollectorRegistry
 
 from robot_bridge.protocol.description import Axis, Camera, Microphone, RobotDescription
 from robot_bridge.protocol.messages import Media
-from server.media.aiortc_private import MediaSender, create_peer_connection
+from rtc.endpoint import Connection, Endpoint
+from rtc.peer_events import Connected, MediaEvent, PeerEvent
+from rtc.sdp import parse_description, write_description
 from server.media.plane import MediaPlane, MediaSettings, PeerMedia
+from server.media.rtp_sender import RtpSender
 
 WIDTH, HEIGHT = 160, 120
 TIMEOUT = 10.0
@@ -86,9 +91,10 @@ class Received:
 class Viewer:
     """Receives; keeps every packet."""
 
-    def __init__(self, pc: RTCPeerConnection, server: RTCPeerConnection, media: PeerMedia, answer: str) -> None:
+    def __init__(self, pc: RTCPeerConnection, connection: Connection, media: PeerMedia, answer: str) -> None:
         self.pc = pc
-        self.server = server
+        self.connection = connection  # the plane's end
+        self.connected = asyncio.Event()  # it is
         self.media = media
         self.answer = answer
         self.received: list[Received] = []
@@ -110,6 +116,28 @@ class Viewer:
         task = asyncio.get_running_loop().create_task(self.changed())
         self._changing.add(task)
         task.add_done_callback(self._changing.discard)
+
+    def heard(self, event: PeerEvent) -> None:
+        """An event of the plane's end, as a peer of the console hands it on."""
+        if isinstance(event, Connected):
+            self.media.connected()
+            self.connected.set()
+        elif isinstance(event, MediaEvent):
+            self.media.heard(event.mid, event.event)
+
+    def tell(self, compound: bytes) -> None:
+        """Let the plane's end have an RTCP packet, as if it came decrypted from the peer."""
+        streams = self.connection.peer.streams
+        assert streams is not None
+        streams.receive_rtcp(compound, asyncio.get_running_loop().time())
+        self.connection.flush()
+
+    @property
+    def ssrc(self) -> int:
+        """Of the first stream."""
+        streams = self.connection.peer.streams
+        assert streams is not None
+        return streams.outgoing[self.media.streams[0].mid].parameters.ssrc
 
     def of(self, kind: str) -> list[Received]:
         """Packets of the first section of a kind, without retransmissions."""
@@ -146,6 +174,21 @@ def with_extensions(offer: str, uris: dict[str, int]) -> str:
     return offer.replace("a=rtcp-mux\r\n", lines + "a=rtcp-mux\r\n")
 
 
+@contextmanager
+def high_profiles() -> Iterator[None]:
+    """While entered, aiortc offers H.264 of Main and High too, as browsers do."""
+    before = list(CODECS["video"])
+    main = next(codec for codec in before if codec.name == "H264")
+    for number, profile in ((120, "4d001f"), (122, "64001f")):
+        parameters = {**main.parameters, "profile-level-id": profile}
+        repair = RTCRtpCodecParameters("video/rtx", 90_000, None, number + 1, [], {"apt": number})
+        CODECS["video"] += [replace(main, payloadType=number, parameters=parameters), repair]
+    try:
+        yield
+    finally:
+        CODECS["video"][:] = before
+
+
 def prefer(pc: RTCPeerConnection, codecs: Sequence[str]) -> None:
     for transceiver in pc.getTransceivers():
         capabilities = RTCRtpReceiver.getCapabilities(transceiver.kind)
@@ -168,54 +211,53 @@ async def viewing(
     priority: bool = False,
     trailer: bool = False,
     thumbnail: bool = False,
+    relays: bool = False,
 ) -> AsyncIterator[Viewer]:
     """A viewer whose media are flowing when this returns."""
-    pc, server = RTCPeerConnection(RTCConfiguration(iceServers=[])), create_peer_connection()
+    pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
     try:
         for kind in kinds:
             pc.addTransceiver(kind, direction="recvonly")
         prefer(pc, codecs)
         await pc.setLocalDescription(await pc.createOffer())
-        offer = with_extensions(pc.localDescription.sdp, uris or {})
-        await server.setRemoteDescription(RTCSessionDescription(offer, "offer"))
-        media = plane.attach(server, offer, priority=priority, waits=not priority, trailer=trailer, thumbnail=thumbnail)
-        await server.setLocalDescription(await server.createAnswer())
-        answer = server.localDescription.sdp
-        viewer = Viewer(pc, server, media, answer)
-        _record(viewer, {identifier: uri for uri, identifier in _answered(answer).items()})
-        _notify_of_server_input(viewer)
-        await pc.setRemoteDescription(RTCSessionDescription(answer, "answer"))
-        await _connected(pc)
-        await _connected(server)
-        yield viewer
+        offer = parse_description(with_extensions(pc.localDescription.sdp, uris or {}))
+        async with Endpoint(["127.0.0.1"]) as endpoint:
+            turns = plane.turns_of(waits=not priority)
+            connection = endpoint.connect(controlling=False, turns=turns)
+            plan = plane.plan(offer, trailer=trailer, thumbnail=thumbnail)
+            answer = write_description(connection.answer(offer, plan.media))
+            if relays:  # with what it asks for, and treated as a relay
+                media = plane.publish(connection, plan)
+            else:
+                media = plane.attach(connection, plan, priority=priority, turns=turns)
+            viewer = Viewer(pc, connection, media, answer)
+            connection.listen(viewer.heard)
+            _notify_of_server_input(viewer)
+            _record(viewer, {identifier: uri for uri, identifier in _answered(answer).items()})
+            await pc.setRemoteDescription(RTCSessionDescription(answer, "answer"))
+            await _connected(pc)
+            async with asyncio.timeout(TIMEOUT):
+                await viewer.connected.wait()
+            yield viewer
+            await media.close()
     finally:
-        await server.close()
         await pc.close()
 
 
-def sender_of(viewer: Viewer) -> MediaSender:
+def sender_of(viewer: Viewer) -> RtpSender:
     """What sends the viewer's first stream over RTP."""
-    sender = viewer.media._deliveries[0].sender
-    assert isinstance(sender, MediaSender)
-    return sender
+    return viewer.media.deliveries[0].sender
 
 
 def _notify_of_server_input(viewer: Viewer) -> None:
-    """Wake `until` after everything the server receives, too."""
-    for transport in {cast(Any, t.receiver.transport) for t in viewer.server.getTransceivers()}:
-        receive, intake = transport._recv_next, transport.transport._connection._queue
-        handled = intake._handled  # most datagrams do not come to `_recv_next`
+    """Wake `until` after everything the plane's end receives, too."""
+    settle = viewer.connection.settle
 
-        async def received(receive: Any = receive) -> None:
-            await receive()
-            await viewer.changed()
+    def settle_and_tell() -> None:
+        settle()
+        viewer.change_soon()
 
-        def handled_and_told(data: bytes, handled: Any = handled) -> bool:
-            viewer.change_soon()
-            return bool(handled(data))
-
-        transport._recv_next = received
-        intake._handled = handled_and_told
+    cast(Any, viewer.connection).settle = settle_and_tell
 
 
 def _answered(answer: str) -> dict[str, int]:

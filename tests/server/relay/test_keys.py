@@ -12,15 +12,15 @@ from server.relay.desk import RelayDesk
 from server.relay.publication import Publication
 from server.relay.relay_settings import RelaySettings
 from server.relay.station import Station
-from server.relay.tickets import JanusTicket
+from server.relay.tickets import RelayTicket
 from tests.server.relay.test_desk import Relays
 
 
 class _Keyed(Relays):
     """An engine whose tickets have the feed for a PIN."""
 
-    def ticket(self, station: Station) -> JanusTicket:
-        return JanusTicket(
+    def ticket(self, station: Station) -> RelayTicket:
+        return RelayTicket(
             relay=station.name, url="ws://a.example", feed=station.feed, streams=[], room=1, pin=str(station.feed)
         )
 
@@ -41,7 +41,7 @@ class _Hall:
         self.ended: set[str] = set()
         self.now = 100.0
         settings = RelaySettings(relay=("janus:ws://a.example/1",), observers_direct=0)
-        self.desk = RelayDesk(settings, {"janus": self.relays}, lambda: self.here, self.has_ended, lambda: self.now)
+        self.desk = RelayDesk(settings, self.relays, lambda: self.here, self.has_ended, lambda: self.now)
 
     def has_ended(self, link: str, expires: float) -> bool:
         return link in self.ended or self.now >= expires
@@ -78,7 +78,7 @@ async def test_when_the_link_of_anybody_who_has_the_key_ends_it_is_made_anew(mon
         watcher = hall.watch("mallory")
         first = hall.relays.carrying["0"]
         ticket = hall.desk.key(watcher)
-        assert isinstance(ticket, JanusTicket)
+        assert isinstance(ticket, RelayTicket)
         assert ticket.pin == str(first.feed)
         hall.here.remove(watcher)  # the line is closed, the key is kept
         hall.ended.add("mallory")

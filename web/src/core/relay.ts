@@ -3,25 +3,14 @@ import type { StreamInfo } from "../wire";
 import { isRecord } from "./schema_check";
 
 /** Where an observer watches instead of at the console (GET /api/relay). */
-export type RelayTicket = JanusTicket | LiveKitTicket;
-
-interface AnyTicket {
+export interface RelayTicket {
+  readonly engine: "janus";
   readonly relay: string;
   readonly url: string; // WebSocket
-  readonly feed: number; // another one with every publication
-  readonly streams: readonly StreamInfo[]; // `mid` is the publisher's
-}
-
-export interface JanusTicket extends AnyTicket {
-  readonly engine: "janus";
   readonly room: number;
-  readonly pin: string;
-}
-
-export interface LiveKitTicket extends AnyTicket {
-  readonly engine: "livekit";
-  readonly token: string; // good for a minute, to come in
-  readonly publisher: string; // whose tracks and messages count
+  readonly pin: string; // lets in; "" in the first answer, which only says where
+  readonly feed: number; // the publisher; another one with every publication
+  readonly streams: readonly StreamInfo[]; // `mid` is the publisher's
 }
 
 /** One message of a Janus. */
@@ -39,20 +28,11 @@ const ENDED = ["hangup", "detached", "timeout"];
 export function parseRelayAnswer(answer: unknown): RelayTicket | null {
   const found = isRecord(answer) ? answer["relay"] : null;
   if (!isRecord(found)) return null;
-  const { engine, relay, url, feed, streams: listed } = found;
-  if (typeof relay !== "string" || typeof url !== "string" || typeof feed !== "number") return null;
+  const { engine, relay, url, room, pin, feed, streams: listed } = found;
+  if (engine !== "janus" || typeof relay !== "string" || typeof url !== "string") return null;
+  if (typeof room !== "number" || typeof pin !== "string" || typeof feed !== "number") return null;
   const streams = Array.isArray(listed) ? listed.filter(isStream) : [];
-  const { room, pin, token, publisher } = found;
-  if (engine === "janus" && typeof room === "number" && typeof pin === "string")
-    return { engine, relay, url, feed, streams, room, pin };
-  if (engine === "livekit" && typeof token === "string" && typeof publisher === "string")
-    return { engine, relay, url, feed, streams, token, publisher };
-  return null;
-}
-
-/** Whether it lets in; the first answer only says where. */
-export function hasKey(ticket: RelayTicket): boolean {
-  return (ticket.engine === "janus" ? ticket.pin : ticket.token) !== "";
+  return { engine, relay, url, room, pin, feed, streams };
 }
 
 function isStream(value: unknown): value is StreamInfo {
@@ -62,7 +42,7 @@ function isStream(value: unknown): value is StreamInfo {
 }
 
 /** The mids that one asks for: pictures and sound as named, and the feedback behind them. */
-export function wantedMids(ticket: JanusTicket): string[] {
+export function wantedMids(ticket: RelayTicket): string[] {
   return [...ticket.streams.map((stream) => stream.mid), String(ticket.streams.length)];
 }
 

@@ -35,26 +35,3 @@ export function levelOf(samples: Float32Array): number {
   const power = samples.reduce((sum, sample) => sum + sample * sample, 0) / samples.length;
   return power === 0 ? -Infinity : 10 * Math.log10(power);
 }
-
-/** One packet of a message that holds several. */
-export interface SoundPacket {
-  readonly stream: number; // the ticket's, by its number
-  readonly time: number; // RTP timestamp
-  readonly data: Uint8Array; // with its trailer
-}
-
-const HEAD = 7; // bytes: stream 1, time 4, length 2
-
-/** The packets of a sound message; what is cut off is left out. */
-export function splitSounds(message: Uint8Array): SoundPacket[] {
-  const view = new DataView(message.buffer, message.byteOffset, message.length);
-  const found: SoundPacket[] = [];
-  for (let at = 0; at + HEAD <= message.length;) {
-    const end = at + HEAD + view.getUint16(at + 5);
-    if (end > message.length) break;
-    const data = message.subarray(at + HEAD, end);
-    found.push({ stream: view.getUint8(at), time: view.getUint32(at + 1), data });
-    at = end;
-  }
-  return found;
-}

@@ -1,14 +1,18 @@
-import { completeOffer, feedMids, wantedMids, type JanusTicket } from "../core/relay";
+import { completeOffer, feedMids, wantedMids, type RelayTicket } from "../core/relay";
 import type { IceServer } from "../core/ice_servers";
 import { askForCaptureTime } from "./header_extensions";
 import { JanusSocket } from "./janus_socket";
-import type { RelayEvents, RelayLink } from "./relay_link";
 import { receivedSection, type Section } from "./section";
 import { SilenceWatch } from "./silence_watch";
 import type { StampReader } from "./stamp_reader";
 
+export interface RelayEvents {
+  feedback(data: unknown): void;
+  lost(why: string): void; // once, unless closed from here
+}
+
 /** Pictures, sound and feedback through a Janus. It ends once. */
-export class JanusMedia implements RelayLink {
+export class JanusMedia {
   readonly sections = new Map<string, Section>(); // by the publisher's mid
   private readonly connection: RTCPeerConnection;
   private readonly socket: JanusSocket;
@@ -16,7 +20,7 @@ export class JanusMedia implements RelayLink {
   private isOver = false;
 
   constructor(
-    readonly ticket: JanusTicket,
+    readonly ticket: RelayTicket,
     private readonly reader: StampReader | null,
     servers: readonly IceServer[],
     private readonly events: RelayEvents,

@@ -1,7 +1,7 @@
 import type { IceServer } from "../core/ice_servers";
-import { hasKey, parseRelayAnswer, type RelayTicket } from "../core/relay";
+import { parseRelayAnswer, type RelayTicket } from "../core/relay";
 import type { ConsoleApi } from "./console_api";
-import { relayLink, type RelayLink } from "./relay_link";
+import { JanusMedia } from "./relay_media";
 import type { Section } from "./section";
 import type { StampReader } from "./stamp_reader";
 
@@ -17,7 +17,7 @@ export interface RelayWatchEvents {
 
 /** Keeps an observer's media coming through one relay or another. The connection to the console lives on meanwhile. */
 export class RelayWatch {
-  private media: RelayLink | null = null;
+  private media: JanusMedia | null = null;
   private isOver = false;
 
   constructor(
@@ -60,7 +60,7 @@ export class RelayWatch {
     const lost = Promise.withResolvers<null>();
     this.wake = () => lost.resolve(null);
     try {
-      this.media = await relayLink(ticket, this.reader, this.servers(), {
+      this.media = new JanusMedia(ticket, this.reader, this.servers(), {
         feedback: (data) => this.events.feedback(data),
         lost: () => lost.resolve(null),
       });
@@ -80,7 +80,7 @@ export class RelayWatch {
       const limit = AbortSignal.timeout(REQUEST_LIMIT_MS);
       const answer = this.api.relay(this.peer(), lost === null ? "" : `${lost.relay}-${lost.feed}`, limit);
       const ticket = await answer.then(parseRelayAnswer).catch(() => undefined);
-      if (ticket !== undefined && (ticket === null || hasKey(ticket))) return ticket;
+      if (ticket !== undefined && (ticket === null || ticket.pin !== "")) return ticket;
     }
     return null;
   }

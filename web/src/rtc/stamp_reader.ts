@@ -14,7 +14,7 @@ export interface ReceiverStamps extends Arrivals {
   onpacket: ((rtpTimestamp: number, packet: ArrayBuffer) => void) | null;
 }
 
-export function createStamps(packets: boolean): ReceiverStamps {
+function createStamps(packets: boolean): ReceiverStamps {
   return {
     book: createStampBook(BOOK_LIMIT),
     packets,
@@ -25,7 +25,7 @@ export function createStamps(packets: boolean): ReceiverStamps {
 }
 
 /** A frame came; `packet` is null where the page does not decode it. */
-export function notePacket(
+function notePacket(
   stamps: ReceiverStamps,
   rtpTimestamp: number,
   mark: FrameMark,

@@ -1,0 +1,27 @@
+"""The client of docs/examples/aiortc, which has nothing but aiortc, drives a real console and watches it."""
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+from tests.server.rig import PATIENCE, running_rig
+
+SCRIPT = Path(__file__).parents[3] / "docs" / "examples" / "aiortc" / "drive.py"
+
+
+async def test_plain_aiortc_drives_and_decodes_pictures() -> None:
+    async with running_rig() as rig:
+        link = f"{rig.url}/#token={rig.access.issue('operator', 'operator')}"
+        script = await asyncio.create_subprocess_exec(
+            sys.executable, str(SCRIPT), link, "--seconds", "3", stdout=asyncio.subprocess.PIPE
+        )
+        async with asyncio.timeout(2 * PATIENCE):
+            printed, _ = await script.communicate()
+        assert script.returncode == 0
+        found = json.loads(printed.splitlines()[-1])
+        assert found["event"] > 10
+        assert found["pictures"] > 10
+        assert rig.services.console.clock.event == found["event"]
+        assert any(axis > 0 for axis in json.loads(printed.splitlines()[-2].split(b"axes ")[1].split(b"]")[0] + b"]"))
+        assert not list(rig.services.console.peers)
