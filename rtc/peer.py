@@ -184,7 +184,7 @@ class Peer:
     def accept(self, answer: SessionDescription, now: float) -> None:
         """The peer's answer to our offer. Raises SdpError; RuntimeError without an offer that waits for one."""
         if self._offer is None:
-            raise RuntimeError("no own offer waits for an answer")
+            raise RuntimeError("no offer waits for an answer")
         check_answer(self._offer, answer)
         ours = [replace(section, direction=reverse(section.direction)) for section in answer.sections]
         self._offer = None
