@@ -327,4 +327,4 @@ def test_why_the_association_has_ended_is_known_before_its_channels_close() -> N
     both.ends[0].abort(both.now, "done")
     both.run(both.now + 1.0)
     assert both.ends[0].closed == Closed("done")
-    assert both.ends[1].closed == Closed("peer_aborted")
+    assert both.ends[1].closed == Closed("peer_closed", "cause 12")

@@ -367,29 +367,28 @@ async def test_each_answered_check_tells_its_round_trip(endpoint: Endpoint) -> N
 
 
 async def test_a_listener_that_comes_later_hears_what_was_kept_for_it(endpoint: Endpoint) -> None:
-    offerer, answerer = endpoint.connect(controlling=True), endpoint.connect(controlling=False)
-    offerer.accept(answerer.answer(offerer.offer(), {}))
-    async with asyncio.timeout(10):
-        async for event in offerer:
-            if isinstance(event, Connected):
-                break
-    heard: list[PeerEvent] = []
-    answerer.listen(heard.append)
-    assert heard, "its path, at least"
-    answerer.close()
-    assert isinstance(heard[-1], PeerEnded)
-    assert endpoint.connections == 1
+    async with Endpoint([HOST]) as other:
+        offerer, answerer = other.connect(controlling=True), endpoint.connect(controlling=False)
+        offerer.accept(answerer.answer(offerer.offer(), {}))
+        async with asyncio.timeout(10):
+            await until(offerer, of(Connected))
+        heard: list[PeerEvent] = []
+        answerer.listen(heard.append)
+        assert heard, "its path, at least"
+        assert endpoint.connections == 1
+        answerer.close()
+        assert isinstance(heard[-1], PeerEnded)
+        assert endpoint.connections == 0
 
 
 async def test_nothing_can_be_sent_without_a_path_or_while_the_kernel_takes_no_more(endpoint: Endpoint) -> None:
-    offerer, answerer = endpoint.connect(controlling=True), endpoint.connect(controlling=False)
-    blocked = [offerer.is_blocked]
-    offerer.accept(answerer.answer(offerer.offer(), {}))
-    async with asyncio.timeout(10):
-        async for event in offerer:
-            if isinstance(event, Connected):
-                break
-    blocked.append(offerer.is_blocked)
-    for each in endpoint.sockets:
-        each.is_full = True
-    assert [*blocked, offerer.is_blocked] == [True, False, True]
+    async with Endpoint([HOST]) as other:
+        offerer, answerer = endpoint.connect(controlling=True), other.connect(controlling=False)
+        blocked = [offerer.is_blocked]
+        offerer.accept(answerer.answer(offerer.offer(), {}))
+        async with asyncio.timeout(10):
+            await until(offerer, of(Connected))
+        blocked.append(offerer.is_blocked)
+        for each in endpoint.sockets:
+            each.is_full = True
+        assert [*blocked, offerer.is_blocked] == [True, False, True]

@@ -211,7 +211,7 @@ def test_no_mutation_raises_anything_else_and_what_is_read_can_be_written(
 def test_channels_that_need_no_opening_message_are_kept_as_they_are_written() -> None:
     maps = ('0 label="control";ordered=false;max-retr=0', '1 label="session"')
     lines = "".join(f"a=dcmap:{each}\r\n" for each in maps)
-    text = GOOD.replace("a=sctp-port:5000\r\n", f"a=sctp-port:5000\r\n{lines}")
+    text = text_of("werift").replace("a=sctp-port:5000\r\n", f"a=sctp-port:5000\r\n{lines}")
     found = parse_description(text)
     (data,) = (each for each in found.sections if each.sctp_port is not None)
     assert data.channel_maps == maps
