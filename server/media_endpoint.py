@@ -8,6 +8,7 @@ from typing import Protocol
 import structlog
 
 from rtc.endpoint import Connection, Endpoint, Listener, Turns
+from rtc.endpoint import EndpointSettings as WebRtcSettings
 from rtc.ice.gathering import Advertised
 from rtc.peer import PeerSettings
 from rtc.turn import servers as turn
@@ -18,6 +19,9 @@ from server.media_addresses import MediaHostSettings, media_hosts
 __all__ = ["MediaEndpoint"]
 
 log = structlog.get_logger(__name__)
+
+# Each robot has bounds of its own (`max_peers`); this one is for a fleet of twenty.
+OF_ALL_ROBOTS = WebRtcSettings(peers=4096)
 
 
 class EndpointSettings(MediaHostSettings, Protocol):
@@ -86,15 +90,20 @@ class MediaEndpoint:
         settings = self._settings
         hosts = media_hosts(settings)
         if self._endpoint is None:
-            advertised = [Advertised(each) for each in settings.advertise]
             try:
-                self._endpoint = Endpoint(hosts, settings.media_port, tcp=settings.media_tcp, advertised=advertised)
+                self._endpoint = self._bound(hosts)
             except OSError:
                 if settings.media_port:
                     raise
-                # An address that has just come may not be ready yet: without it.
-                self._endpoint = Endpoint([], tcp=settings.media_tcp, advertised=advertised)
+                self._endpoint = self._bound([])  # an address that has just come may not be ready yet: without it
         self._endpoint.use_hosts(hosts)
         for each in self._endpoint.sockets:
             self._turns.yield_to(each)
         return self._endpoint
+
+    def _bound(self, hosts: Sequence[str]) -> Endpoint:
+        settings = self._settings
+        advertised = [Advertised(each) for each in settings.advertise]
+        return Endpoint(
+            hosts, settings.media_port, tcp=settings.media_tcp, advertised=advertised, settings=OF_ALL_ROBOTS
+        )
