@@ -102,7 +102,7 @@ class Peer(asyncio.Protocol):
         Raises:
             Violation: it does not, or for another reason.
         """
-        goodbye = await self.find(Goodbye, patience=patience)
+        goodbye = await self._goodbye(patience)
         if goodbye.error not in errors:
             raise Violation(f"the link ended with {goodbye.error!r}, not {' or '.join(map(repr, errors))}")
         if await self.next() is not None:
@@ -189,6 +189,18 @@ class Peer(asyncio.Protocol):
         self.ended = True
         self._stop_beating()
         self._news.set()
+
+    async def _goodbye(self, patience: float) -> Goodbye:
+        try:
+            async with asyncio.timeout(patience):
+                while not isinstance(said := await self.next(patience + 1), Goodbye):
+                    if said is None:
+                        raise Violation("the connection ended without a goodbye")
+                    if isinstance(said, Hello):
+                        raise Violation("it was admitted")
+        except TimeoutError:
+            raise Violation(f"the link is still open after {patience:g} s") from None
+        return said
 
     async def _answer(self) -> LinkMessage | None:
         answer = await self.next()

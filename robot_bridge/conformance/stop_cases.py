@@ -38,7 +38,8 @@ async def _numbers(subject: Subject) -> None:
         first, second, again, third, last = numbers
         expect(0 < first < second < third < last, f"each press needs a number above the last, not {numbers}")
         expect(again == first, f"a repeat of press {first} has the number {again}")
-        await driver.heard(lambda feedback: feedback.stop.number == last, f"the newest stop, {last}")
+        shown = await driver.heard(lambda feedback: feedback.stop.number == last, f"the newest stop, {last}")
+        expect(shown.stop.press == "", "the stop state has another press than the newest stop's")
 
 
 async def _reset_names_one(subject: Subject) -> None:
@@ -47,8 +48,10 @@ async def _reset_names_one(subject: Subject) -> None:
         await driver.heard(lambda feedback: feedback.stop.number == first, f"stop {first}")
         await driver.refused(Reset(by=BY), "stale_reset")
         await driver.refused(Reset(by=BY, number=first), "too_soon")
-        second = await driver.stop(_press())
+        press = _press()
+        second = await driver.stop(press)
         await driver.heard(lambda feedback: feedback.stop.number == second, f"stop {second}")
+        expect(driver.feedback.stop.press == press, "the stop state has another press than the newest stop's")
         await driver.refused(Reset(by=BY, number=first), "stale_reset")
         expect(driver.feedback.stop.stopped, "a reset of an older stop released the newest")
         await driver.reset()
