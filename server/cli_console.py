@@ -187,7 +187,8 @@ def up(
         )
     if "" not in bridges:  # where they will be, is known when they run
         settings = settings.model_copy(update={"robots": tuple(f"{name}=tcp://127.0.0.1:1" for name in bridges)})
-    _run(settings, bridges, as_json, quiet)
+    is_own = any(kind not in simulated_names() for kind in kinds.values())
+    _run(settings, bridges, as_json, quiet, is_own)
 
 
 @commands.command()
@@ -309,7 +310,14 @@ def _network(
     return dict(locals())
 
 
-def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool, quiet: bool) -> None:
+def _run(
+    settings: Settings,
+    bridges: Mapping[str, BridgeProcess],
+    as_json: bool,
+    quiet: bool,
+    own_robot: bool = False,
+) -> None:
+    """`own_robot`: one of them was named as somebody's own class, so that its bridge may say that there is none."""
     configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
     for each in unknown_settings(os.environ, Settings):
         say(each)
@@ -335,7 +343,7 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     except ssl.SSLError as error:
         raise _usage(f"tls_cert and tls_key are no certificate chain and its key: {error}") from error
     except BridgeFailed as error:
-        if error.code == EXIT_USAGE:  # it has said itself what cannot be meant
+        if own_robot and error.code == EXIT_USAGE:  # it has said itself what cannot be meant
             raise typer.Exit(EXIT_USAGE) from error
         say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error
