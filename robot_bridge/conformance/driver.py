@@ -1,11 +1,13 @@
 """An operator of the conformance check: answers feedback, moves little, and ends when somebody else stops the robot."""
 
 import asyncio
+import contextlib
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from robot_bridge.conformance.errors import NotApplicable, StoppedByOther, Violation, expect
-from robot_bridge.conformance.peer import PATIENCE, Peer
+from robot_bridge.conformance.peer import Peer
+from robot_bridge.conformance.waiting import PATIENCE, within
 from robot_bridge.feedback_fit import misfit
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.messages import Command, Feedback, Goodbye, LinkMessage, Refusal, Reset, Stop, StopTaken
@@ -15,6 +17,7 @@ __all__ = ["BY", "Driver", "Motion", "first_motion"]
 
 BY = "lockstep check"  # who stops and resets
 TRIES = 5  # of a command that a bridge on a busy machine refuses, because it was held up itself
+MOST_AHEAD = 3  # events by which a bridge may delay feedback, to keep max_event_rate
 RESET_AGAIN = 0.1  # s between two tries to reset a stop that is too new
 
 
@@ -77,13 +80,14 @@ class Driver:
         Raises:
             Violation: that took too long.
         """
-        try:
-            async with asyncio.timeout(patience):
-                while not condition(self.feedback):
-                    await self.next()
-        except TimeoutError:
-            raise Violation(f"no feedback within {patience:g} s says: {what}") from None
+        async with within(patience, f"no feedback within {patience:g} s says: {what}"):
+            while not condition(self.feedback):
+                await self.next()
         return self.feedback
+
+    async def becomes(self, command: Command) -> Feedback:
+        """The first feedback of the event that this command is to become."""
+        return await self.heard(lambda feedback: feedback.event == command.event, f"event {command.event}")
 
     async def fresh(self) -> Feedback:
         """The next feedback, whichever."""
@@ -128,26 +132,27 @@ class Driver:
         before = self.feedback.event
         number = message.number if isinstance(message, Reset) else 0
         wanted = message.event if isinstance(message, Command) else 0
-        while True:
-            said = await self.next()
-            if isinstance(said, Refusal) and said.event in (wanted, 0) and said.stop == number:
-                expect(said.reason in reasons, f"refused {said.reason!r}, not {' or '.join(map(repr, reasons))}")
-                return said
-            if isinstance(said, Feedback) and isinstance(message, Command) and is_newer(said.event, before):
-                raise Violation(f"it executed as event {said.event}; it had to be refused {reasons[0]!r}")
-            if isinstance(said, Feedback) and isinstance(message, Reset) and not said.stop.stopped:
-                raise Violation(f"it released the stop; it had to be refused {reasons[0]!r}")
+        async with within(PATIENCE, f"neither executed nor refused; it had to be refused {reasons[0]!r}"):
+            while True:
+                said = await self.next()
+                if isinstance(said, Refusal) and said.event in (wanted, 0) and said.stop == number:
+                    expect(said.reason in reasons, f"refused {said.reason!r}, not {' or '.join(map(repr, reasons))}")
+                    return said
+                if isinstance(said, Feedback) and isinstance(message, Command) and is_newer(said.event, before):
+                    raise Violation(f"it executed as event {said.event}; it had to be refused {reasons[0]!r}")
+                if isinstance(said, Feedback) and isinstance(message, Reset) and not said.stop.stopped:
+                    raise Violation(f"it released the stop; it had to be refused {reasons[0]!r}")
 
     async def stop(self, press: str, peer: Peer | None = None) -> int:
         """Press STOP, on this link or another; the number that the press has."""
         self._motion.presses.add(press)
         on = peer or self.peer
         on.send(Stop(by=BY, reason="a case of the conformance check", press=press))
-        while True:
-            said = await self.next() if on is self.peer else await on.find(StopTaken)
-            if isinstance(said, StopTaken):
-                expect(said.press == press, f"stop_taken names the press {said.press!r}, not {press!r}")
-                return said.number
+        async with within(PATIENCE, "a stop was not answered with stop_taken"):
+            while not isinstance(said := await self.next() if on is self.peer else await on.find(StopTaken), StopTaken):
+                pass
+        expect(said.press == press, f"stop_taken names the press {said.press!r}, not {press!r}")
+        return said.number
 
     async def reset(self) -> None:
         """Release the newest stop as soon as the bridge lets that happen."""
@@ -157,22 +162,22 @@ class Driver:
         while self.feedback.stop.stopped:
             expect(loop.time() < deadline, f"a reset that names the newest stop, {number}, does not release it")
             self.peer.send(Reset(by=BY, number=number))
-            try:
+            with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(RESET_AGAIN):
                     while self.feedback.stop.stopped:
                         await self.next()
-            except TimeoutError:
-                pass
 
     async def _executed(self, command: Command) -> Refusal | None:
         """None: it did."""
         self.peer.send(command)
-        while self.feedback.event != command.event:
-            said = await self.next()
-            if isinstance(said, Refusal) and said.event == command.event:
-                return said
-            jumped = isinstance(said, Feedback) and is_newer(said.event, command.event)
-            expect(not jumped, f"event {command.event} was commanded, and event {self.feedback.event} is current")
+        longest = PATIENCE + MOST_AHEAD / self.description.max_event_rate
+        async with within(longest, "a proper command was neither executed nor refused"):
+            while self.feedback.event != command.event:
+                said = await self.next()
+                if isinstance(said, Refusal) and said.event == command.event:
+                    return said
+                jumped = isinstance(said, Feedback) and is_newer(said.event, command.event)
+                expect(not jumped, f"event {command.event} was commanded, and event {self.feedback.event} is current")
         return None
 
     async def _pace(self) -> None:
@@ -182,7 +187,7 @@ class Driver:
 
     def _take(self, feedback: Feedback) -> None:
         stop = feedback.stop
-        if stop.stopped and (stop.by != BY or (stop.press and stop.press not in self._motion.presses)):
+        if stop.stopped and (stop.by != BY or stop.press not in self._motion.presses):
             raise StoppedByOther(f"somebody stopped the robot: {stop.by or 'nobody named'}: {stop.reason}")
         if wrong := misfit(feedback, self.description):
             raise Violation(wrong)

@@ -6,8 +6,8 @@ import math
 from robot_bridge.conformance.case import Case
 from robot_bridge.conformance.driver import Driver
 from robot_bridge.conformance.errors import expect
-from robot_bridge.conformance.peer import PATIENCE
 from robot_bridge.conformance.subject import Subject
+from robot_bridge.conformance.waiting import PATIENCE, within
 from robot_bridge.protocol.messages import Command, Feedback
 from robot_bridge.protocol.serial import event_after
 
@@ -35,7 +35,7 @@ async def _repeat(subject: Subject) -> None:
         for _ in range(3):
             command = driver.command(driver.moving())
             driver.peer.send(command)
-            fed_back = await driver.heard(lambda feedback, of=command: feedback.event == of.event, "its event")  # type: ignore[misc]
+            fed_back = await driver.becomes(command)
             driver.peer.send(command)
             await _stored(driver, fed_back)
 
@@ -52,7 +52,7 @@ async def _copies(subject: Subject) -> None:
     async with subject.operator() as driver:
         command = driver.command(driver.moving())
         driver.peer.send(*([command] * COPIES))
-        await driver.heard(lambda feedback: feedback.event == command.event, "the event of the copies")
+        await driver.becomes(command)
         after = await driver.drive(driver.neutral)
         expect(after.event == event_after(command.event), f"{COPIES} copies made more than one event")
 
@@ -61,9 +61,9 @@ async def _repeats_hold_nothing(subject: Subject) -> None:
     async with subject.operator() as driver:
         command = driver.command(driver.moving())
         driver.peer.send(command)
-        moved = await driver.heard(lambda feedback: feedback.event == command.event, "its event")
+        moved = await driver.becomes(command)
         longest = driver.description.hold + SETTLE
-        async with asyncio.timeout(longest + PATIENCE):
+        async with within(longest + PATIENCE, "the state is not measured again while a command is repeated"):
             while not (driver.feedback.at_rest and driver.feedback.issue > 1):
                 expect(driver.feedback.time - moved.time < longest, "the robot goes on while one command is repeated")
                 driver.peer.send(command)
@@ -92,7 +92,7 @@ async def _late(subject: Subject) -> None:
         for _ in range(2):  # as two copies of one command that a network held up
             issue = driver.feedback.issue
             await driver.refused(late, "late")
-            await driver.heard(lambda feedback, than=issue: feedback.issue > than, "a fresh issue after late")  # type: ignore[misc]
+            expect((await driver.fresh()).issue > issue, "no fresh issue after late")
         await driver.drive(values)
 
 

@@ -1,13 +1,15 @@
 """Cases about links: bytes, handshake, roles, heartbeats."""
 
 import asyncio
+from collections.abc import Awaitable
 
 import msgspec
 
 from robot_bridge.conformance.case import Case
 from robot_bridge.conformance.errors import Violation, expect
-from robot_bridge.conformance.peer import PATIENCE, Peer
+from robot_bridge.conformance.peer import Peer
 from robot_bridge.conformance.subject import Subject, described, needs
+from robot_bridge.conformance.waiting import PATIENCE
 from robot_bridge.protocol.errors import LinkRefused
 from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, frame
 from robot_bridge.protocol.link_secret import LinkSecret
@@ -190,7 +192,7 @@ async def _heartbeats(subject: Subject) -> None:
     async with subject.link("events") as (peer, _):
         for number in (-77, FAR_ID):
             peer.send(Ping(id=number))
-            await peer.find(Pong, lambda pong, wanted=number: pong.id == wanted)  # type: ignore[misc]
+            expect((await peer.find(Pong)).id == number, "a pong has another id than its ping")
         count = await peer.pinged(PINGS, PING_SECONDS)
         expect(count >= PINGS, f"{count} pings in {PING_SECONDS:g} s")
 
@@ -222,10 +224,10 @@ async def _events_role(subject: Subject) -> None:
         expect(again.time > notice.time, "a refreshed feedback's notice has the time of the one before")
 
 
-async def _told(what: str, result: object) -> None:
+async def _told(what: str, result: Awaitable[None]) -> None:
     """Await, and say of what a violation is."""
     try:
-        await result  # type: ignore[misc]
+        await result
     except Violation as error:
         raise Violation(f"{what}: {error}") from error
 

@@ -1,13 +1,12 @@
 """Cases about pictures and sound."""
 
-import asyncio
 from collections.abc import Iterable
 
 from robot_bridge.conformance.case import Case
 from robot_bridge.conformance.driver import Driver
 from robot_bridge.conformance.errors import expect
-from robot_bridge.conformance.peer import PATIENCE
 from robot_bridge.conformance.subject import Subject, described, needs
+from robot_bridge.conformance.waiting import PATIENCE, within
 from robot_bridge.protocol.messages import LinkMessage, Media
 from robot_bridge.protocol.serial import is_newer
 
@@ -24,7 +23,7 @@ async def _media_role(subject: Subject) -> None:
         sounds = {microphone.name for microphone in description.microphones}
         needs(bool(cameras | sounds), STREAMS)
         silent = cameras | sounds
-        async with asyncio.timeout(PATIENCE):
+        async with within(PATIENCE, "a stream of the description does not come"):
             while silent:
                 media = await watcher.find(Media)
                 expect(media.stream in cameras | sounds, f"a stream {media.stream!r}, which is not described")
@@ -51,7 +50,7 @@ async def _stamps(subject: Subject) -> None:
         description = driver.description
         needs(bool(description.cameras or description.microphones), STREAMS)
         seen: list[tuple[int, float]] = []
-        async with asyncio.timeout(PATIENCE):
+        async with within(PATIENCE, f"no media of {STAMPS} different events"):
             while len({stamp for stamp, _ in seen}) < STAMPS:
                 await driver.drive(driver.neutral)
                 seen += _captured(watcher.drain())

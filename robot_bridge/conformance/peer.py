@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from robot_bridge.conformance.errors import Violation
 from robot_bridge.conformance.place import Place
+from robot_bridge.conformance.waiting import PATIENCE, within
 from robot_bridge.protocol.errors import FramingError, LinkLost, LinkRefused, MessageError
 from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_MEDIA_FRAME, FrameReader, frame
 from robot_bridge.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
@@ -23,13 +24,12 @@ from robot_bridge.protocol.messages import (
     encode_message,
 )
 
-__all__ = ["PATIENCE", "Peer", "opened"]
+__all__ = ["Peer", "opened"]
 
 Kind = TypeVar("Kind", bound=LinkMessage)
 
-PATIENCE = 5.0  # s for an answer that has to come; waited for in full only where it does not come
 PING_INTERVAL = 0.2  # s
-MAX_WAITING = 256  # messages that wait for the case; of more, the oldest is forgotten
+MAX_WAITING = 64  # messages that wait for the case; of more, the oldest is forgotten
 
 
 class Peer(asyncio.Protocol):
@@ -63,13 +63,10 @@ class Peer(asyncio.Protocol):
         Raises:
             Violation: nothing came in time, or something that is no message.
         """
-        try:
-            async with asyncio.timeout(patience):
-                while not self._waiting and not self.ended and self._broken is None:
-                    self._news.clear()
-                    await self._news.wait()
-        except TimeoutError:
-            raise Violation(f"nothing came for {patience:g} s") from None
+        async with within(patience, f"nothing came for {patience:g} s"):
+            while not self._waiting and not self.ended and self._broken is None:
+                self._news.clear()
+                await self._news.wait()
         if self._waiting:
             return self._waiting.popleft()
         if self._broken is not None:
@@ -85,15 +82,12 @@ class Peer(asyncio.Protocol):
             Violation: it did not come in time, or the link ended.
         """
         wanted = kind.__name__.lower()
-        try:
-            async with asyncio.timeout(patience):
-                while (message := await self.next(patience + 1)) is not None:
-                    if isinstance(message, kind) and accept(message):
-                        return message
-                    if isinstance(message, Goodbye):
-                        raise Violation(f"the link ended: {message.error}; a {wanted} was expected")
-        except TimeoutError:
-            raise Violation(f"no such {wanted} within {patience:g} s") from None
+        async with within(patience, f"no such {wanted} within {patience:g} s"):
+            while (message := await self.next(patience + 1)) is not None:
+                if isinstance(message, kind) and accept(message):
+                    return message
+                if isinstance(message, Goodbye):
+                    raise Violation(f"the link ended: {message.error}; a {wanted} was expected")
         raise Violation(f"the connection ended; a {wanted} was expected")
 
     async def ends(self, *errors: str, patience: float = PATIENCE) -> None:
@@ -191,15 +185,12 @@ class Peer(asyncio.Protocol):
         self._news.set()
 
     async def _goodbye(self, patience: float) -> Goodbye:
-        try:
-            async with asyncio.timeout(patience):
-                while not isinstance(said := await self.next(patience + 1), Goodbye):
-                    if said is None:
-                        raise Violation("the connection ended without a goodbye")
-                    if isinstance(said, Hello):
-                        raise Violation("it was admitted")
-        except TimeoutError:
-            raise Violation(f"the link is still open after {patience:g} s") from None
+        async with within(patience, f"the link is still open after {patience:g} s"):
+            while not isinstance(said := await self.next(patience + 1), Goodbye):
+                if said is None:
+                    raise Violation("the connection ended without a goodbye")
+                if isinstance(said, Hello):
+                    raise Violation("it was admitted")
         return said
 
     async def _answer(self) -> LinkMessage | None:

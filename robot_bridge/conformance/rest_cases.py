@@ -3,8 +3,8 @@
 from robot_bridge.conformance.case import Case
 from robot_bridge.conformance.errors import expect
 from robot_bridge.conformance.event_cases import SETTLE
-from robot_bridge.conformance.peer import PATIENCE
 from robot_bridge.conformance.subject import Subject, needs
+from robot_bridge.conformance.waiting import PATIENCE
 from robot_bridge.protocol.messages import Rest
 from robot_bridge.protocol.serial import MAX_EVENT, event_after
 

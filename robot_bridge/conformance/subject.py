@@ -7,8 +7,9 @@ from contextlib import asynccontextmanager
 from robot_bridge.check_description import check_description
 from robot_bridge.conformance.driver import Driver, first_motion
 from robot_bridge.conformance.errors import NotApplicable, NotReady, Violation
-from robot_bridge.conformance.peer import PATIENCE, Peer, opened
+from robot_bridge.conformance.peer import Peer, opened
 from robot_bridge.conformance.place import Place
+from robot_bridge.conformance.waiting import PATIENCE
 from robot_bridge.errors import DescriptionError
 from robot_bridge.protocol.description import RobotDescription
 from robot_bridge.protocol.errors import LinkRefused
@@ -84,6 +85,7 @@ class Subject:
             if driver.feedback.stop.stopped:
                 await driver.reset()
             await driver.heard(lambda feedback: feedback.at_rest, "at rest after the case")
+        self.presses.discard("")  # from now on, a press without an id is somebody else's again
 
     @asynccontextmanager
     async def _operator(self) -> AsyncIterator[tuple[Peer, Hello]]:

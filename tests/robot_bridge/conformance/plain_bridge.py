@@ -85,6 +85,7 @@ class Fault(Enum):
     NO_BOUND = auto()  # waits for whatever length
     ANY_VERSION = auto()
     ANY_ROLE = auto()  # takes what the role does not permit, and says nothing
+    REFUSES_SILENTLY = auto()
     NO_REFRESH = auto()  # measures only when commanded
 
 
@@ -192,7 +193,8 @@ class PlainBridge:
         if reason is None:
             self.execute(command)
             return
-        link.send(Refusal(event=command.event, reason=reason, current=self.event))
+        if self.fault is not Fault.REFUSES_SILENTLY:
+            link.send(Refusal(event=command.event, reason=reason, current=self.event))
         if reason == "late":
             self.measure()
 

@@ -26,6 +26,7 @@ FOUND_BY = {
     Fault.NO_BOUND: "lengths",
     Fault.ANY_VERSION: "version",
     Fault.ANY_ROLE: "permissions",
+    Fault.REFUSES_SILENTLY: "out_of_order",
     Fault.NO_REFRESH: "refresh",
 }
 SAID = {  # of those that another fault could bring to the same end
@@ -35,6 +36,7 @@ SAID = {  # of those that another fault could bring to the same end
     Fault.DIES_OF_MALFORMED: "an array: the connection ended",
     Fault.STAMPS_AHEAD: "a medium is stamped",
     Fault.TWO_OPERATORS: "a second operator was admitted beside the first",
+    Fault.REFUSES_SILENTLY: "neither executed nor refused",
     Fault.ANY_VERSION: "it was admitted",
 }
 
