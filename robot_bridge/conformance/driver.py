@@ -37,7 +37,7 @@ class Driver:
         self.peer = peer
         self.description = description
         self.feedback = Feedback(event=1, issue=1, time=0.0, axes=[])  # until the first has come
-        self.began: dict[int, float] = {}  # event -> s of the bridge's clock, of its first feedback on this link
+        self.began: dict[int, float] = {}  # event -> s of the bridge's clock, when it was first measured
         self._motion = motion
         self._next_command = 0.0  # s of the loop's clock: not before that, to keep max_event_rate
 
@@ -196,7 +196,8 @@ class Driver:
             f"event {self.feedback.event} was current, and now {feedback.event} is",
         )
         self.feedback = feedback
-        self.began.setdefault(feedback.event, feedback.time)
+        if feedback.issue == 1:  # a later one says nothing of when the event began
+            self.began[feedback.event] = feedback.time
 
 
 def first_motion(description: RobotDescription, fraction: float, direction: int) -> list[float]:

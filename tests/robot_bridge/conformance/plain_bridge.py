@@ -5,6 +5,7 @@ import contextlib
 import math
 import secrets
 import time
+from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -103,6 +104,8 @@ class PlainBridge:
     """The state of the robot and of who is there."""
 
     fault: Fault | None = None
+    drawing: float = 0.0  # s from capturing a picture to sending it
+    captured: deque[Media] = field(default_factory=deque)  # and not sent yet
     address: tuple[str, int] = ("127.0.0.1", 0)
     links: set[Link] = field(default_factory=set)
     epoch: str = field(default_factory=lambda: secrets.token_hex(8))
@@ -133,10 +136,11 @@ class PlainBridge:
             self.tell("media", Ping(id=self.ticks))
         if self.ticks % 4 == 0:
             stamp = event_after(self.event) if self.fault is Fault.STAMPS_AHEAD else self.event
-            self.tell(
-                "media",
-                Media(stream="camera", codec="yuv420p", stamp=stamp, time=now, payload=PICTURE, width=16, height=16),
+            self.captured.append(
+                Media(stream="camera", codec="yuv420p", stamp=stamp, time=now, payload=PICTURE, width=16, height=16)
             )
+        while self.captured and now - self.captured[0].time >= self.drawing:
+            self.tell("media", self.captured.popleft())
 
     @property
     def newest(self) -> Feedback:
@@ -364,8 +368,8 @@ def send(writer: asyncio.StreamWriter, message: LinkMessage) -> None:
 
 
 @asynccontextmanager
-async def running_plain_bridge(fault: Fault | None = None) -> AsyncIterator[PlainBridge]:
-    bridge = PlainBridge(fault)
+async def running_plain_bridge(fault: Fault | None = None, drawing: float = 0.0) -> AsyncIterator[PlainBridge]:
+    bridge = PlainBridge(fault, drawing)
     loop = asyncio.get_running_loop()
     timers: list[asyncio.TimerHandle] = []
 

@@ -4,6 +4,8 @@ import asyncio
 
 from robot_bridge.conformance import CASES, Outcome, Result, Subject, play, play_all
 from robot_bridge.conformance.place import Place
+from robot_bridge.protocol.messages import Media
+from tests.robot_bridge.bridge_helpers import raw_link
 from tests.robot_bridge.conformance.plain_bridge import Fault, PlainBridge, running_plain_bridge
 
 FOUND_BY = {
@@ -68,3 +70,13 @@ async def test_every_planted_fault_is_found_by_the_case_that_is_about_it() -> No
     details = {fault: result.detail for fault, result in zip(Fault, results, strict=True)}
     for fault, words in SAID.items():
         assert words in details[fault], fault
+
+
+async def test_pictures_that_take_long_to_draw_are_judged_by_their_capture() -> None:
+    """Some come that were captured before the operator link opened, in an event that began before it."""
+    case = next(case for case in CASES if case.name == "stamps")
+    async with running_plain_bridge(drawing=0.3) as bridge:
+        async with raw_link(bridge, "media") as watcher:
+            await watcher.find(Media)
+        result = await play(subject(bridge), case)
+    assert result.outcome is Outcome.OK, result
