@@ -19,6 +19,7 @@ import uvloop
 from robot_bridge.bridge import Bridge
 from robot_bridge.check_link import check_link
 from robot_bridge.errors import (
+    BadRobot,
     BridgeError,
     DescriptionError,
     InsecureLink,
@@ -29,10 +30,11 @@ from robot_bridge.errors import (
 from robot_bridge.link_tls import LinkTls
 from robot_bridge.liveness import LIMIT, Liveness
 from robot_bridge.mounts import is_in_memory
+from robot_bridge.new_robot import CannotWrite, class_name, write_new_robot
 from robot_bridge.protocol.errors import SecretError
 from robot_bridge.protocol.link_secret import LinkSecret
 from robot_bridge.robots.base import Robot
-from robot_bridge.robots.registry import create_robot, robot_names
+from robot_bridge.robots.registry import create_robot, simulated_names
 from robot_bridge.service_manager import ServiceManager
 from robot_bridge.settings import BridgeSettings
 from robot_bridge.state_place import default_place, older_places
@@ -43,7 +45,7 @@ SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 # Another try cannot mend these errors; the others may end, as a robot that is not switched on yet.
-CANNOT_BE_MEANT = (UnknownRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
+CANNOT_BE_MEANT = (UnknownRobot, BadRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
 
 _logger = logging.getLogger(__name__)
 
@@ -52,7 +54,14 @@ robot_app = typer.Typer(pretty_exceptions_enable=False)
 
 @robot_app.callback(invoke_without_command=True, context_settings={"allow_interspersed_args": True})
 def run(
-    name: Annotated[str, typer.Argument(help=f"The robot: {', '.join(robot_names())}.")] = "mobile-manipulator",
+    name: Annotated[
+        str,
+        typer.Argument(
+            help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class. "
+            "Or `new`, with a name behind it: writes a folder with a robot of your own to begin with."
+        ),
+    ] = "mobile-manipulator",
+    new_name: Annotated[str | None, typer.Argument(metavar="[NEW_NAME]", help="Behind `new` only: my_arm.")] = None,
     ros2: Annotated[
         Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
     ] = None,
@@ -98,6 +107,11 @@ def run(
     as_json: Annotated[bool, typer.Option("--json", help="Print the address as one JSON line once ready.")] = False,
 ) -> None:
     """Run a robot and its bridge until interrupted."""
+    if name == "new":
+        _write(new_name)
+        return
+    if new_name is not None:
+        raise typer.BadParameter(f"{new_name!r} is one argument too many")
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     file = ros2 or mjcf
     known_as = (name,) if file is None else (file.stem, name)
@@ -126,6 +140,18 @@ def run(
     except OSError as error:
         typer.echo(f"lockstep robot: {error}", err=True)
         raise typer.Exit(EXIT_FAILED) from error
+
+
+def _write(name: str | None) -> None:
+    """The folder of a new robot."""
+    if name is None:
+        raise typer.BadParameter("`new` needs a name: lockstep robot new my_arm")
+    try:
+        folder = write_new_robot(name, Path.cwd())
+    except (CannotWrite, OSError) as error:
+        typer.echo(f"lockstep robot new: {error}", err=True)
+        raise typer.Exit(EXIT_USAGE) from error
+    typer.echo(f"{folder.name}/ is written. Now: cd {folder.name} && lockstep up --robot {name}:{class_name(name)}")
 
 
 def _warn_of_state(directory: Path) -> None:

@@ -3,6 +3,7 @@
 BridgeError
 ├── RobotUnavailable        something that the robot needs is missing on this machine
 ├── UnknownRobot            no robot of that name
+├── BadRobot                a class that was named makes no robot
 ├── SettingsError           a settings file cannot be used; names its line and key
 ├── ModelError              a MuJoCo model cannot be driven
 ├── DescriptionError        the robot's description contradicts itself
@@ -14,6 +15,7 @@ BridgeError
 """
 
 __all__ = [
+    "BadRobot",
     "BridgeError",
     "DescriptionError",
     "InsecureLink",
@@ -52,6 +54,10 @@ class RobotUnavailable(BridgeError):
 
 class UnknownRobot(BridgeError):
     name = "unknown_robot"
+
+
+class BadRobot(BridgeError):
+    name = "bad_robot"
 
 
 class SettingsError(BridgeError):

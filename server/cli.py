@@ -29,6 +29,14 @@ def _robot() -> typer.Typer:
     return commands
 
 
+def _check() -> typer.Typer:
+    from robot_bridge.conformance.cli import check
+
+    commands = typer.Typer()
+    commands.command()(check)
+    return commands
+
+
 def _access() -> typer.Typer:
     from server.cli_access import add_access_commands
     from server.cli_settings import make_settings
@@ -51,6 +59,7 @@ def _recordings() -> typer.Typer:
 LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
     _console: ("up", "serve"),
     _robot: ("robot",),
+    _check: ("check",),
     _access: ("invite", "invitations", "revoke", "audit"),
     _recordings: ("record", "recordings", "replay", "verify", "export"),
 }

@@ -14,7 +14,7 @@ import uvloop
 from pydantic import SecretStr
 
 from robot_bridge.protocol.link_secret import LinkSecret
-from robot_bridge.robots.registry import robot_names
+from robot_bridge.robots.registry import is_robot, robot_names, simulated_names
 from server.board import check_board
 from server.board.errors import BoardUnusable
 from server.bridge_process import BridgeFailed, BridgeProcess
@@ -108,8 +108,8 @@ def up(
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            help=f"The robot: {', '.join(robot_names())}; {DEFAULT_ROBOT} unless set. Given again, or as NAME=robot: "
-            "a fleet of several, docs/fleet.md."
+            help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class; "
+            f"{DEFAULT_ROBOT} unless set. Given again, or as NAME=robot: a fleet of several, docs/fleet.md."
         ),
     ] = None,
     ros2: Annotated[
@@ -190,7 +190,7 @@ def up(
     kinds = _simulated(robot)
     if (ros2 or mjcf) and "" not in kinds:
         raise _usage("--ros2 and --mjcf are for one robot; run the others by `lockstep robot` and use `lockstep serve`")
-    unknown = [] if ros2 or mjcf else sorted(set(kinds.values()) - set(robot_names()))
+    unknown = [] if ros2 or mjcf or robot_python else sorted(kind for kind in kinds.values() if not is_robot(kind))
     if unknown:
         raise _usage(f"no robot {unknown[0]!r}; there are {', '.join(robot_names())}")
     for number, (name, kind) in enumerate(kinds.items()):
@@ -203,7 +203,8 @@ def up(
         )
     if "" not in bridges:  # where they will be, is known when they run
         settings = settings.model_copy(update={"robots": tuple(f"{name}=tcp://127.0.0.1:1" for name in bridges)})
-    _run(settings, bridges, as_json, quiet)
+    is_own = any(kind not in simulated_names() for kind in kinds.values())
+    _run(settings, bridges, as_json, quiet, is_own)
 
 
 @commands.command()
@@ -329,7 +330,14 @@ def _network(
     return dict(locals())
 
 
-def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool, quiet: bool) -> None:
+def _run(
+    settings: Settings,
+    bridges: Mapping[str, BridgeProcess],
+    as_json: bool,
+    quiet: bool,
+    own_robot: bool = False,
+) -> None:
+    """`own_robot`: one of them was named as somebody's own class, so that its bridge may say that there is none."""
     configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
     for each in unknown_settings(os.environ, Settings):
         say(each)
@@ -355,6 +363,8 @@ def _run(settings: Settings, bridges: Mapping[str, BridgeProcess], as_json: bool
     except ssl.SSLError as error:
         raise _usage(f"tls_cert and tls_key are no certificate chain and its key: {error}") from error
     except BridgeFailed as error:
+        if own_robot and error.code == EXIT_USAGE:  # it has said itself what cannot be meant
+            raise typer.Exit(EXIT_USAGE) from error
         say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error
     except ConsoleFailed as error:

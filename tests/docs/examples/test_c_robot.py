@@ -8,15 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_bridge.check_description import check_description
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.errors import LinkLost, LinkRefused
+from robot_bridge.protocol.errors import LinkLost
 from robot_bridge.protocol.messages import (
     Command,
-    EventNotice,
     Feedback,
     Goodbye,
-    Hello,
     Media,
     Ping,
     Refusal,
@@ -30,24 +26,6 @@ from robot_bridge.robots.event_strip import read_event_strip
 from tests.docs.examples.robots import Robot, description_of, moving
 from tests.robot_bridge.bridge_helpers import operator, raw_link
 from tests.support.c_robot import running_c_robot
-
-
-async def test_the_hello_describes_a_robot_that_makes_sense(robot: Robot) -> None:
-    async with operator(robot) as driver:
-        check_description(description_of(driver))
-        assert driver.link.hello.epoch
-        assert len(driver.feedback.axes) == len(description_of(driver).axes)
-        assert len(driver.feedback.joints) == len(description_of(driver).joints)
-        assert (driver.feedback.event, driver.feedback.at_rest) == (2, True)
-
-
-async def test_the_event_subscriber_gets_notices_and_no_description(robot: Robot) -> None:
-    async with raw_link(robot) as link, operator(robot) as driver:
-        link.send(Hello(role="events"))
-        assert (await link.find(Hello)).description is None
-        await driver.drive(moving(driver))
-        while (await link.find(EventNotice)).event != 3:
-            pass
 
 
 async def test_each_command_executes_once_and_a_repeat_gets_the_stored_feedback(robot: Robot) -> None:
@@ -99,36 +77,6 @@ async def test_what_must_not_execute_is_refused_with_its_reason(robot: Robot) ->
     assert [line["event"] for line in executed] == [2]
 
 
-async def test_after_a_late_command_a_fresh_feedback_comes_and_only_it_may_be_answered(robot: Robot) -> None:
-    async with operator(robot) as driver:
-        before = driver.feedback
-        age = description_of(driver).max_event_age
-        await driver.heard(lambda feedback: feedback.time - before.time > age)
-        late = Command(event=3, issue=before.issue, values=moving(driver), nonce=before.nonce)
-        assert (await driver.refused(late)).reason == "late"
-        assert (await driver.next(Feedback)).issue > before.issue
-        assert (await driver.refused(late)).reason == "late"
-        assert (await driver.drive(moving(driver))).event >= 3
-
-
-async def test_without_another_command_the_robot_comes_to_rest(robot: Robot) -> None:
-    async with operator(robot) as driver:
-        moved = await driver.drive(moving(driver))
-        await driver.heard(lambda feedback: feedback.at_rest and feedback.issue > 1)
-        assert driver.feedback.event == moved.event
-
-
-async def test_a_rest_voids_moving_commands_up_to_its_event_and_lets_neutral_ones_pass(robot: Robot) -> None:
-    async with operator(robot) as driver:
-        await driver.drive(moving(driver))
-        following = event_after(driver.feedback.event)
-        driver.link.send(Rest(event=following))
-        refusal = await driver.refused(driver.command(moving(driver)))
-        assert (refusal.reason, refusal.event) == ("rested", following)
-        await driver.drive([0.0] * len(driver.feedback.axes))
-        assert (await driver.drive(moving(driver))).event > following
-
-
 async def test_a_rest_for_an_event_that_is_past_does_nothing(robot: Robot) -> None:
     async with operator(robot) as driver:
         await driver.drive(moving(driver))
@@ -136,14 +84,6 @@ async def test_a_rest_for_an_event_that_is_past_does_nothing(robot: Robot) -> No
         await driver.drive(moving(driver))
     rests = await robot.records("rest")
     assert [line["applied"] for line in rests] == [False]
-
-
-async def test_a_rest_far_ahead_rests_but_voids_only_the_next_event(robot: Robot) -> None:
-    async with operator(robot) as driver:
-        driver.link.send(Rest(event=500))
-        assert (await driver.refused(driver.command(moving(driver)))).reason == "rested"
-        await driver.drive([0.0] * len(driver.feedback.axes))
-        assert (await driver.drive(moving(driver))).event >= 4
 
 
 async def test_any_client_may_stop_and_only_the_operator_resets(robot: Robot) -> None:
@@ -157,40 +97,6 @@ async def test_any_client_may_stop_and_only_the_operator_resets(robot: Robot) ->
         assert (await watcher.find(Refusal)).reason == "not_allowed"
         await driver.reset(by="operator")
         assert driver.feedback.at_rest
-
-
-async def test_after_a_reset_the_robot_moves_only_after_a_neutral_command(robot: Robot) -> None:
-    async with operator(robot) as driver:
-        driver.link.send(Stop())
-        await driver.heard(lambda feedback: feedback.stop.stopped)
-        await driver.reset()
-        assert (await driver.refused(driver.command(moving(driver)))).reason == "not_neutral"
-        assert not (await driver.drive([0.0] * len(driver.feedback.axes))).neutral_needed
-        assert (await driver.drive(moving(driver))).event >= 4
-
-
-async def test_a_new_operator_link_moves_the_robot_only_after_a_neutral_command(robot: Robot) -> None:
-    for _ in range(2):
-        async with operator(robot, armed=False) as driver:
-            assert driver.feedback.neutral_needed
-            assert (await driver.refused(driver.command(moving(driver)))).reason == "not_neutral"
-            await driver.arm()
-            await driver.drive(moving(driver))
-
-
-async def test_each_press_has_a_number_and_its_repeats_have_the_same(robot: Robot) -> None:
-    async with operator(robot) as driver, raw_link(robot, "events") as watcher:
-        numbers = []
-        for press in ("0" * 32, "1" * 32, "0" * 32, "", ""):
-            watcher.send(Stop(press=press))
-            taken = await watcher.find(StopTaken)
-            assert taken.press == press
-            numbers.append(taken.number)
-        first, second, again, other, last = numbers
-        assert 0 < first < second < other < last
-        assert again == first
-        await driver.heard(lambda feedback: feedback.stop.number == last)
-        assert driver.feedback.stop.press == ""
 
 
 async def test_only_the_newest_stop_can_be_reset_and_only_after_a_second(robot: Robot) -> None:
@@ -212,16 +118,6 @@ async def test_only_the_newest_stop_can_be_reset_and_only_after_a_second(robot: 
         await driver.arm()
         assert not driver.feedback.stop.stopped, "a repeat of a press that was reset is no new stop"
         await driver.drive(moving(driver))
-
-
-async def test_a_lost_operator_leaves_the_robot_at_rest_and_its_place_to_another(robot: Robot) -> None:
-    async with operator(robot) as driver:
-        with pytest.raises(LinkRefused, match="taken"):
-            await RobotLink(*robot.address, "operator").connect()
-        last = await driver.drive(moving(driver))
-    async with operator(robot) as successor:
-        assert successor.feedback.event == event_after(last.event), "its neutral command is the next event"
-        await successor.heard(lambda feedback: feedback.at_rest)
 
 
 async def test_pictures_are_of_the_described_size_and_never_stamped_newer_than_the_truth(robot: Robot) -> None:

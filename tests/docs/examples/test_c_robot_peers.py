@@ -1,7 +1,6 @@
 """What docs/robot-link.md promises of links, asked of the robot in C and of our own bridge alike."""
 
 import asyncio
-from collections.abc import Iterator
 from random import Random
 
 import pytest
@@ -11,81 +10,16 @@ from robot_bridge.protocol.errors import LinkRefused
 from robot_bridge.protocol.framing import frame
 from robot_bridge.protocol.messages import (
     Command,
-    EventNotice,
     Feedback,
     Goodbye,
     Hello,
     LinkMessage,
-    LinkRole,
     Ping,
-    Pong,
-    Refusal,
-    Reset,
     Rest,
-    Stop,
     encode_message,
 )
 from tests.docs.examples.robots import Robot, moving
 from tests.robot_bridge.bridge_helpers import operator, raw_link
-
-
-async def test_a_ping_is_answered_with_its_number(robot: Robot) -> None:
-    async with raw_link(robot, "media") as link:
-        link.send(Ping(id=-77), Ping(id=2**53 - 1))
-        while (await link.find(Pong)).id != 2**53 - 1:
-            pass
-
-
-async def test_who_says_nothing_is_told_so(robot: Robot) -> None:
-    async with raw_link(robot, "operator") as mute, raw_link(robot) as stranger:
-        assert (await mute.find(Goodbye)).error == "silent"
-        assert (await stranger.find(Goodbye)).error == "silent"
-
-
-@pytest.mark.parametrize(
-    ("data", "error"),
-    [
-        (bytes(4), "framing"),
-        (b"\xff\xff\xff\xff", "framing"),
-        (b"\x00\x00\x20\x01", "framing"),
-        (frame(b"\xc1"), "handshake"),
-        (frame(encode_message(Ping(id=1))), "handshake"),
-        (frame(encode_message(Hello(role="robot"))), "role"),
-        (frame(encode_message(Hello(role="operator", version=1))), "version"),
-    ],
-    ids=["empty", "longest", "too-long", "no-message", "no-hello", "role", "version"],
-)
-async def test_a_bad_beginning_is_answered_with_a_goodbye_that_names_it(robot: Robot, data: bytes, error: str) -> None:
-    async with raw_link(robot) as link:
-        link.writer.write(data)
-        assert (await link.find(Goodbye)).error == error
-        assert await link.next() is None
-
-
-def malformed() -> Iterator[bytes]:
-    """Frames that are no messages."""
-    yield b"\x93\x01\x02\x03"
-    yield b"\xdf\xff\xff\xff\xff"
-    yield b"\x81\xa4type\xa4none"
-    yield b"\x81\xa4type\xa7command"
-    yield encode_message(Stop(by="x")) + b"\x00"
-    yield b"\x82\xa4type\xa4stop\xa2by\xa2\xc3\x28"  # not UTF-8
-    yield b"\x82\xa4type\xa4stop\xa2by\xda\x01\xf5" + b"x" * 501
-    yield b"\x82\xa4type\xa4rest\xa5event\x00"
-    yield b"\x82\xa4type\xa4rest\xa5event\xce\x80\x00\x00\x00"
-    yield b"\x84\xa4type\xa7command\xa5event\x02\xa5issue\x01\xa6values\xa3abc"
-    yield b"\x84\xa4type\xa7command\xa5event\x02\xa5issue\x00\xa6values\x90"
-
-
-async def test_malformed_messages_are_refused_and_the_link_stays(robot: Robot) -> None:
-    async with raw_link(robot, "operator") as link:
-        for payload in malformed():
-            link.writer.write(frame(payload))
-            refusal = await link.find(Refusal)
-            assert refusal.reason == "malformed", payload
-        link.send(Stop(by="x"))
-        while not (await link.find(Feedback)).stop.stopped:
-            pass
 
 
 async def test_unknown_fields_are_passed_over(robot: Robot) -> None:
@@ -93,20 +27,6 @@ async def test_unknown_fields_are_passed_over(robot: Robot) -> None:
         link.writer.write(frame(b"\x83\xa4type\xa4stop\xa3new\x92\x81\x01\x90\xc0\xa2by\xa1x"))
         while (await link.find(Feedback)).stop.by != "x":
             pass
-
-
-async def test_what_a_role_may_not_say_is_refused(robot: Robot) -> None:
-    forbidden: list[tuple[LinkRole, LinkMessage]] = [
-        ("media", Command(event=2, issue=1, values=[])),
-        ("events", Rest(event=2)),
-        ("events", Reset()),
-        ("operator", Hello(role="operator")),
-        ("operator", EventNotice(event=1, time=0.0)),
-    ]
-    for role, message in forbidden:
-        async with raw_link(robot, role) as link:
-            link.send(message)
-            assert (await link.find(Refusal)).reason == "not_allowed"
 
 
 async def test_who_does_not_read_is_dropped_and_holds_nobody_up(robot: Robot) -> None:

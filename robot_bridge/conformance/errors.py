@@ -1,0 +1,38 @@
+"""Why a case of the conformance check does not end well.
+
+CheckError
+├── Violation               the bridge did something else than the protocol asks
+├── NotApplicable           this robot has nothing that the case is about
+├── NotReady                the robot cannot be checked now; nothing was tried
+└── StoppedByOther          somebody stopped the robot during the check, which then ends
+"""
+
+__all__ = ["CheckError", "NotApplicable", "NotReady", "StoppedByOther", "Violation", "expect"]
+
+
+class CheckError(Exception):
+    """Base; the text says what was found, for a person."""
+
+
+class Violation(CheckError):
+    pass
+
+
+class NotApplicable(CheckError):
+    pass
+
+
+class NotReady(CheckError):
+    pass
+
+
+class StoppedByOther(CheckError):
+    pass
+
+
+def expect(condition: bool, found: str) -> None:
+    """Raises:
+    Violation: the condition does not hold.
+    """
+    if not condition:
+        raise Violation(found)

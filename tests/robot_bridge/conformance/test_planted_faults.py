@@ -1,0 +1,82 @@
+"""A bridge with a fault is found out, by the case that is about it; the same bridge without one passes all."""
+
+import asyncio
+
+from robot_bridge.conformance import CASES, Outcome, Result, Subject, play, play_all
+from robot_bridge.conformance.place import Place
+from robot_bridge.protocol.messages import Media
+from tests.robot_bridge.bridge_helpers import raw_link
+from tests.robot_bridge.conformance.plain_bridge import Fault, PlainBridge, running_plain_bridge
+
+FOUND_BY = {
+    Fault.REPEATS_HOLD: "repeats_hold_nothing",
+    Fault.REPEATS_COUNT: "repeat",
+    Fault.LATE_EXECUTES: "late",
+    Fault.UNSEEN_EXECUTES: "unseen",
+    Fault.NO_HOLD: "hold",
+    Fault.NO_REST: "rest",
+    Fault.NO_NEUTRAL: "new_link",
+    Fault.FORGETS_STOP: "stop_latches",
+    Fault.NUMBERS_REPEATS: "stop_numbers",
+    Fault.RESETS_ANY_STOP: "reset_names_one",
+    Fault.NAN_EXECUTES: "not_a_number",
+    Fault.DIES_OF_MALFORMED: "malformed",
+    Fault.STAMPS_AHEAD: "stamps",
+    Fault.TWO_OPERATORS: "second_operator",
+    Fault.NO_HEARTBEATS: "heartbeats",
+    Fault.SILENCE_LASTS: "silent_link",
+    Fault.NO_BOUND: "lengths",
+    Fault.ANY_VERSION: "version",
+    Fault.ANY_ROLE: "permissions",
+    Fault.REFUSES_SILENTLY: "out_of_order",
+    Fault.NO_REFRESH: "refresh",
+}
+SAID = {  # of those that another fault could bring to the same end
+    Fault.REPEATS_HOLD: "the robot goes on while one command is repeated",
+    Fault.NO_HOLD: "not at rest 1.0 s after the last command",
+    Fault.FORGETS_STOP: "a new operator link released the stop",
+    Fault.DIES_OF_MALFORMED: "an array: the connection ended",
+    Fault.STAMPS_AHEAD: "a medium is stamped",
+    Fault.TWO_OPERATORS: "a second operator was admitted beside the first",
+    Fault.REFUSES_SILENTLY: "neither executed nor refused",
+    Fault.ANY_VERSION: "it was admitted",
+}
+
+
+def subject(bridge: PlainBridge) -> Subject:
+    return Subject(Place(*bridge.address))
+
+
+async def test_a_bridge_written_from_the_page_passes() -> None:
+    async with running_plain_bridge() as bridge:
+        results = await play_all(subject(bridge), CASES, lambda result: None)
+    assert {result.case.name: result.detail for result in results if result.outcome is not Outcome.OK} == {
+        "secret": "no link secret was given",
+        "warning": "the description has no start_warning",
+    }
+
+
+async def result_of(fault: Fault) -> Result:
+    case = next(case for case in CASES if case.name == FOUND_BY[fault])
+    async with running_plain_bridge(fault) as bridge:
+        return await play(subject(bridge), case)
+
+
+async def test_every_planted_fault_is_found_by_the_case_that_is_about_it() -> None:
+    """All at once: most of the time is spent waiting for what a faulty bridge does not do."""
+    assert set(FOUND_BY) == set(Fault)
+    results = await asyncio.gather(*map(result_of, Fault))
+    assert [result for result in results if result.outcome is not Outcome.FAILED] == []
+    details = {fault: result.detail for fault, result in zip(Fault, results, strict=True)}
+    for fault, words in SAID.items():
+        assert words in details[fault], fault
+
+
+async def test_pictures_that_take_long_to_draw_are_judged_by_their_capture() -> None:
+    """Some come that were captured before the operator link opened, in an event that began before it."""
+    case = next(case for case in CASES if case.name == "stamps")
+    async with running_plain_bridge(drawing=0.3) as bridge:
+        async with raw_link(bridge, "media") as watcher:
+            await watcher.find(Media)
+        result = await play(subject(bridge), case)
+    assert result.outcome is Outcome.OK, result
