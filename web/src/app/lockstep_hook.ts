@@ -39,18 +39,18 @@ const NO_SCENE: SceneStatistics = { state: "away", event: null, gap: null, held:
 /** The page that the hook looks at. */
 export interface HookedPage {
   readonly engine: ConsoleEngine;
-  readonly board: { readonly scene: SceneView | null; mainStream(): string | null };
+  readonly grid: { readonly scene: SceneView | null; mainStream(): string | null };
 }
 
 export function installHook(page: HookedPage): void {
   const { engine } = page;
   const { streams } = engine;
   window.lockstep = {
-    stats: () => statisticsOf(engine, page.board.mainStream()),
+    stats: () => statisticsOf(engine, page.grid.mainStream()),
     robot: () => engine.state.robot?.description ?? null,
     rendered: (stream) => (streams.videos.get(stream) ?? streams.sounds.get(stream))?.log.all() ?? [],
     feedbacks: () => streams.feedbacks.all(),
-    scene: () => page.board.scene?.statistics() ?? NO_SCENE,
+    scene: () => page.grid.scene?.statistics() ?? NO_SCENE,
     configure({ gate, pacing, tolerance }) {
       const { settings } = engine.state;
       settings.gate = gate ?? settings.gate;

@@ -32,7 +32,7 @@ const SMALL_SCREEN = matchMedia("(max-width: 999px)");
 /** The whole page: one engine, and panels that show it. */
 export class Page {
   readonly engine: ConsoleEngine;
-  readonly board: ViewGrid;
+  readonly grid: ViewGrid;
   private readonly root = h("div", "console");
   private side: SidePanels | null = null; // until its code is there
   private readonly later = new DeferredLoader(() => note(this.engine.state, "error", NOT_LOADED, Date.now()));
@@ -44,21 +44,21 @@ export class Page {
   constructor(api: ConsoleApi, options: PeerOptions, name: string | null, first: Preconnection | null) {
     const left = h("div", "stick left", { role: "group", "aria-label": "Left stick" });
     const right = h("div", "stick right", { role: "group", "aria-label": "Right stick" });
-    this.board = new ViewGrid();
+    this.grid = new ViewGrid();
     const events: ConsoleEngineEvents = {
-      canvas: (info) => this.board.canvas(info),
-      mainStream: () => this.board.mainStream(),
+      canvas: (info) => this.grid.canvas(info),
+      mainStream: () => this.grid.mainStream(),
       isOccupied: () => this.isOccupied(),
       armedChanged: () => this.draw(performance.now()),
-      feedbackTaken: (now) => this.board.update(this.engine, now),
-      pictureDrawn: () => this.board.scene?.settle(),
+      feedbackTaken: (now) => this.grid.update(this.engine, now),
+      pictureDrawn: () => this.grid.scene?.settle(),
     };
     this.engine = new ConsoleEngine(api, options, name, new TouchSticks(left, right), events, first);
     this.panels = this.build(left, right, api);
     this.later.use(({ installHook }) => installHook(this));
     this.later.use(({ Rumble, ContactTone, SceneSwitch, SoundStream, createScene }) => {
       this.engine.streams.sound = SoundStream;
-      this.board.takeScene(createScene(this.engine, this.board, api), new SceneSwitch());
+      this.grid.takeScene(createScene(this.engine, this.grid, api), new SceneSwitch());
       this.engine.haptics.rumble = new Rumble();
       this.engine.haptics.tone = new ContactTone(this.engine.audio);
     });
@@ -78,10 +78,10 @@ export class Page {
   }
 
   private build(left: HTMLElement, right: HTMLElement, api: ConsoleApi): Panel[] {
-    const { engine, board, later } = this;
+    const { engine, grid: grid, later } = this;
     const redraw = (): void => this.draw(performance.now());
     const side = (parts: DeferredParts): SidePanels =>
-      (this.side ??= new parts.SidePanels(engine, board, this.root, api, redraw));
+      (this.side ??= new parts.SidePanels(engine, grid, this.root, api, redraw));
     const bar = createStatusBar(
       engine,
       () => this.root.classList.toggle("shows-details"),
@@ -90,14 +90,14 @@ export class Page {
     const alarm = createAlarmStrip(engine);
     const banner = createBanner(engine);
     const event = createEventPanel(engine);
-    board.card = event.element;
+    grid.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));
     const contact = later.panel((parts) => parts.createForceGauge(engine, true));
     const radar = later.panel((parts) => parts.createRangeRadar(engine));
     const places = later.panel((parts) => parts.createAxisPositionPanel(engine));
     const overlay = createOverlay(engine);
     const limits = createLimitsStrip(engine);
-    const scale = later.panel((parts) => parts.createScaleBar(engine, () => board.largeStream()));
+    const scale = later.panel((parts) => parts.createScaleBar(engine, () => grid.largeStream()));
     const talk = later.panel((parts) => parts.createTalkButton(engine, this.takeVoice(parts)));
     const seat = createSeatBar(engine, talk);
     const record = later.panel((parts) => side(parts).record);
@@ -110,8 +110,8 @@ export class Page {
     const axes = createAxisPanel(engine);
     const stop = createStopPanel(engine);
     const announcer = createAnnouncer(engine);
-    board.gauges.append(places.element, force.element, radar.element);
-    board.element.append(
+    grid.gauges.append(places.element, force.element, radar.element);
+    grid.element.append(
       h("div", "stage", {}, scale.element, contact.element, limits.element, overlay.element),
     );
     const rail = h("aside", "rail", {}, event.element, tabs.element);
@@ -119,7 +119,7 @@ export class Page {
     this.root.append(
       ...[bar.element, seat.element],
       h("div", "strips", {}, alarm.element, banner.element),
-      ...[board.element, rail],
+      ...[grid.element, rail],
       ...[charts.element, sheets.element, deck, announcer.element],
     );
     return [
@@ -182,7 +182,7 @@ export class Page {
     setData(root, "stopped", String(engine.state.stop.stopped));
     setData(root, "gate", engine.state.settings.gate === "event" ? "on" : "off");
     root.classList.toggle("has-overlay", overlayLabels(engine, now) !== null);
-    this.board.update(engine, now);
+    this.grid.update(engine, now);
     for (const panel of this.panels) panel.update(now);
   }
 }

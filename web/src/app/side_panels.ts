@@ -6,7 +6,7 @@ import type { PageAction } from "../input/shortcuts";
 import { replayHash } from "../replay/replay_link";
 import { countUnread, createUnread, markRead } from "../session/unread_notes";
 import { Pad } from "../input/gamepad";
-import { PadStorage } from "../input/gamepad_storage";
+import { GamepadStorage } from "../input/gamepad_storage";
 import { watchPageKeys } from "./shortcut_listener";
 import type { ConsoleApi } from "../transport/signalling/console_api";
 import { SessionApi } from "../transport/signalling/session_api";
@@ -48,13 +48,13 @@ export class SidePanels {
   /** `redraw`: at once, after something was pressed. */
   constructor(
     private readonly engine: ConsoleEngine,
-    private readonly board: ViewGrid,
+    private readonly grid: ViewGrid,
     root: HTMLElement,
     api: ConsoleApi,
     private readonly redraw: () => void,
   ) {
     const { controls } = engine;
-    const pad = (controls.pad ??= new Pad(controls.events, new PadStorage()));
+    const pad = (controls.pad ??= new Pad(controls.events, new GamepadStorage()));
     this.pads = once(() => createGamepadSheet(pad));
     this.session = new SessionApi(api);
     this.sheets = new Sheets(() => root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
@@ -67,7 +67,7 @@ export class SidePanels {
     });
     this.tools = {
       element: this.pageTools.bar,
-      update: () => this.pageTools.update(engine, board.sceneSwitch?.isOn === true),
+      update: () => this.pageTools.update(engine, grid.sceneSwitch?.isOn === true),
     };
     this.tabs = this.createTabs();
     const sampler = new ChartSampler(engine);
@@ -94,7 +94,7 @@ export class SidePanels {
   }
 
   private toggleScene(): void {
-    this.board.sceneSwitch?.toggle();
+    this.grid.sceneSwitch?.toggle();
     this.redraw();
   }
 
@@ -103,7 +103,7 @@ export class SidePanels {
     const status = [
       { element: this.pageTools.details, update: () => undefined },
       createStreamTable(engine),
-      createDelayPanel(engine, () => this.board.mainStream()),
+      createDelayPanel(engine, () => this.grid.mainStream()),
       createSettingsPanel(engine),
       createLogPanel(engine),
     ];

@@ -15,15 +15,15 @@ export function createInputActivity(): InputActivity {
 }
 
 /** Takes what is held now; returns a text that stays the same while no hand shows. */
-export function noteInput(grip: InputActivity, held: HeldInputs): string {
+export function noteInput(activity: InputActivity, held: HeldInputs): string {
   const keys = [...held.keys].sort().join();
   const values = [...valuesOf(held.pad), ...valuesOf(held.touch)];
-  if (keys !== grip.keys || isMoved(values, grip.values)) {
-    grip.keys = keys;
-    grip.values = values;
-    grip.changes += 1;
+  if (keys !== activity.keys || isMoved(values, activity.values)) {
+    activity.keys = keys;
+    activity.values = values;
+    activity.changes += 1;
   }
-  return String(grip.changes);
+  return String(activity.changes);
 }
 
 function valuesOf(inputs: Readonly<Record<string, number>> | null): number[] {

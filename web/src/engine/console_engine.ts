@@ -270,11 +270,11 @@ export class ConsoleEngine {
     this.ticker.catchUp(performance.now());
     this.heardMs = at;
     const { feedback, handOver } = this.state;
-    const standing = snapshotOf(this.state);
+    const snapshot = snapshotOf(this.state);
     applyMessage(this.state, parsed.message, Date.now());
     this.stopping.took(parsed.message, this.state, this.heardMs);
     const awaits = this.driver !== null && driver.driverAwaitsNeutral(this.driver, parsed.message);
-    const forbidden = restartInterlock(standing, this.state, parsed.message, awaits);
+    const forbidden = restartInterlock(snapshot, this.state, parsed.message, awaits);
     if (forbidden !== null) this.bar(forbidden);
     this.follow(parsed.message, feedback, this.heardMs);
     if (this.state.handOver !== handOver) this.handedOver();

@@ -25,7 +25,7 @@ import type { ServerMessage, StopState } from "../protocol/wire";
  * place of the one before: a robot that has the newer one is stopped for both.
  */
 export class StopSender {
-  readonly offer = createResetState();
+  readonly resetState = createResetState();
   private press: StopPress | null = null; // null: none, or it is done with
   private isSilenced = false; // the STOP of this page's link
   private unkeptMs: number | null = null; // since when what the robot says of its stop is not on its disk
@@ -62,10 +62,10 @@ export class StopSender {
 
   /** Resets the stop that is on screen, if it was there when the hand came to the button, at `heldMs`. */
   reset(heldMs: number, now: number): void {
-    const number = resetNumber(this.offer, heldMs);
+    const number = resetNumber(this.resetState, heldMs);
     if (number === null) return;
     const text = JSON.stringify({ type: "reset", by: "", number });
-    if (!this.connection.send("stop", text)) resetNotSent(this.offer, now);
+    if (!this.connection.send("stop", text)) resetNotSent(this.resetState, now);
   }
 
   /** `state`: with this message taken. */
@@ -73,7 +73,7 @@ export class StopSender {
     const { stop } = state;
     if (message.type === "participants")
       this.noteSilence(isSilenced(state.participants, state.welcome?.peer ?? null));
-    if (message.type === "refusal" && message.stop > 0) tookResetRefusal(this.offer, message, now);
+    if (message.type === "refusal" && message.stop > 0) tookResetRefusal(this.resetState, message, now);
     this.unkeptMs = unkeptSince(this.unkeptMs, stop, now);
     const { press } = this;
     if (press === null) return;

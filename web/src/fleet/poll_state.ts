@@ -24,30 +24,30 @@ export function createPollState(): PollState {
 }
 
 export function tookAnswer(
-  news: PollState,
+  poll: PollState,
   answer: FleetStatus,
   askedMs: number,
   now: number,
   wall: number,
 ): void {
-  news.answer = answer;
-  news.askedMs = askedMs;
-  news.heardMs = now;
-  news.heardAt = wall;
-  news.trouble = null;
+  poll.answer = answer;
+  poll.askedMs = askedMs;
+  poll.heardMs = now;
+  poll.heardAt = wall;
+  poll.trouble = null;
 }
 
 /** The console did not tell. A link that is good for nothing any more shows nothing any more. */
-export function tookError(news: PollState, trouble: PollError): void {
-  news.trouble = trouble;
-  if (isShutOut(trouble)) news.answer = null;
+export function tookError(poll: PollState, trouble: PollError): void {
+  poll.trouble = trouble;
+  if (isShutOut(trouble)) poll.answer = null;
 }
 
 /** `unknown`: what is shown was so once. */
-export function pollPhase(news: PollState, now: number): PollPhase {
-  if (news.trouble !== null && isShutOut(news.trouble)) return "shut_out";
-  if (news.answer === null) return "loading";
-  return now - news.heardMs < UNKNOWN_MS ? "live" : "unknown";
+export function pollPhase(poll: PollState, now: number): PollPhase {
+  if (poll.trouble !== null && isShutOut(poll.trouble)) return "shut_out";
+  if (poll.answer === null) return "loading";
+  return now - poll.heardMs < UNKNOWN_MS ? "live" : "unknown";
 }
 
 /** "12:03:20" */

@@ -27,7 +27,7 @@ export interface PadProfiles {
 export const NO_PROFILES: PadProfiles = { profiles: [], preferred: null };
 
 export type ParsedProfiles =
-  { readonly kind: "book"; readonly book: PadProfiles } | { readonly kind: "bad"; readonly why: string };
+  { readonly kind: "profiles"; readonly book: PadProfiles } | { readonly kind: "bad"; readonly why: string };
 
 export function writeProfiles(book: PadProfiles): string {
   const profiles = book.profiles.slice(-MAX_PROFILES);
@@ -57,7 +57,7 @@ export function readProfiles(text: string): ParsedProfiles {
   const bad = read.findIndex((profile) => profile === null);
   if (bad >= 0) return { kind: "bad", why: `profile ${bad + 1} is damaged` };
   const kept = read.filter((profile) => profile !== null);
-  return { kind: "book", book: { profiles: kept, preferred: isId(preferred) ? preferred : null } };
+  return { kind: "profiles", book: { profiles: kept, preferred: isId(preferred) ? preferred : null } };
 }
 
 /** The imported profiles win over those of the same pads. */

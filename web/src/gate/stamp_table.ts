@@ -10,16 +10,16 @@ export function createStampTable(limit: number): StampTable {
   return { limit, marks: new Map() };
 }
 
-export function noteMark(book: StampTable, rtpTimestamp: number, mark: FrameMark): void {
-  book.marks.delete(rtpTimestamp);
-  book.marks.set(rtpTimestamp, mark);
-  for (const oldest of book.marks.keys()) {
-    if (book.marks.size <= book.limit) break;
-    book.marks.delete(oldest);
+export function noteMark(table: StampTable, rtpTimestamp: number, mark: FrameMark): void {
+  table.marks.delete(rtpTimestamp);
+  table.marks.set(rtpTimestamp, mark);
+  for (const oldest of table.marks.keys()) {
+    if (table.marks.size <= table.limit) break;
+    table.marks.delete(oldest);
   }
 }
 
 /** Undefined while nothing is known of the frame. */
-export function findMark(book: StampTable, rtpTimestamp: number): FrameMark | undefined {
-  return book.marks.get(rtpTimestamp);
+export function findMark(table: StampTable, rtpTimestamp: number): FrameMark | undefined {
+  return table.marks.get(rtpTimestamp);
 }

@@ -18,7 +18,7 @@ export interface ControlSample {
 export class Controls {
   pad: Pad | null = null; // until its code is there
   readonly keyboard: Keyboard;
-  private readonly grip = createInputActivity();
+  private readonly activity = createInputActivity();
 
   constructor(
     readonly sticks: TouchSticks,
@@ -45,7 +45,7 @@ export class Controls {
       deadman: this.deadman,
       held,
       slowShare: keyboard.slow ? SLOW_SHARE : 1,
-      signature: noteInput(this.grip, held),
+      signature: noteInput(this.activity, held),
     };
   }
 

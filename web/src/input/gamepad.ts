@@ -4,7 +4,7 @@ import { createReportTimeout, notePadReport, type ReportTimeout } from "../gamep
 import { readPad, type PadInputs, type SeenAtRest } from "../gamepad/mapping";
 import { padName, setupOf, type PadSetup } from "../gamepad/profile";
 import { speedShare } from "../gamepad/shaping";
-import type { PadStorage } from "./gamepad_storage";
+import type { GamepadStorage } from "./gamepad_storage";
 
 export interface PadEvents {
   stop(): void;
@@ -45,7 +45,7 @@ export class Pad {
 
   constructor(
     private readonly events: PadEvents,
-    readonly storage: PadStorage,
+    readonly storage: GamepadStorage,
   ) {}
 
   /** All pads that are plugged in and were touched. */
@@ -75,7 +75,7 @@ export class Pad {
     const before = this.state;
     const states = pads.map((pad) => this.read(pad));
     const candidates = states.map(({ gamepad, ready }) => ({ index: gamepad.index, id: gamepad.id, ready }));
-    const index = choosePad(candidates, this.chosen, this.storage.book.preferred);
+    const index = choosePad(candidates, this.chosen, this.storage.saved.preferred);
     const state = states.find(({ gamepad }) => gamepad.index === index) ?? null;
     this.chosen = state === null ? null : { index: state.gamepad.index, id: state.id };
     this.state = this.isSuspended ? null : state;
@@ -94,7 +94,7 @@ export class Pad {
   }
 
   private read(gamepad: Gamepad): PadState {
-    const setup = setupOf(gamepad, this.storage.book.profiles);
+    const setup = setupOf(gamepad, this.storage.saved.profiles);
     const { layout, shaping } = setup;
     const common = { id: gamepad.id, name: padName(gamepad.id), setup, gamepad };
     if (layout === null) return { ...common, ready: false, deadman: false, inputs: NOTHING, pressed: NONE };

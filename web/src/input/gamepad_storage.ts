@@ -10,8 +10,8 @@ import {
 const KEY = "lockstep.pads";
 
 /** The profiles of pads, kept in this browser. What cannot be kept still holds until the page closes. */
-export class PadStorage {
-  book: PadProfiles = NO_PROFILES;
+export class GamepadStorage {
+  saved: PadProfiles = NO_PROFILES;
   /** What is wrong with what is stored, or with storing; null when nothing is. */
   trouble: string | null = null;
 
@@ -19,36 +19,36 @@ export class PadStorage {
     const text = this.load();
     if (text === null) return;
     const parsed = readProfiles(text);
-    if (parsed.kind === "book") this.book = parsed.book;
+    if (parsed.kind === "profiles") this.saved = parsed.book;
     else this.trouble = `The stored gamepad profiles were left out: ${parsed.why}`;
   }
 
   save(profile: PadProfile): void {
-    this.write({ ...this.book, profiles: withProfile(this.book.profiles, profile) });
+    this.write({ ...this.saved, profiles: withProfile(this.saved.profiles, profile) });
   }
 
   forget(id: string): void {
-    this.write({ ...this.book, profiles: this.book.profiles.filter((profile) => profile.id !== id) });
+    this.write({ ...this.saved, profiles: this.saved.profiles.filter((profile) => profile.id !== id) });
   }
 
   prefer(id: string): void {
-    this.write({ ...this.book, preferred: id });
+    this.write({ ...this.saved, preferred: id });
   }
 
   /** Takes the profiles of a file; says what is wrong with it, null when nothing is. */
   import(text: string): string | null {
     const parsed = readProfiles(text);
     if (parsed.kind === "bad") return `This file was not taken: ${parsed.why}`;
-    this.write(mergeProfiles(this.book, parsed.book));
+    this.write(mergeProfiles(this.saved, parsed.book));
     return null;
   }
 
   export(): string {
-    return writeProfiles(this.book);
+    return writeProfiles(this.saved);
   }
 
   private write(book: PadProfiles): void {
-    this.book = book;
+    this.saved = book;
     try {
       localStorage.setItem(KEY, writeProfiles(book));
       this.trouble = null;

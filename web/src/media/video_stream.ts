@@ -52,7 +52,7 @@ export class VideoStream {
 
   private readonly lookup = (rtpTimestamp: number): FrameMark | undefined => {
     const { stamps } = this.section;
-    return stamps === null ? UNMARKED : findMark(stamps.book, rtpTimestamp);
+    return stamps === null ? UNMARKED : findMark(stamps.table, rtpTimestamp);
   };
 
   private readonly draw = (

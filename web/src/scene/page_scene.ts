@@ -5,10 +5,10 @@ import { SceneView } from "./scene_view";
 import type { ViewGrid } from "../ui/views/view_grid";
 
 /** The 3D scene of a page: it shows the event of the picture in the large view. */
-export function createScene(engine: ConsoleEngine, board: ViewGrid, api: ConsoleApi): SceneView {
+export function createScene(engine: ConsoleEngine, grid: ViewGrid, api: ConsoleApi): SceneView {
   return new SceneView(api, {
     due: () => {
-      const video = engine.streams.videos.get(board.mainStream() ?? "");
+      const video = engine.streams.videos.get(grid.mainStream() ?? "");
       return sceneDue(engine.streams.context("video"), video?.gate.shown ?? null);
     },
     context: () => engine.streams.context("video"),

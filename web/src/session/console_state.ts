@@ -49,7 +49,7 @@ export interface ConsoleState {
   robot: RobotState | null;
   seat: Seat | null;
   handOver: SeatHandover | null; // the last one
-  seatNews: SeatNotice | null; // what was last to be told about the seat, a new object each time
+  seatNotice: SeatNotice | null; // what was last to be told about the seat, a new object each time
   participants: readonly Participant[];
   quality: Quality | null; // of this peer's pictures
   speedCap: SpeedCapState | null; // the console's; null before it has said so
@@ -92,7 +92,7 @@ export function createConsoleState(): ConsoleState {
     robot: null,
     seat: null,
     handOver: null,
-    seatNews: null,
+    seatNotice: null,
     participants: [],
     quality: null,
     speedCap: null,
@@ -238,7 +238,7 @@ function takeSeat(state: ConsoleState, seat: Seat, wallMs: number): void {
   state.seat = seat;
   if (change === null) return;
   state.handOver = change;
-  state.seatNews = { words: change.words };
+  state.seatNotice = { words: change.words };
   note(state, "info", change.words, wallMs);
 }
 
@@ -261,7 +261,7 @@ function takeSources(state: ConsoleState, sources: readonly SourceStatus[], wall
 /** A page that only looked whether the seat is free asked for nothing, so nothing was refused. */
 function takeRefusal(state: ConsoleState, refusal: Refusal, wallMs: number): void {
   const answer = requestAnswer(refusal, state.seat?.name ?? "");
-  if (answer !== null) state.seatNews = { words: answer };
+  if (answer !== null) state.seatNotice = { words: answer };
   if (refusal.reason === "seat_taken" && answer === null) return;
   if (refusal.stop > 0) {
     note(state, "warning", resetRefusalLabel(refusal), wallMs);

@@ -19,27 +19,27 @@ const OBSTACLE_WORDS: Readonly<Record<Obstacle, string>> = {
 
 export interface SeatView {
   readonly role: Role | null; // null while not connected
-  readonly standing: SeatStatus;
+  readonly status: SeatStatus;
   readonly holder: string; // name
   readonly claims: readonly Claim[];
   readonly me: string | null;
   readonly idleSeconds: number | null;
   readonly armed: boolean;
   readonly obstacle: Obstacle | null;
-  readonly news: string | null; // the last hand-over, while it is fresh
+  readonly notice: string | null; // the last hand-over, while it is fresh
 }
 
 export function seatLabels(view: SeatView): SeatLabels {
-  switch (view.standing) {
+  switch (view.status) {
     case "unknown":
       return { tone: "off", title: "Control seat", text: "Not connected" };
     case "free":
-      return { tone: "free", title: "Nobody drives", text: view.news ?? freeWords(view.role) };
+      return { tone: "free", title: "Nobody drives", text: view.notice ?? freeWords(view.role) };
     case "mine":
       return holderWords(view);
     case "asked":
     case "held":
-      return { tone: "off", title: `${view.holder} drives`, text: view.news ?? waitingWords(view) };
+      return { tone: "off", title: `${view.holder} drives`, text: view.notice ?? waitingWords(view) };
   }
 }
 
@@ -63,7 +63,7 @@ function holderWords(view: SeatView): SeatLabels {
     };
   }
   const next = view.obstacle === null ? (view.armed ? "" : "Arm to drive") : OBSTACLE_WORDS[view.obstacle];
-  return { tone: "mine", title: "You have control", text: [view.news, next].filter(Boolean).join(". ") };
+  return { tone: "mine", title: "You have control", text: [view.notice, next].filter(Boolean).join(". ") };
 }
 
 function freeWords(role: Role | null): string {

@@ -40,12 +40,12 @@ export function idleSecondsAfter(seat: Seat | null, agedMs: number): number | nu
 }
 
 /** The button beside the seat for this role; null for who may only watch. It never goes away for who may drive. */
-export function seatAction(role: Role | null, standing: SeatStatus): SeatAction | null {
+export function seatAction(role: Role | null, status: SeatStatus): SeatAction | null {
   if (role === "observer" || role === null) return null;
-  if (standing === "mine") return { kind: "release", label: "Give control back", why: null };
-  const why = standing === "unknown" ? "Not connected" : null;
+  if (status === "mine") return { kind: "release", label: "Give control back", why: null };
+  const why = status === "unknown" ? "Not connected" : null;
   if (role === "supervisor") return { kind: "take", label: "Take control", why };
-  if (standing === "asked") return { kind: "withdraw", label: "Withdraw request", why };
+  if (status === "asked") return { kind: "withdraw", label: "Withdraw request", why };
   return { kind: "request", label: "Request control", why };
 }
 

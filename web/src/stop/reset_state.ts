@@ -5,37 +5,37 @@ import { resetRefusalLabel } from "./reset_labels";
 
 /** A stop is looked at this long before the button takes a hand; the bridge refuses an earlier reset. */
 const LOOK_MS = 1000;
-const NEWS_MS = 10_000;
+const MESSAGE_MS = 10_000;
 
 /** The reset of the stop that the page shows. A hand that was on the button before that stop came resets nothing. */
 export interface ResetState {
   number: number | null; // of the stop on screen; null: none is
   shownMs: number; // since when
-  news: string; // what became of the last try; ""
-  newsMs: number;
+  message: string; // what became of the last try; ""
+  messageMs: number;
 }
 
 export function createResetState(): ResetState {
-  return { number: null, shownMs: Infinity, news: "", newsMs: -Infinity };
+  return { number: null, shownMs: Infinity, message: "", messageMs: -Infinity };
 }
 
 /** Call with every drawing: `stop` is what is on screen, null when another thing is. */
-export function noteShownStop(offer: ResetState, stop: StopState | null, now: number): void {
+export function noteShownStop(state: ResetState, stop: StopState | null, now: number): void {
   const number = stop === null ? null : stop.number;
-  if (number === offer.number) return;
-  offer.number = number;
-  offer.shownMs = now;
-  if (number === null) offer.news = "";
+  if (number === state.number) return;
+  state.number = number;
+  state.shownMs = now;
+  if (number === null) state.message = "";
 }
 
 /** Whole seconds until the button takes a hand; 0: it does. */
-export function secondsToReset(offer: ResetState, now: number): number {
-  return offer.number === null ? 1 : Math.max(0, Math.ceil((offer.shownMs + LOOK_MS - now) / 1000));
+export function secondsToReset(state: ResetState, now: number): number {
+  return state.number === null ? 1 : Math.max(0, Math.ceil((state.shownMs + LOOK_MS - now) / 1000));
 }
 
 /** The number that a button held since `heldMs` resets; null: it must not. */
-export function resetNumber(offer: ResetState, heldMs: number): number | null {
-  return offer.number !== null && heldMs >= offer.shownMs + LOOK_MS ? offer.number : null;
+export function resetNumber(state: ResetState, heldMs: number): number | null {
+  return state.number !== null && heldMs >= state.shownMs + LOOK_MS ? state.number : null;
 }
 
 /** Whether this page's person may reset. */
@@ -52,16 +52,16 @@ export function whoResets(state: ConsoleState): string {
     : "An operator who takes control, or a supervisor, can reset it.";
 }
 
-export function tookResetRefusal(offer: ResetState, refusal: Refusal, now: number): void {
-  offer.news = resetRefusalLabel(refusal);
-  offer.newsMs = now;
+export function tookResetRefusal(state: ResetState, refusal: Refusal, now: number): void {
+  state.message = resetRefusalLabel(refusal);
+  state.messageMs = now;
 }
 
-export function resetNotSent(offer: ResetState, now: number): void {
-  offer.news = "Not reset: the console cannot hear this page. Wait for the connection, then hold again.";
-  offer.newsMs = now;
+export function resetNotSent(state: ResetState, now: number): void {
+  state.message = "Not reset: the console cannot hear this page. Wait for the connection, then hold again.";
+  state.messageMs = now;
 }
 
-export function resetNews(offer: ResetState, now: number): string {
-  return now - offer.newsMs < NEWS_MS ? offer.news : "";
+export function resetMessage(state: ResetState, now: number): string {
+  return now - state.messageMs < MESSAGE_MS ? state.message : "";
 }

@@ -41,7 +41,7 @@ export interface ConnectionEvents {
 
 /** Keeps one peer connected: the only layer that tries again. `first`: what the page's first script has begun. */
 export class Connection {
-  resume = createReconnect(); // of the present peer
+  reconnect = createReconnect(); // of the present peer
   private readonly backoff = createBackoff();
   private peer: Peer | null = null;
   private wake: (() => void) | null = null;
@@ -79,12 +79,12 @@ export class Connection {
 
   /** To be called many times a second: notices silence, which WebRTC takes seconds to notice. */
   step(now: number): void {
-    if (this.peer?.isConnected === true) this.act(this.peer, reconnectStep(this.resume, now));
+    if (this.peer?.isConnected === true) this.act(this.peer, reconnectStep(this.reconnect, now));
   }
 
   /** The network changed. */
   alarm(): void {
-    reconnectAlarm(this.resume, performance.now());
+    reconnectAlarm(this.reconnect, performance.now());
     this.peer?.probe();
     this.retryNow();
   }
@@ -114,17 +114,17 @@ export class Connection {
     const ending = Promise.withResolvers<PeerEnd>();
     const events: PeerEvents = {
       message: (channel, data, at) => {
-        reconnectHeard(this.resume, at);
+        reconnectHeard(this.reconnect, at);
         this.events.message(channel, data, at);
       },
-      troubled: () => reconnectAlarm(this.resume, performance.now()),
+      troubled: () => reconnectAlarm(this.reconnect, performance.now()),
       ended: (end) => ending.resolve(end),
       streams: (streams) => this.events.streams(peer, streams),
     };
     const peer: Peer = new Peer(this.api, this.reader, this.options, events, this.first);
     this.first = null;
     this.peer = peer;
-    this.resume = createReconnect();
+    this.reconnect = createReconnect();
     this.end = (end) => ending.resolve(end);
     this.events.opened(peer);
     try {
@@ -155,7 +155,7 @@ export class Connection {
       (error: unknown) => error instanceof ConsoleError && error.status !== 0 && error.status < 500,
     );
     if (peer === this.peer)
-      reconnectAsked(this.resume, reached, performance.now(), performance.now() - askedMs);
+      reconnectAsked(this.reconnect, reached, performance.now(), performance.now() - askedMs);
   }
 
   private async restart(peer: Peer): Promise<void> {
@@ -163,7 +163,7 @@ export class Connection {
       () => "accepted" as const,
       (error: unknown) => (error instanceof ConsoleError && error.status === 0 ? "unanswered" : "refused"),
     );
-    if (peer === this.peer) this.act(peer, reconnectRestarted(this.resume, outcome, performance.now()));
+    if (peer === this.peer) this.act(peer, reconnectRestarted(this.reconnect, outcome, performance.now()));
   }
 
   private async sleep(waitMs: number): Promise<void> {

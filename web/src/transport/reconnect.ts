@@ -42,34 +42,34 @@ export function createReconnect(): Reconnect {
 }
 
 /** A message came. A restart that was asked for is carried to its end. */
-export function reconnectHeard(resume: Reconnect, now: number): void {
-  resume.silentMs = 0;
-  if (resume.phase !== "over" && resume.phase !== "restarting") enter(resume, "live", now);
+export function reconnectHeard(reconnect: Reconnect, now: number): void {
+  reconnect.silentMs = 0;
+  if (reconnect.phase !== "over" && reconnect.phase !== "restarting") enter(reconnect, "live", now);
 }
 
 /** The network changed, or WebRTC misses the other side. */
-export function reconnectAlarm(resume: Reconnect, now: number): void {
-  resume.alarmedUntilMs = now + ALARM_MS;
+export function reconnectAlarm(reconnect: Reconnect, now: number): void {
+  reconnect.alarmedUntilMs = now + ALARM_MS;
 }
 
 /** To be called many times a second. */
-export function reconnectStep(resume: Reconnect, now: number): ReconnectAction | null {
-  resume.silentMs += Math.min(STEP_LIMIT_MS, now - (resume.stepMs ?? now));
-  resume.stepMs = now;
-  const spent = now - resume.sinceMs;
-  switch (resume.phase) {
+export function reconnectStep(reconnect: Reconnect, now: number): ReconnectAction | null {
+  reconnect.silentMs += Math.min(STEP_LIMIT_MS, now - (reconnect.stepMs ?? now));
+  reconnect.stepMs = now;
+  const spent = now - reconnect.sinceMs;
+  switch (reconnect.phase) {
     case "live":
-      if (resume.silentMs < (now < resume.alarmedUntilMs ? ALARMED_MS : SILENT_MS)) return null;
-      enter(resume, "asking", now);
-      return ask(resume, now);
+      if (reconnect.silentMs < (now < reconnect.alarmedUntilMs ? ALARMED_MS : SILENT_MS)) return null;
+      enter(reconnect, "asking", now);
+      return ask(reconnect, now);
     case "asking":
-      return now - resume.askedMs < ASK_MS ? null : ask(resume, now);
+      return now - reconnect.askedMs < ASK_MS ? null : ask(reconnect, now);
     case "hoping":
-      if (spent < Math.min(HOPE_MS + resume.answerMs / 2, MOST_HOPE_MS)) return null;
-      enter(resume, "restarting", now);
+      if (spent < Math.min(HOPE_MS + reconnect.answerMs / 2, MOST_HOPE_MS)) return null;
+      enter(reconnect, "restarting", now);
       return "restart";
     case "moving":
-      return spent < Math.min(MOVE_MS + 4 * resume.answerMs, MOST_MOVE_MS) ? null : giveUp(resume, now);
+      return spent < Math.min(MOVE_MS + 4 * reconnect.answerMs, MOST_MOVE_MS) ? null : giveUp(reconnect, now);
     case "restarting":
     case "over":
       return null;
@@ -77,36 +77,36 @@ export function reconnectStep(resume: Reconnect, now: number): ReconnectAction |
 }
 
 /** The console answered a question after `tookMs`, or something else did in its place. */
-export function reconnectAsked(resume: Reconnect, reached: boolean, now: number, tookMs = 0): void {
-  if (reached) resume.answerMs = tookMs;
-  if (resume.phase === "asking" && reached) enter(resume, "hoping", now);
+export function reconnectAsked(reconnect: Reconnect, reached: boolean, now: number, tookMs = 0): void {
+  if (reached) reconnect.answerMs = tookMs;
+  if (reconnect.phase === "asking" && reached) enter(reconnect, "hoping", now);
 }
 
 /** How the restart was answered. One that got no answer is asked for again, when the console can be reached. */
 export function reconnectRestarted(
-  resume: Reconnect,
+  reconnect: Reconnect,
   outcome: "accepted" | "refused" | "unanswered",
   now: number,
 ): ReconnectAction | null {
-  if (resume.phase !== "restarting") return null;
-  if (outcome === "refused") return giveUp(resume, now);
-  enter(resume, outcome === "accepted" ? "moving" : "asking", now);
+  if (reconnect.phase !== "restarting") return null;
+  if (outcome === "refused") return giveUp(reconnect, now);
+  enter(reconnect, outcome === "accepted" ? "moving" : "asking", now);
   return null;
 }
 
-function ask(resume: Reconnect, now: number): ReconnectAction {
-  resume.askedMs = now;
+function ask(reconnect: Reconnect, now: number): ReconnectAction {
+  reconnect.askedMs = now;
   return "ask";
 }
 
-function giveUp(resume: Reconnect, now: number): ReconnectAction {
-  enter(resume, "over", now);
+function giveUp(reconnect: Reconnect, now: number): ReconnectAction {
+  enter(reconnect, "over", now);
   return "reconnect";
 }
 
-function enter(resume: Reconnect, phase: ReconnectPhase, now: number): void {
-  resume.phase = phase;
-  resume.sinceMs = now;
+function enter(reconnect: Reconnect, phase: ReconnectPhase, now: number): void {
+  reconnect.phase = phase;
+  reconnect.sinceMs = now;
 }
 
 /** What the page does about a console that fell silent. */

@@ -47,11 +47,11 @@ const holding: Record<string, (now: number) => HeldInputs> = {
 /** Holds it and says when it disarmed as taped down; null when it did not within `forMs`. */
 function tapedAfter(held: (now: number) => HeldInputs, forMs: number): number | null {
   const arming = createArming();
-  const grip = createInputActivity();
+  const activity = createInputActivity();
   sampleDeadman(arming, false, "", 0);
   expect(arm(arming, READY, false)).toBeNull();
   for (let now = 0; now <= forMs; now += TICK_MS)
-    if (sampleDeadman(arming, true, noteInput(grip, held(now)), now) === "taped_down") {
+    if (sampleDeadman(arming, true, noteInput(activity, held(now)), now) === "taped_down") {
       expect([arming.state, arming.reason]).toEqual(["disarmed", "taped_down"]);
       return now;
     }

@@ -31,7 +31,7 @@ function damaged(path: string, value: unknown): string {
 
 describe("the profiles of pads", () => {
   it("are read as they were written", () =>
-    expect(readProfiles(writeProfiles(BOOK))).toEqual({ kind: "book", book: BOOK }));
+    expect(readProfiles(writeProfiles(BOOK))).toEqual({ kind: "profiles", book: BOOK }));
 
   it("are at most so many, the newest", () => {
     const profiles = Array.from({ length: MAX_PROFILES + 3 }, (_, at) => ({
@@ -40,7 +40,7 @@ describe("the profiles of pads", () => {
       shaping: DEFAULT_SHAPING,
     }));
     const read = readProfiles(writeProfiles({ profiles, preferred: null }));
-    expect(read.kind === "book" && read.book.profiles.map(({ id }) => id).slice(0, 1)).toEqual(["3"]);
+    expect(read.kind === "profiles" && read.book.profiles.map(({ id }) => id).slice(0, 1)).toEqual(["3"]);
   });
 
   it.each<[string, string, unknown]>([
@@ -73,7 +73,7 @@ describe("the profiles of pads", () => {
 
   it("take settings that are out of bounds within them", () => {
     const read = readProfiles(damaged("profiles.0.shaping", { normal: 99, deadzone: "much" }));
-    expect(read.kind === "book" && read.book.profiles[0]?.shaping).toEqual(DEFAULT_SHAPING);
+    expect(read.kind === "profiles" && read.book.profiles[0]?.shaping).toEqual(DEFAULT_SHAPING);
   });
 
   it("of a file win over those of the same pads", () => {

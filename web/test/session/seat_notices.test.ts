@@ -25,9 +25,9 @@ describe("the answer to a request for the seat", () => {
     const state = createConsoleState();
     applyMessage(state, seatOf("ann", "Ann"), 0);
     applyMessage(state, refusalOf(0, "seat_taken"), 0);
-    expect([state.seatNews, state.log]).toEqual([null, []]);
+    expect([state.seatNotice, state.log]).toEqual([null, []]);
     applyMessage(state, { ...refusalOf(0, "declined"), detail: "declined" }, 0);
-    expect(state.seatNews).toEqual({ words: "Ann declined your request" });
+    expect(state.seatNotice).toEqual({ words: "Ann declined your request" });
     expect(state.log[0]?.text).toBe("Ann declined your request");
   });
 });

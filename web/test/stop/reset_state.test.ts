@@ -4,7 +4,7 @@ import {
   createResetState,
   mayReset,
   noteShownStop,
-  resetNews,
+  resetMessage,
   resetNotSent,
   resetNumber,
   secondsToReset,
@@ -53,12 +53,12 @@ describe("the offer to reset", () => {
     const offer = createResetState();
     noteShownStop(offer, stopped(7), 1000);
     tookResetRefusal(offer, { ...refusalOf(0, "stale_reset"), stop: 7 }, 2000);
-    expect(resetNews(offer, 11_999)).toMatch(/pressed STOP again.*hold again/);
-    expect(resetNews(offer, 12_000)).toBe("");
+    expect(resetMessage(offer, 11_999)).toMatch(/pressed STOP again.*hold again/);
+    expect(resetMessage(offer, 12_000)).toBe("");
     resetNotSent(offer, 20_000);
-    expect(resetNews(offer, 20_001)).toContain("cannot hear this page");
+    expect(resetMessage(offer, 20_001)).toContain("cannot hear this page");
     noteShownStop(offer, null, 20_002);
-    expect(resetNews(offer, 20_003)).toBe("");
+    expect(resetMessage(offer, 20_003)).toBe("");
   });
 
   it.each([

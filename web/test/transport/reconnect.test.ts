@@ -14,10 +14,10 @@ import {
 const STEP = 10;
 
 /** Steps until `until`, and what had to be done when. */
-function run(resume: Reconnect, from: number, until: number): [at: number, action: ReconnectAction][] {
+function run(reconnect: Reconnect, from: number, until: number): [at: number, action: ReconnectAction][] {
   const done: [number, ReconnectAction][] = [];
   for (let now = from; now <= until; now += STEP) {
-    const action = reconnectStep(resume, now);
+    const action = reconnectStep(reconnect, now);
     if (action !== null) done.push([now, action]);
   }
   return done;
@@ -25,17 +25,17 @@ function run(resume: Reconnect, from: number, until: number): [at: number, actio
 
 /** Silent long enough to be asking. */
 function asking(): Reconnect {
-  const resume = createReconnect();
-  run(resume, 0, 1500);
-  return resume;
+  const reconnect = createReconnect();
+  run(reconnect, 0, 1500);
+  return reconnect;
 }
 
 describe("resuming a connection", () => {
   it("leaves a console that speaks alone", () => {
-    const resume = createReconnect();
+    const reconnect = createReconnect();
     for (let now = 0; now < 5000; now += 500) {
-      reconnectHeard(resume, now);
-      expect(run(resume, now, now + 490)).toEqual([]);
+      reconnectHeard(reconnect, now);
+      expect(run(reconnect, now, now + 490)).toEqual([]);
     }
   });
 
@@ -48,65 +48,65 @@ describe("resuming a connection", () => {
   });
 
   it("asks sooner when the network changed, for a while", () => {
-    const resume = createReconnect();
-    reconnectAlarm(resume, 0);
-    expect(run(resume, 0, 1000)).toEqual([[700, "ask"]]);
+    const reconnect = createReconnect();
+    reconnectAlarm(reconnect, 0);
+    expect(run(reconnect, 0, 1000)).toEqual([[700, "ask"]]);
     const later = createReconnect();
     reconnectAlarm(later, -6000);
     expect(run(later, 0, 1000)).toEqual([]);
   });
 
   it("does not take a page that was held up for a console that is silent", () => {
-    const resume = createReconnect();
-    reconnectStep(resume, 0);
-    expect(reconnectStep(resume, 10_000)).toBeNull();
-    expect(resume.phase).toBe("live");
+    const reconnect = createReconnect();
+    reconnectStep(reconnect, 0);
+    expect(reconnectStep(reconnect, 10_000)).toBeNull();
+    expect(reconnect.phase).toBe("live");
   });
 
   it("is live again with the first message, while it asks and while it hopes", () => {
-    const resume = asking();
-    expect(resume.phase).toBe("asking");
-    reconnectHeard(resume, 1600);
-    expect(resume.phase).toBe("live");
-    run(resume, 1600, 3200);
-    reconnectAsked(resume, true, 3200);
-    expect(resume.phase).toBe("hoping");
-    reconnectHeard(resume, 3300);
-    expect(run(resume, 3300, 4500)).toEqual([]);
+    const reconnect = asking();
+    expect(reconnect.phase).toBe("asking");
+    reconnectHeard(reconnect, 1600);
+    expect(reconnect.phase).toBe("live");
+    run(reconnect, 1600, 3200);
+    reconnectAsked(reconnect, true, 3200);
+    expect(reconnect.phase).toBe("hoping");
+    reconnectHeard(reconnect, 3300);
+    expect(run(reconnect, 3300, 4500)).toEqual([]);
   });
 
   it("restarts ICE when the console can be reached and its connection stays silent", () => {
-    const resume = asking();
-    reconnectAsked(resume, false, 1600);
-    expect(resume.phase).toBe("asking");
-    reconnectAsked(resume, true, 1700);
-    expect(run(resume, 1710, 2300)).toEqual([[2100, "restart"]]);
+    const reconnect = asking();
+    reconnectAsked(reconnect, false, 1600);
+    expect(reconnect.phase).toBe("asking");
+    reconnectAsked(reconnect, true, 1700);
+    expect(run(reconnect, 1710, 2300)).toEqual([[2100, "restart"]]);
   });
 
   it("connects anew when the restart is refused", () => {
-    const resume = asking();
-    reconnectAsked(resume, true, 1600);
-    run(resume, 1610, 2100);
-    expect(reconnectRestarted(resume, "refused", 2200)).toBe("reconnect");
-    expect(run(resume, 2210, 9000)).toEqual([]);
-    reconnectHeard(resume, 9100);
-    expect(resume.phase).toBe("over");
+    const reconnect = asking();
+    reconnectAsked(reconnect, true, 1600);
+    run(reconnect, 1610, 2100);
+    expect(reconnectRestarted(reconnect, "refused", 2200)).toBe("reconnect");
+    expect(run(reconnect, 2210, 9000)).toEqual([]);
+    reconnectHeard(reconnect, 9100);
+    expect(reconnect.phase).toBe("over");
   });
 
   it("connects anew when the new path brings nothing within 3 s", () => {
-    const resume = asking();
-    reconnectAsked(resume, true, 1600);
-    run(resume, 1610, 2100);
-    expect(reconnectRestarted(resume, "accepted", 2200)).toBeNull();
-    expect(run(resume, 2210, 9000)).toEqual([[5200, "reconnect"]]);
+    const reconnect = asking();
+    reconnectAsked(reconnect, true, 1600);
+    run(reconnect, 1610, 2100);
+    expect(reconnectRestarted(reconnect, "accepted", 2200)).toBeNull();
+    expect(run(reconnect, 2210, 9000)).toEqual([[5200, "reconnect"]]);
   });
 
   it("gives a long path more time, up to ten seconds", () => {
-    const resume = asking();
-    reconnectAsked(resume, true, 1600, 1200);
-    expect(run(resume, 1610, 3000)).toEqual([[2600, "restart"]]);
-    reconnectRestarted(resume, "accepted", 4000);
-    expect(run(resume, 4010, 15_000)).toEqual([[11_800, "reconnect"]]);
+    const reconnect = asking();
+    reconnectAsked(reconnect, true, 1600, 1200);
+    expect(run(reconnect, 1610, 3000)).toEqual([[2600, "restart"]]);
+    reconnectRestarted(reconnect, "accepted", 4000);
+    expect(run(reconnect, 4010, 15_000)).toEqual([[11_800, "reconnect"]]);
     const longer = asking();
     reconnectAsked(longer, true, 1600, 8000);
     expect(run(longer, 1610, 4000)).toEqual([[3600, "restart"]]);
@@ -115,37 +115,37 @@ describe("resuming a connection", () => {
   });
 
   it("is live again when the new path brings a message", () => {
-    const resume = asking();
-    reconnectAsked(resume, true, 1600);
-    run(resume, 1610, 2100);
-    reconnectRestarted(resume, "accepted", 2200);
-    reconnectHeard(resume, 2500);
-    expect([resume.phase, run(resume, 2500, 3700)]).toEqual(["live", []]);
+    const reconnect = asking();
+    reconnectAsked(reconnect, true, 1600);
+    run(reconnect, 1610, 2100);
+    reconnectRestarted(reconnect, "accepted", 2200);
+    reconnectHeard(reconnect, 2500);
+    expect([reconnect.phase, run(reconnect, 2500, 3700)]).toEqual(["live", []]);
   });
 
   it("asks again when the restart got no answer", () => {
-    const resume = asking();
-    reconnectAsked(resume, true, 1600);
-    run(resume, 1610, 2100);
-    expect(reconnectRestarted(resume, "unanswered", 7000)).toBeNull();
-    expect(run(resume, 7010, 7500)).toEqual([[7010, "ask"]]);
+    const reconnect = asking();
+    reconnectAsked(reconnect, true, 1600);
+    run(reconnect, 1610, 2100);
+    expect(reconnectRestarted(reconnect, "unanswered", 7000)).toBeNull();
+    expect(run(reconnect, 7010, 7500)).toEqual([[7010, "ask"]]);
   });
 
   it("carries a restart that was asked for to its end, also when the old path is back", () => {
-    const resume = asking();
-    reconnectAsked(resume, true, 1600);
-    run(resume, 1610, 2100);
-    reconnectHeard(resume, 2150);
-    expect(resume.phase).toBe("restarting");
-    reconnectRestarted(resume, "accepted", 2200);
-    expect(resume.phase).toBe("moving");
+    const reconnect = asking();
+    reconnectAsked(reconnect, true, 1600);
+    run(reconnect, 1610, 2100);
+    reconnectHeard(reconnect, 2150);
+    expect(reconnect.phase).toBe("restarting");
+    reconnectRestarted(reconnect, "accepted", 2200);
+    expect(reconnect.phase).toBe("moving");
   });
 
   it("ignores answers that come when nobody waits for them", () => {
-    const resume = createReconnect();
-    reconnectAsked(resume, true, 0);
-    expect(reconnectRestarted(resume, "refused", 0)).toBeNull();
-    expect(resume.phase).toBe("live");
+    const reconnect = createReconnect();
+    reconnectAsked(reconnect, true, 0);
+    expect(reconnectRestarted(reconnect, "refused", 0)).toBeNull();
+    expect(reconnect.phase).toBe("live");
   });
 });
 

@@ -27,7 +27,7 @@ const HOLD_MS = 3000; // tiles stay where they are this long after the pointer m
 
 /** The overview of a fleet: a tile for each robot, STOP for all of them. */
 export class FleetPage {
-  readonly news = createPollState();
+  readonly pollState = createPollState();
   readonly tiles = new Map<string, Tile>();
   shown: readonly Tile[] = []; // in the order of the page
   readonly thumbnails: Thumbnails;
@@ -67,12 +67,12 @@ export class FleetPage {
     });
     this.poll = new FleetPoll(api, {
       answer: (answer, askedMs) => {
-        tookAnswer(this.news, answer, askedMs, performance.now(), Date.now());
+        tookAnswer(this.pollState, answer, askedMs, performance.now(), Date.now());
         this.stopping.took(answer.robots);
         this.follow();
       },
       trouble: (trouble) => {
-        tookError(this.news, trouble);
+        tookError(this.pollState, trouble);
         this.follow();
       },
     });
@@ -84,11 +84,11 @@ export class FleetPage {
   }
 
   get robots(): readonly FleetRobot[] {
-    return this.news.answer?.robots ?? [];
+    return this.pollState.answer?.robots ?? [];
   }
 
   phase(now: number): PollPhase {
-    return pollPhase(this.news, now);
+    return pollPhase(this.pollState, now);
   }
 
   /** Shows the page and keeps it current. */
@@ -186,15 +186,15 @@ export class FleetPage {
     this.drawnMs = now;
     const phase = this.phase(now);
     setData(this.root, "phase", this.link.token === null ? "shut_out" : phase);
-    const unknownSince = phase === "unknown" ? this.news.heardAt : null;
+    const unknownSince = phase === "unknown" ? this.pollState.heardAt : null;
     const before = new Map([...this.tiles].map(([name, tile]) => [name, tile.state]));
     for (const robot of this.robots) {
       const tile = this.tiles.get(robot.name);
-      tile?.show(robot, tileState(robot, { unknownSince, heardAt: this.news.heardAt }));
+      tile?.show(robot, tileState(robot, { unknownSince, heardAt: this.pollState.heardAt }));
       tile?.showPicture(now);
     }
     if (phase !== "unknown") this.arrange(false);
-    setHidden(this.auditing, this.news.answer?.role !== "supervisor");
+    setHidden(this.auditing, this.pollState.answer?.role !== "supervisor");
     this.announce(before, phase);
     this.showBanner(phase);
     this.showMessage(phase);
@@ -244,7 +244,7 @@ export class FleetPage {
 
   /** What concerns the page as a whole. */
   private showBanner(phase: PollPhase): void {
-    const { answer, trouble, heardAt } = this.news;
+    const { answer, trouble, heardAt } = this.pollState;
     let words = answer?.notices.map((notice) => notice.text).join(" ") ?? "";
     let tone = answer?.notices.some((notice) => notice.level === "error") === true ? "bad" : "wait";
     const lost = phase === "unknown" || (phase === "loading" && trouble !== null);
@@ -274,7 +274,7 @@ export class FleetPage {
 
   private message(phase: PollPhase): FleetMessage | null {
     if (this.link.token === null) return NO_LINK;
-    if (phase === "shut_out") return this.news.trouble === null ? null : shutOut(this.news.trouble);
+    if (phase === "shut_out") return this.pollState.trouble === null ? null : shutOut(this.pollState.trouble);
     if (phase === "loading") return null;
     if (this.robots.length === 0) return NO_ROBOTS;
     return this.shown.length === 0 ? notFound(this.tools.query) : null;

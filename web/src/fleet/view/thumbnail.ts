@@ -21,7 +21,7 @@ export class Thumbnail {
   private readonly state = createConsoleState();
   private readonly room: MediaStreams;
   private readonly connection: Connection;
-  private readonly pulse: Heartbeat;
+  private readonly heartbeat: Heartbeat;
   private peer: Peer | null = null;
   private link: ConnectionState = { kind: "connecting" };
   private heardMs = 0;
@@ -47,12 +47,12 @@ export class Thumbnail {
       streams: () => undefined, // thumbnails come from the console itself
       closed: () => this.closed(),
     });
-    this.pulse = new Heartbeat({
+    this.heartbeat = new Heartbeat({
       tell: (message) => this.connection.send("control", JSON.stringify(message)),
       report: () => ({ type: "report", event: this.state.feedback?.event ?? 0 }),
       lost: () => undefined,
     });
-    this.pulse.observes = true;
+    this.heartbeat.observes = true;
     void this.connection.run();
   }
 
@@ -73,7 +73,7 @@ export class Thumbnail {
 
   /** To be called many times a second. */
   step(now: number): void {
-    if (this.isConnected) this.pulse.step(now);
+    if (this.isConnected) this.heartbeat.step(now);
     this.connection.step(now);
   }
 
@@ -116,7 +116,7 @@ export class Thumbnail {
 
   private closed(): void {
     this.peer = null;
-    this.pulse.end();
+    this.heartbeat.end();
     this.room.close();
     forgetConnection(this.state);
     this.changed();
@@ -134,7 +134,7 @@ export class Thumbnail {
     if (message.type === "welcome") {
       this.link = { kind: "connected" };
       if (this.peer !== null) this.room.open(this.peer, message.streams);
-    } else if (message.type === "pong") this.pulse.answered(message.id, this.heardMs);
+    } else if (message.type === "pong") this.heartbeat.answered(message.id, this.heardMs);
     else if (message.type === "feedback" && this.state.feedback === message) {
       this.room.changed();
       this.changed();

@@ -38,7 +38,7 @@ export class SoundStream {
   observe(context: GateContext, audible: boolean): void {
     const playing = this.source.playing();
     const { stamps } = this.section;
-    const mark = playing === undefined || stamps === null ? UNMARKED : findMark(stamps.book, playing);
+    const mark = playing === undefined || stamps === null ? UNMARKED : findMark(stamps.table, playing);
     const before = this.gate.counts.rendered;
     const passes = playing !== undefined && this.judge(playing, mark, context, audible, performance.now());
     if (this.gate.counts.rendered > before) this.note(mark ?? UNMARKED, context);
@@ -76,14 +76,14 @@ export class SoundStream {
   private arrived(): void {
     const { stamps } = this.section;
     if (stamps === null || stamps.newest === null) return;
-    const mark = findMark(stamps.book, stamps.newest) ?? UNMARKED;
+    const mark = findMark(stamps.table, stamps.newest) ?? UNMARKED;
     const { feedback, tolerance, gate } = this.context();
     noteSeen(this.gate.counts, judge(feedback, mark.stamp, tolerance, gate, null).gap);
   }
 
   private wouldPass(rtpTimestamp: number, context: GateContext): boolean {
     const { stamps } = this.section;
-    const mark = stamps === null ? undefined : findMark(stamps.book, rtpTimestamp);
+    const mark = stamps === null ? undefined : findMark(stamps.table, rtpTimestamp);
     if (mark === undefined) return false;
     const { feedback, tolerance, gate } = context;
     return judge(feedback, mark.stamp, tolerance, gate, ageOf(mark, context)).verdict === "render";

@@ -8,7 +8,7 @@ const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
 
 /** Stamps of one receiver's frames. */
 export interface ReceiverStamps extends Arrivals {
-  readonly book: StampTable;
+  readonly table: StampTable;
   readonly packets: boolean; // its packets go to `onpacket`, not to the browser's decoder
   onstamp: (() => void) | null;
   onpacket: ((rtpTimestamp: number, packet: ArrayBuffer) => void) | null;
@@ -16,7 +16,7 @@ export interface ReceiverStamps extends Arrivals {
 
 function createStamps(packets: boolean): ReceiverStamps {
   return {
-    book: createStampTable(BOOK_LIMIT),
+    table: createStampTable(BOOK_LIMIT),
     packets,
     ...createArrivals(),
     onstamp: null,
@@ -32,7 +32,7 @@ function notePacket(
   dropped: boolean,
   packet: ArrayBuffer | null,
 ): void {
-  noteMark(stamps.book, rtpTimestamp, mark);
+  noteMark(stamps.table, rtpTimestamp, mark);
   noteArrival(stamps, rtpTimestamp, dropped);
   stamps.onstamp?.();
   if (packet !== null) stamps.onpacket?.(rtpTimestamp, packet);

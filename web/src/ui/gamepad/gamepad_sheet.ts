@@ -78,7 +78,7 @@ class PadSheet implements SheetContent {
     setText(this.heading, state.name);
     this.controls.update(state);
     // Of the profiles as they are now: the pad itself is read a moment later.
-    this.form.show(setupOf(state.gamepad, storage.book.profiles).shaping);
+    this.form.show(setupOf(state.gamepad, storage.saved.profiles).shaping);
   }
 
   private updateWizard(gamepad: Gamepad, now: number): void {
@@ -89,7 +89,7 @@ class PadSheet implements SheetContent {
       setText(this.words, `${padName(gamepad.id)} is gone: nothing was changed`);
       return;
     }
-    this.wizard.update(live, setupOf(live, this.pad.storage.book.profiles).shaping, now);
+    this.wizard.update(live, setupOf(live, this.pad.storage.saved.profiles).shaping, now);
   }
 
   private calibrate(gamepad: Gamepad): void {
@@ -112,7 +112,7 @@ class PadSheet implements SheetContent {
   private keep(layout: PadLayout): void {
     const gamepad = this.calibrated;
     if (gamepad === null) return;
-    const { shaping } = setupOf(gamepad, this.pad.storage.book.profiles);
+    const { shaping } = setupOf(gamepad, this.pad.storage.saved.profiles);
     this.pad.storage.save({ id: gamepad.id, layout, shaping });
     this.pad.choose(gamepad);
     this.leaveWizard();

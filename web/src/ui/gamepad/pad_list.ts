@@ -33,7 +33,7 @@ export class PadList {
   update(): void {
     const pads = this.pad.all();
     const current = this.pad.state?.gamepad.index ?? null;
-    const { profiles } = this.pad.storage.book;
+    const { profiles } = this.pad.storage.saved;
     setHidden(this.empty, pads.length > 0);
     const words = pads.map((pad) => setupLabel(setupOf(pad, profiles), pad.index === current));
     const shape = pads.map((pad, at) => `${pad.index} ${pad.id} ${words[at]}`).join("\n");

@@ -36,23 +36,23 @@ export function createSeatBar(engine: ConsoleEngine, talk: Panel): Panel {
     element,
     update(now) {
       const { state, session } = engine;
-      if (state.seatNews !== told) {
-        told = state.seatNews;
+      if (state.seatNotice !== told) {
+        told = state.seatNotice;
         toldMs = now;
       }
       const me = state.welcome?.peer ?? null;
-      const standing = seatStatus(state.seat, me);
+      const status = seatStatus(state.seat, me);
       const claims = session.claims(now);
       const found = seatLabels({
         role: state.welcome?.role ?? null,
-        standing,
+        status: status,
         holder: state.seat?.name ?? "",
         claims,
         me,
         idleSeconds: session.idleSecondsLeft(now),
         armed: engine.isArmed(),
         obstacle: obstacleOf(engine, now),
-        news: told !== null && now - toldMs < NEWS_MS ? told.words : null,
+        notice: told !== null && now - toldMs < NEWS_MS ? told.words : null,
       });
       session.shownClaim = found.tone === "asked" ? (claims[0]?.peer ?? null) : null;
       setData(element, "tone", found.tone);

@@ -1,7 +1,7 @@
 import { robotIsUp } from "../../session/console_state";
 import { ageLabel } from "../../drive/feedback_age";
 import { reconnectLabel } from "../../transport/reconnect";
-import { mayReset, noteShownStop, resetNews, secondsToReset, whoResets } from "../../stop/reset_state";
+import { mayReset, noteShownStop, resetMessage, secondsToReset, whoResets } from "../../stop/reset_state";
 import {
   CONNECTION_END_LABELS,
   CONNECTION_ERROR_LABELS,
@@ -39,7 +39,7 @@ export function createOverlay(engine: ConsoleEngine): Panel {
       const words = overlayLabels(engine, now);
       setHidden(element, words === null);
       const isStop = words?.tone === "stopped";
-      noteShownStop(engine.stopping.offer, isStop ? engine.state.stop : null, now);
+      noteShownStop(engine.stopping.resetState, isStop ? engine.state.stop : null, now);
       if (words === null) return;
       setData(element, "tone", words.tone);
       setText(title, words.title);
@@ -49,9 +49,9 @@ export function createOverlay(engine: ConsoleEngine): Panel {
       setText(warning, words.warning ?? "");
       setHidden(warning, words.warning === undefined);
       setHidden(reset.element, !isStop || !mayReset(engine.state) || engine.state.stop.locked_out !== "");
-      const seconds = secondsToReset(engine.stopping.offer, now);
+      const seconds = secondsToReset(engine.stopping.resetState, now);
       reset.show(seconds === 0 ? "Hold to reset" : `Look first: reset in ${seconds} s`, seconds === 0);
-      const told = resetNews(engine.stopping.offer, now);
+      const told = resetMessage(engine.stopping.resetState, now);
       setText(news, told);
       setHidden(news, told === "");
     },
@@ -98,7 +98,7 @@ function linkWords(link: ConnectionState, now: number): OverlayLabels {
 function silentWords(engine: ConsoleEngine, now: number): OverlayLabels {
   const since = ageLabel(engine.silentMs(now));
   const stopped = engine.state.stop.stopped ? " The robot was stopped when it was last heard." : "";
-  const text = `Nothing was heard for ${since}. ${reconnectLabel(engine.connection.resume.phase)}${stopped}`;
+  const text = `Nothing was heard for ${since}. ${reconnectLabel(engine.connection.reconnect.phase)}${stopped}`;
   return { tone: "bad", title: "Console silent", text };
 }
 
