@@ -1,6 +1,6 @@
 """Write the JSON Schemas of the console's and the robot link's messages and of recordings to docs/schemas/.
 
-The page's TypeScript types (web/src/wire.ts) are made from the first by `npm run generate` in web/.
+The page's TypeScript types (web/src/protocol/wire.ts) are made from the first by `npm run generate` in web/.
 With `--check` nothing is written and a difference ends with status 1.
 """
 

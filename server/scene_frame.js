@@ -1,6 +1,6 @@
 // Runs in the 3D scene's frame before any script of viser's. The frame has an origin of its own that nobody else has,
 // so the console's page around it can only be told things, and tell: which event a change belongs to, and which
-// changes may be shown (web/src/ui/scene_frame.ts). Without such a page it shows none.
+// changes may be shown (web/src/scene/scene_frame.ts). Without such a page it shows none.
 (() => {
   "use strict";
   const waiting = []; // changes that the page has not let through: {id, deliver}, in order

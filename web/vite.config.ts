@@ -24,7 +24,7 @@ const FILES = /\s*<(script|link)\b([^>]*\b(?:src|href)="\.\/assets\/[^>]*)>(?:<\
 const ATTRIBUTE = /([\w-]+)(?:="([^"]*)")?/g;
 
 /**
- * The operator's page begins with what connects (src/first.ts). Its other files are named in that script alone: a browser
+ * The operator's page begins with what connects (src/preconnect.ts). Its other files are named in that script alone: a browser
  * that saw them in the page would ask for them first, on the connection that the offer is to take.
  */
 const firstScript: Plugin = {
@@ -43,7 +43,7 @@ const firstScript: Plugin = {
         rest.push({ tag, attributes: Object.fromEntries(pairs) });
         return "";
       });
-      const script = await bundled("src/first.ts", { REST: JSON.stringify(rest) });
+      const script = await bundled("src/preconnect.ts", { REST: JSON.stringify(rest) });
       page.source = html.replace("</body>", () => `  <script>${script}</script>\n  </body>`);
     },
   },

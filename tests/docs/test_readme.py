@@ -30,7 +30,10 @@ def test_every_make_target_that_is_named_exists(document: Path) -> None:
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_every_file_of_the_project_that_is_named_exists(document: Path) -> None:
     folders = "robot_bridge|server|client|web|bench|tests|docs|scripts"
-    # `rtc/peer.ts` is short for web/src/rtc/peer.ts where a text speaks of the page.
+    text = document.read_text()
     named_files = rf"`((?:(?:{folders})/[\w./-]+\.(?:py|ts|md|json|js))|rtc/[\w./-]+\.py)`"
-    for named in re.findall(named_files, document.read_text()):
+    for named in re.findall(named_files, text):
         assert (ROOT / named).exists(), named
+    # `drive/driver.ts` is short for web/src/drive/driver.ts where a text speaks of the page.
+    for named in re.findall(rf"`((?!(?:{folders})/)[a-z_]+/[\w/]+\.ts)`", text):
+        assert (ROOT / "web" / "src" / named).exists(), named

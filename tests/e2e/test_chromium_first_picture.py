@@ -73,7 +73,7 @@ async def test_whatever_the_rest_of_the_page_takes_the_gate_judges_with_feedback
         async def hold(route: Route) -> None:
             # The connection is there, and has said a lot, before the script that listens.
             await page.wait_for_function(
-                "() => window.lockstepFirst?.opening.early.filter((each) => each.channel === 'control').length > 3",
+                "() => window.lockstepFirst?.pending.early.filter((each) => each.channel === 'control').length > 3",
                 timeout=60_000,
             )
             await route.continue_()
@@ -118,7 +118,7 @@ async def test_what_comes_after_the_first_picture_is_tried_again_when_it_did_not
         await (route.abort() if len(tries) == 1 else route.continue_())
 
     async with open_console(chromium, "about:blank") as console:
-        await console.page.route(re.compile(r"/assets/later_parts-.*\.js"), fail_once)
+        await console.page.route(re.compile(r"/assets/deferred_parts-.*\.js"), fail_once)
         await console.page.goto(stack.operator)
         await console.until_live()
         await console.page.locator(".stop").first.wait_for()

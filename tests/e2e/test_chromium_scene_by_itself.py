@@ -19,7 +19,7 @@ DRAWN = "window.lockstep.scene().state === 'drawn'"
 # Later than this after the first picture the page has decided; two answers of its rule have passed since.
 DECIDED = "performance.now() - window.lockstep.rendered('overview')[0].at > 3500"
 FIGURES = "[...document.querySelectorAll('.view')].map((each) => each.dataset.view)"
-CODE = "performance.getEntriesByType('resource').filter((each) => each.name.includes('scene_stage'))"
+CODE = "performance.getEntriesByType('resource').filter((each) => each.name.includes('scene_renderer'))"
 
 # At every frame: what the page's own drawing and the picture show, and whether the drawing may be seen.
 WATCH = """() => {
@@ -55,7 +55,9 @@ async def test_the_robot_stands_in_the_scene_by_itself_where_the_machine_has_gra
         await console.until(DRAWN, 30)
         assert await _colours(console) > 30
         await expect(_toggle(console)).to_have_attribute("aria-pressed", "true")
-        assert not [url for url in asked if "/scene" in url and "scene_stage" not in url], "the console serves nothing"
+        assert not [url for url in asked if "/scene" in url and "scene_renderer" not in url], (
+            "the console serves nothing"
+        )
         first = await console.page.evaluate("window.lockstep.rendered('overview')[0].at")
         code = await console.page.evaluate(f"{CODE}.map((each) => each.startTime)")
         assert len(code) > 0

@@ -1,7 +1,7 @@
 """What a reviewer of a teleoperation system looks for, one test for each point that Python can show.
 
 They stand together so that they are found; more on each of them stands where the rule is kept (docs/safety.md has the
-table). What the page does is tested in web/test/core and tests/e2e.
+table). What the page does is tested in web/test and tests/e2e.
 """
 
 import ast
@@ -62,7 +62,7 @@ def pilot_after_driving() -> tuple[Pilot, float]:
 
 
 def test_point_01_hold_to_run_a_script_that_stops_commanding_lets_go() -> None:
-    """The page's deadman is tested in web/test/core/arming.test.ts. Without one, silence is letting go."""
+    """The page's deadman is tested in web/test/drive/arming.test.ts. Without one, silence is letting go."""
     pilot, now = pilot_after_driving()
     sent = [message for step in range(60) for message in pilot.due(now + step * 0.01)]
     assert sent
@@ -162,7 +162,7 @@ async def test_point_06_trips_latch_and_reset_moves_nothing() -> None:
 
 
 async def test_point_07_an_operator_who_is_gone_leaves_the_robot_at_rest() -> None:
-    """Blur, hidden tab and unplugged pad: tests/e2e/test_chromium_driving.py and web/test/core/arming.test.ts."""
+    """Blur, hidden tab and unplugged pad: tests/e2e/test_chromium_driving.py and web/test/drive/arming.test.ts."""
     robot = RecordingRobot()
     async with running_bridge(robot) as bridge:
         async with operator(bridge) as driver:
@@ -243,7 +243,7 @@ async def test_point_10_every_refusal_is_told_counted_and_recorded(tmp_path: Pat
 
 def test_point_11_a_deadman_held_unchanged_for_a_minute_counts_as_taped_down() -> None:
     """The page knows what is held, so the rule is the page's; its test is named here so that it cannot get lost."""
-    text = (Path(__file__).parents[2] / "web/test/core/arming.test.ts").read_text()
+    text = (Path(__file__).parents[2] / "web/test/drive/arming.test.ts").read_text()
     assert 'it("held a minute with nothing else changing counts as taped down"' in text
 
 

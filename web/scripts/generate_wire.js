@@ -1,4 +1,4 @@
-// Writes src/wire.ts (types) and src/wire_schema.json (what the parser checks) from docs/schemas/console.schema.json.
+// Writes src/protocol/wire.ts (types) and src/protocol/wire_schema.json (what the parser checks) from docs/schemas/console.schema.json.
 // With --check nothing is written and a difference ends with status 1.
 import { existsSync, readFileSync, writeFileSync } from "node:fs";
 
@@ -36,7 +36,7 @@ function declarationOf([name, node]) {
   return `${about}export interface ${name} {\n${fieldsOf(node).join("\n")}\n}`;
 }
 
-/** The same as the page's parser reads it (src/core/schema_check.ts): it comes before the first picture, so it is short. */
+/** The same as the page's parser reads it (src/protocol/schema_check.ts): it comes before the first picture, so it is short. */
 function shapeOf(node) {
   if (node.$ref) return nameOf(node.$ref);
   const union = node.anyOf ?? node.oneOf;
@@ -75,8 +75,8 @@ const types = `${head}\n${Object.entries(definitions).map(declarationOf).join("\
 const received = [...reachableFrom("ServerMessage")].sort();
 const checks = Object.fromEntries(received.map((name) => [name, shapeOf(definitions[name])]));
 const generated = {
-  "../src/wire.ts": types,
-  "../src/wire_schema.json": `${JSON.stringify(checks)}\n`,
+  "../src/protocol/wire.ts": types,
+  "../src/protocol/wire_schema.json": `${JSON.stringify(checks)}\n`,
 };
 
 for (const [path, text] of Object.entries(generated)) {

@@ -1,9 +1,9 @@
 import "./style/fleet_page.css";
-import { readFragment } from "./core/fragment";
-import { installFleetHook } from "./fleet/fleet_hook";
-import { FleetPage } from "./fleet/fleet_page";
-import { ConsoleApi } from "./rtc/console_api";
-import { watchTouch } from "./ui/touch_mark";
+import { readFragment } from "./util/url_fragment";
+import { installFleetHook } from "./fleet/view/fleet_hook";
+import { FleetPage } from "./fleet/view/fleet_page";
+import { ConsoleApi } from "./transport/signalling/console_api";
+import { watchTouch } from "./ui/elements/touch_detection";
 
 const link = readFragment(location.hash);
 const page = new FleetPage(new ConsoleApi(link.token ?? ""), link);

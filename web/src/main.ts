@@ -1,16 +1,16 @@
 import "./style/console_page.css";
-import { readFragment } from "./core/fragment";
-import { Page } from "./page";
-import { ConsoleApi } from "./rtc/console_api";
-import { takeFirst } from "./rtc/first_opening";
-import { styled } from "./styled";
+import { readFragment } from "./util/url_fragment";
+import { Page } from "./app/page";
+import { ConsoleApi } from "./transport/signalling/console_api";
+import { takePreconnection } from "./transport/webrtc/preconnection";
+import { stylesheetsLoaded } from "./app/stylesheets";
 
 const link = readFragment(location.hash);
-const page = new Page(new ConsoleApi(link.token ?? ""), link, link.name, takeFirst());
-if (link.token === null) page.app.link = { kind: "no_token" };
-void styled().then(() => {
+const page = new Page(new ConsoleApi(link.token ?? ""), link, link.name, takePreconnection());
+if (link.token === null) page.engine.connectionState = { kind: "no_token" };
+void stylesheetsLoaded().then(() => {
   page.start();
-  if (link.token !== null) void page.app.connection.run();
+  if (link.token !== null) void page.engine.connection.run();
 });
 
 // Another link pasted into the same tab changes only the fragment.
@@ -18,5 +18,5 @@ addEventListener("hashchange", () => location.reload());
 // Any first touch of the page lets it make sound, unless the operator turned it off.
 for (const type of ["pointerdown", "keydown"] as const)
   addEventListener(type, () => {
-    if (page.app.state.settings.soundWanted && !page.app.audio.isRunning()) page.app.audio.resume();
+    if (page.engine.state.settings.soundWanted && !page.engine.audio.isRunning()) page.engine.audio.resume();
   });

@@ -1,13 +1,13 @@
 import "./style/recordings_page.css";
-import { readReplayLink, replayHash, tokenIn } from "./core/replay_link";
-import { ListView } from "./replay/list_view";
+import { readReplayLink, replayHash, tokenIn } from "./replay/replay_link";
+import { ListView } from "./replay/view/list_view";
 import { startDecoders } from "./replay/picture_decoder";
-import { PlayerView } from "./replay/player_view";
+import { PlayerView } from "./replay/view/player_view";
 import { RecordingsApi } from "./replay/recordings_api";
-import { installReplayHook } from "./replay/replay_hook";
-import { ConsoleApi } from "./rtc/console_api";
-import { troubleWords } from "./rtc/session_api";
-import { button, h, setText } from "./ui/dom";
+import { installReplayHook } from "./replay/view/replay_hook";
+import { ConsoleApi } from "./transport/signalling/console_api";
+import { requestErrorLabel } from "./transport/signalling/session_api";
+import { button, h, setText } from "./ui/elements/dom";
 
 interface View {
   readonly element: HTMLElement;
@@ -62,7 +62,7 @@ async function route(): Promise<void> {
     installReplayHook(player);
     player.start(link.event);
   } catch (error) {
-    if (view === waiting) put(message("The recording cannot be opened", troubleWords(error), true));
+    if (view === waiting) put(message("The recording cannot be opened", requestErrorLabel(error), true));
   }
 }
 

@@ -7,7 +7,7 @@ import type {
   Seat,
   StopState,
   Welcome,
-} from "../src/wire";
+} from "../src/protocol/wire";
 
 export function stopOf(rest: Partial<StopState> = {}): StopState {
   return { stopped: false, by: "", reason: "", number: 0, press: "", kept: true, locked_out: "", ...rest };

@@ -1,5 +1,5 @@
-import type { ChartStream, ChartWindow } from "../core/chart_ring";
-import { streamColumn } from "../core/chart_ring";
+import type { ChartStream, ChartWindow } from "./chart_ring";
+import { streamColumn } from "./chart_ring";
 
 /** One line of a chart: how it is told apart, and where its values come from. */
 export interface ChartLine {

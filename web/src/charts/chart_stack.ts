@@ -1,6 +1,6 @@
 import "uplot/dist/uPlot.min.css";
-import { chartWindow, type ChartRing } from "../core/chart_ring";
-import { h } from "../ui/dom";
+import { chartWindow, type ChartRing } from "./chart_ring";
+import { h } from "../ui/elements/dom";
 import { chartSpecs } from "./chart_specs";
 import { TimeChart } from "./time_chart";
 

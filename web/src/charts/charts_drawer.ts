@@ -1,11 +1,11 @@
-import type { ChartSampler } from "../chart_sampler";
-import { chartCsv } from "../core/chart_csv";
-import { chartWindow, newestTime } from "../core/chart_ring";
-import { redrawMs } from "../core/chart_scale";
-import { button, h, setData, setHidden, setPressed, setText, type Panel } from "../ui/dom";
-import { chartPicture } from "./chart_picture";
+import type { ChartSampler } from "./chart_sampler";
+import { chartCsv } from "./chart_csv";
+import { chartWindow, newestTime } from "./chart_ring";
+import { redrawMs } from "./chart_scale";
+import { button, h, setData, setHidden, setPressed, setText, type Panel } from "../ui/elements/dom";
+import { chartPicture } from "./chart_image";
 import type { ChartStack } from "./chart_stack";
-import { save } from "./save";
+import { saveFile } from "../ui/elements/save_file";
 
 const RANGES = [
   { seconds: 30, label: "30 s" },
@@ -79,8 +79,8 @@ export class ChartsDrawer implements Panel {
     const { from, until } = this.span();
     const name = `lockstep-${new Date(until * 1000).toISOString().slice(0, 19).replaceAll(":", "")}`;
     const csv = chartCsv(chartWindow(this.sampler.ring, from, until));
-    save(new Blob([csv], { type: "text/csv" }), `${name}.csv`);
-    save(await chartPicture(stack.all(), `Lockstep · ${clock(from)} to ${clock(until)}`), `${name}.png`);
+    saveFile(new Blob([csv], { type: "text/csv" }), `${name}.csv`);
+    saveFile(await chartPicture(stack.all(), `Lockstep · ${clock(from)} to ${clock(until)}`), `${name}.png`);
     setText(this.words, `Saved ${name}.csv and .png`);
   }
 

@@ -1,7 +1,7 @@
 import uPlot from "uplot";
-import type { ChartWindow } from "../core/chart_ring";
-import { gapRange, held, valueRange } from "../core/chart_scale";
-import { h, setText } from "../ui/dom";
+import type { ChartWindow } from "./chart_ring";
+import { gapRange, held, valueRange } from "./chart_scale";
+import { h, setText } from "../ui/elements/dom";
 import type { ChartBand, ChartLine, ChartSpec } from "./chart_specs";
 
 const SYNC = "lockstep";

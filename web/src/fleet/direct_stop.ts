@@ -1,5 +1,5 @@
-import { robotsNearby, type FleetRobot, type StopReply } from "../core/fleet_answer";
-import { ConsoleApi, stopAnswerOf } from "../rtc/console_api";
+import { robotsNearby, type FleetRobot, type StopReply } from "./fleet_status";
+import { ConsoleApi, stopAnswerOf } from "../transport/signalling/console_api";
 
 /**
  * Says STOP to other consoles' robots at those consoles, where one entry leads to them: it needs nothing between the

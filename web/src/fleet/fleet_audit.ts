@@ -1,36 +1,29 @@
-import { parseFleetAudit, type FleetAuditEntry } from "../core/fleet_audit";
-import type { ConsoleApi } from "../rtc/console_api";
-import { createAuditView, type AuditAnswer } from "../ui/audit_view";
-import { h } from "../ui/dom";
-import type { SheetContent } from "../ui/sheet";
+import { auditEntry, type AuditEntry } from "../session/audit_trail";
+import { isRecord } from "../protocol/schema_check";
 
-const LIMIT_MS = 8000;
-const LINES = 500; // the most that the console gives
-
-/** What happened at all robots, other consoles' too. For supervisors. */
-export function createFleetAudit(api: ConsoleApi): SheetContent {
-  const ask = async (): Promise<AuditAnswer<FleetAuditEntry>> => {
-    const limit = AbortSignal.timeout(LIMIT_MS);
-    const answer = await api.json("GET", `/api/fleet/audit?limit=${LINES}`, undefined, limit);
-    const { entries, trouble } = parseFleetAudit(answer);
-    return {
-      entries,
-      trouble: trouble === "" ? "" : `Lines of other consoles may be missing: ${trouble}.`,
-    };
-  };
-  return createAuditView<FleetAuditEntry>({
-    title: "Audit trail of all robots",
-    className: "of-fleet",
-    second: ["Robot"],
-    cells: (entry) => [robotCell(entry)],
-    newest: ask,
-    hasOlder: () => false, // each robot's own page has all of its lines
-    older: ask,
-    merged: (_known, answer) => answer,
-  });
+/** One line of the audit of some robot's console (docs/console-api.md). */
+export interface FleetAuditEntry extends AuditEntry {
+  readonly robot: string;
+  readonly console: string; // its name; "" for the one that was asked
 }
 
-function robotCell({ robot, console }: FleetAuditEntry): HTMLElement {
-  const title = console === "" ? "at this console" : `at ${console}`;
-  return h("td", "audit-robot", { title }, robot);
+export interface FleetAuditPage {
+  readonly entries: readonly FleetAuditEntry[]; // newest first
+  readonly trouble: string; // why lines of other consoles may be missing; "" when none are
+}
+
+/** What an answer says; what is no line is left out. */
+export function parseFleetAudit(answer: unknown): FleetAuditPage {
+  const records: unknown = isRecord(answer) ? answer["records"] : undefined;
+  const entries = (Array.isArray(records) ? records : []).flatMap((each: unknown) => entryOf(each));
+  const isAll = isRecord(answer) && answer["complete"] === true;
+  const detail = isRecord(answer) && typeof answer["detail"] === "string" ? answer["detail"] : "";
+  return { entries: entries.reverse(), trouble: isAll ? "" : detail || "the others did not answer" };
+}
+
+function entryOf(value: unknown): FleetAuditEntry[] {
+  if (!isRecord(value) || !isRecord(value["record"])) return [];
+  const { robot, console } = value;
+  if (typeof robot !== "string" || typeof console !== "string") return [];
+  return [{ ...auditEntry(value["record"]), robot, console }];
 }

@@ -1,7 +1,7 @@
-import { parseFleet, type FleetAnswer } from "../core/fleet_answer";
-import type { FleetTrouble } from "../core/fleet_news";
-import { troubleOf } from "../core/trouble";
-import { ConsoleError, type ConsoleApi } from "../rtc/console_api";
+import { parseFleet, type FleetStatus } from "./fleet_status";
+import type { PollError } from "./poll_state";
+import { connectionErrorOf } from "../transport/connection_error";
+import { ConsoleError, type ConsoleApi } from "../transport/signalling/console_api";
 
 const POLL_MS = 1000;
 const HIDDEN_MS = 5000; // nobody looks
@@ -9,8 +9,8 @@ const REFUSED_MS = 5000; // a link that was refused is not refused less a moment
 const LIMIT_MS = 4000;
 
 export interface FleetPollEvents {
-  answer(answer: FleetAnswer, askedMs: number): void;
-  trouble(trouble: FleetTrouble): void;
+  answer(answer: FleetStatus, askedMs: number): void;
+  trouble(trouble: PollError): void;
 }
 
 /** Asks how the robots are, once a second; one question at a time. */
@@ -49,7 +49,7 @@ export class FleetPoll {
     return this.abort.signal.aborted;
   }
 
-  private async ask(askedMs: number): Promise<FleetTrouble | null> {
+  private async ask(askedMs: number): Promise<PollError | null> {
     try {
       const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(LIMIT_MS)]);
       const answer = parseFleet(await this.api.json("GET", "/api/fleet", undefined, signal));
@@ -72,13 +72,13 @@ export class FleetPoll {
   }
 }
 
-function describe(error: unknown): FleetTrouble {
+function describe(error: unknown): PollError {
   if (!(error instanceof ConsoleError)) return { why: "refused" };
   if (error.error === "link_revoked" || error.error === "link_expired") return { ended: error.error };
-  return { why: troubleOf(error.status, error.error) };
+  return { why: connectionErrorOf(error.status, error.error) };
 }
 
-function pauseOf(trouble: FleetTrouble | null): number {
+function pauseOf(trouble: PollError | null): number {
   if (trouble !== null && "why" in trouble && trouble.why === "token_refused") return REFUSED_MS;
   return document.hidden ? HIDDEN_MS : POLL_MS;
 }

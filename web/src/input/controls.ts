@@ -1,7 +1,7 @@
-import type { HeldInputs } from "../core/axis_mapping";
-import { createGrip, noteGrip } from "../core/grip";
+import type { HeldInputs } from "../drive/axis_mapping";
+import { createInputActivity, noteInput } from "../drive/input_activity";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
-import type { Pad, PadEvents, PadState } from "./pad";
+import type { Pad, PadEvents, PadState } from "./gamepad";
 import type { TouchSticks } from "./touch_sticks";
 
 const SLOW_SHARE = 0.3;
@@ -18,7 +18,7 @@ export interface ControlSample {
 export class Controls {
   pad: Pad | null = null; // until its code is there
   readonly keyboard: Keyboard;
-  private readonly grip = createGrip();
+  private readonly activity = createInputActivity();
 
   constructor(
     readonly sticks: TouchSticks,
@@ -45,7 +45,7 @@ export class Controls {
       deadman: this.deadman,
       held,
       slowShare: keyboard.slow ? SLOW_SHARE : 1,
-      signature: noteGrip(this.grip, held),
+      signature: noteInput(this.activity, held),
     };
   }
 

@@ -1,4 +1,4 @@
-import { createRateMeter, noteHappening, rateOf } from "../core/samples";
+import { createRateMeter, noteOccurrence, rateOf } from "../util/samples";
 import type { Disposal } from "./disposal";
 import TickWorker from "./tick_worker?worker&inline";
 
@@ -33,7 +33,7 @@ export class Ticker {
   }
 
   private tick(now: number): void {
-    if (now - this.tickMs > STALL_MS) noteHappening(this.stalls, now);
+    if (now - this.tickMs > STALL_MS) noteOccurrence(this.stalls, now);
     this.tickMs = now;
     this.ontick(now);
   }

@@ -1,5 +1,5 @@
-import type { TouchInputs } from "../core/axis_mapping";
-import { shapeStick } from "../core/pad_shaping";
+import type { TouchInputs } from "../drive/axis_mapping";
+import { shapeStick } from "../gamepad/shaping";
 
 type Side = "left" | "right";
 

@@ -1,4 +1,4 @@
-import type { Closable } from "../core/picture_gate";
+import type { Closable } from "../gate/picture_gate";
 
 /** A decoded picture that can be drawn any time until it is closed. */
 export interface Picture extends Closable {

@@ -1,4 +1,4 @@
-import { NewestLog } from "../core/newest_log";
+import { BoundedLog } from "../util/bounded_log";
 
 /** One picture as it was drawn, or one segment of sound as it began to be heard. */
 export interface Rendering {
@@ -10,4 +10,4 @@ export interface Rendering {
 }
 
 /** The newest renderings of one stream. */
-export class RenderLog extends NewestLog<Rendering> {}
+export class RenderLog extends BoundedLog<Rendering> {}

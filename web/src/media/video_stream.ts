@@ -1,9 +1,9 @@
-import { closePictureGate, createPictureGate, offerPicture, settlePicture } from "../core/picture_gate";
-import { UNMARKED, type FrameMark, type GateContext } from "../core/medium_counts";
-import { createRateMeter, noteHappening } from "../core/samples";
-import { findMark } from "../core/stamp_book";
-import type { Section } from "../rtc/section";
-import type { StreamInfo } from "../wire";
+import { closePictureGate, createPictureGate, offerPicture, settlePicture } from "../gate/picture_gate";
+import { UNMARKED, type FrameMark, type GateContext } from "../gate/gate_counters";
+import { createRateMeter, noteOccurrence } from "../util/samples";
+import { findMark } from "../gate/stamp_table";
+import type { MediaSection } from "../transport/webrtc/media_section";
+import type { StreamInfo } from "../protocol/wire";
 import { openFrames, type OnPicture } from "./frame_source";
 import type { Picture } from "./picture";
 import { RenderLog } from "./render_log";
@@ -27,7 +27,7 @@ export class VideoStream {
 
   constructor(
     readonly info: StreamInfo,
-    readonly section: Section,
+    readonly section: MediaSection,
     readonly canvas: HTMLCanvasElement,
     private readonly events: VideoStreamEvents,
   ) {
@@ -52,7 +52,7 @@ export class VideoStream {
 
   private readonly lookup = (rtpTimestamp: number): FrameMark | undefined => {
     const { stamps } = this.section;
-    return stamps === null ? UNMARKED : findMark(stamps.book, rtpTimestamp);
+    return stamps === null ? UNMARKED : findMark(stamps.table, rtpTimestamp);
   };
 
   private readonly draw = (
@@ -69,7 +69,7 @@ export class VideoStream {
     this.drawing?.drawImage(picture.image, 0, 0);
     const at = performance.now();
     this.lastDrawnMs = at;
-    noteHappening(this.frames, at);
+    noteOccurrence(this.frames, at);
     this.log.add({ stamp, gap, feedback: this.events.context().feedback, at, age });
     this.events.drawn(this, stamp, at);
   };

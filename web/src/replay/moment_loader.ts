@@ -1,8 +1,8 @@
-import { momentOf, eventAtTime, type ReplayMoment, type ReplayPlace } from "../core/replay_moment";
-import { CAMERA, type ReplayChunkContent } from "../core/replay_chunk";
-import { chunkAt, chunksOf, keyframeBefore, type ReplayIndex } from "../core/replay_index";
-import { isNewer } from "../core/serial";
-import type { ChunkStore } from "./chunk_store";
+import { momentOf, eventAtTime, type ReplayMoment, type ReplayPlace } from "./moment";
+import { CAMERA, type ReplayChunkContent } from "./chunk";
+import { chunkAt, chunksOf, keyframeBefore, type ReplayIndex } from "./index_table";
+import { isNewer } from "../gate/serial";
+import type { ChunkCache } from "./chunk_cache";
 
 const GROUP_US = 20_000_000; // longer than from any keyframe to the next
 const COMMAND_CHUNKS = 16; // before an event's feedback, in which its command is looked for
@@ -10,7 +10,7 @@ const AHEAD = 3; // chunks
 
 /** Finds what belongs to an event: asks for as few chunks as that needs. */
 export class MomentLoader {
-  constructor(private readonly store: ChunkStore) {}
+  constructor(private readonly store: ChunkCache) {}
 
   async load(index: ReplayIndex, place: ReplayPlace): Promise<ReplayMoment> {
     const range = chunksOf(index, place.event);

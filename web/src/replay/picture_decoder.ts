@@ -1,6 +1,6 @@
-import { avcCodec } from "../core/h264";
-import type { ReplayRecord } from "../core/replay_chunk";
-import type { ReplayPicture } from "../core/replay_moment";
+import { avcCodec } from "../media/h264";
+import type { ReplayRecord } from "./chunk";
+import type { ReplayPicture } from "./moment";
 
 const PATIENCE_MS = 250; // for a decoder that gives a picture only when pressed
 

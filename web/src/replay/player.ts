@@ -1,10 +1,10 @@
-import { CAMERA } from "../core/replay_chunk";
-import { clampedEvent, grownIndex, timeOf, type ReplayIndex, type ReplayMark } from "../core/replay_index";
-import type { ReplayMoment, ReplayPlace } from "../core/replay_moment";
-import { eventAfter, isNewer, MAX_EVENT } from "../core/serial";
-import { ConsoleError } from "../rtc/console_api";
-import type { RobotDescription } from "../wire";
-import { ChunkStore } from "./chunk_store";
+import { CAMERA } from "./chunk";
+import { clampedEvent, grownIndex, timeOf, type ReplayIndex, type ReplayMark } from "./index_table";
+import type { ReplayMoment, ReplayPlace } from "./moment";
+import { eventAfter, isNewer, MAX_EVENT } from "../gate/serial";
+import { ConsoleError } from "../transport/signalling/console_api";
+import type { RobotDescription } from "../protocol/wire";
+import { ChunkCache } from "./chunk_cache";
 import { MomentLoader } from "./moment_loader";
 import { CannotDecode, PictureDecoder } from "./picture_decoder";
 import type { RecordingDetails, RecordingsApi } from "./recordings_api";
@@ -43,7 +43,7 @@ export class Player {
   trouble: unknown = null; // of the last request
   isGone = false; // it was deleted meanwhile: what is loaded can still be looked at
   private followMs = FOLLOW_MS;
-  private readonly store: ChunkStore;
+  private readonly store: ChunkCache;
   private readonly loader: MomentLoader;
   private readonly sound: SoundPlayer;
   private readonly decoders = new Map<string, PictureDecoder>();
@@ -62,7 +62,7 @@ export class Player {
     this.isRunning = details.entry.running;
     this.cameras = this.index.topics.filter((topic) => topic.startsWith(CAMERA));
     this.place = { event: this.index.firstEvent, until: null };
-    this.store = new ChunkStore((number, signal) => api.chunk(details.entry.id, number, signal));
+    this.store = new ChunkCache((number, signal) => api.chunk(details.entry.id, number, signal));
     this.loader = new MomentLoader(this.store);
     this.sound = new SoundPlayer(this.store, microphonesOf(this.index));
     if (this.isRunning) this.followLater();

@@ -1,10 +1,10 @@
-import { parseIndex, type ReplayIndex } from "../core/replay_index";
-import { parseChunkBody, type ReplayChunkContent } from "../core/replay_chunk";
-import { parseEntry, parseList, type RecordingEntry, type RecordingList } from "../core/recording_list";
-import { isRecord } from "../core/schema_check";
-import { ConsoleError, type ConsoleApi } from "../rtc/console_api";
-import type { RobotDescription } from "../wire";
-import { parseDescription } from "../core/wire_parser";
+import { parseIndex, type ReplayIndex } from "./index_table";
+import { parseChunkBody, type ReplayChunkContent } from "./chunk";
+import { parseEntry, parseList, type RecordingEntry, type RecordingList } from "./recording_list";
+import { isRecord } from "../protocol/schema_check";
+import { ConsoleError, type ConsoleApi } from "../transport/signalling/console_api";
+import type { RobotDescription } from "../protocol/wire";
+import { parseDescription } from "../protocol/wire_parser";
 
 const LIMIT_MS = 20_000;
 

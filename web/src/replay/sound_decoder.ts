@@ -1,5 +1,5 @@
-import { soundRuns, type ReplaySegment } from "../core/replay_moment";
-import { atRate, decodeMuLaw, opusChannels } from "../core/sound_packets";
+import { soundRuns, type ReplaySegment } from "./moment";
+import { atRate, decodeMuLaw, opusChannels } from "../media/sound/sound_samples";
 
 const OPUS_RATE = 48_000;
 const MU_LAW_RATE = 8000; // RFC 3551 4.5.14

@@ -1,6 +1,6 @@
-import { MICROPHONE, type ReplayRecord } from "../core/replay_chunk";
-import { chunkAt, type ReplayIndex } from "../core/replay_index";
-import type { ChunkStore } from "./chunk_store";
+import { MICROPHONE, type ReplayRecord } from "./chunk";
+import { chunkAt, type ReplayIndex } from "./index_table";
+import type { ChunkCache } from "./chunk_cache";
 import { decodeSound } from "./sound_decoder";
 
 const AHEAD_US = 400_000; // how far ahead of the pictures sound is decoded
@@ -17,7 +17,7 @@ export class SoundPlayer {
   private busy = false;
 
   constructor(
-    private readonly store: ChunkStore,
+    private readonly store: ChunkCache,
     private readonly topics: readonly string[],
   ) {}
 

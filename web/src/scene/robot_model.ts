@@ -1,5 +1,5 @@
 import { Box3, Group, Quaternion, Sphere, Vector3 } from "three";
-import type { Body, RobotDescription } from "../wire";
+import type { Body, RobotDescription } from "../protocol/wire";
 import { shapeOf } from "./robot_shapes";
 
 const NEAREST = 1e-7; // m: a robot of no size is drawn as one of this size

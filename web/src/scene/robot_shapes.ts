@@ -9,7 +9,7 @@ import {
   SRGBColorSpace,
   type BufferGeometry,
 } from "three";
-import type { Geom } from "../wire";
+import type { Geom } from "../protocol/wire";
 
 const ROUND = 28; // segments of a circle
 

@@ -1,8 +1,8 @@
 import { ArrowHelper, type BufferGeometry, LineSegments } from "three";
 import { describe, expect, test } from "vitest";
-import { addSigns, type SceneState } from "../../src/scene/robot_signs";
+import { addAnnotations, type SceneState } from "../../src/scene/robot_annotations";
 import { RobotModel } from "../../src/scene/robot_model";
-import type { Body, RobotDescription } from "../../src/wire";
+import type { Body, RobotDescription } from "../../src/protocol/wire";
 import { readVectors } from "../vectors";
 
 interface Poses {
@@ -69,7 +69,7 @@ test("the arrow shows a force from the sensor's threshold on, as long as its sha
   };
   const description = robot({ bodies: [body("hand", "")], wrench });
   const model = new RobotModel(description);
-  const [sign] = addSigns(model, description, 1);
+  const [sign] = addAnnotations(model, description, 1);
   const arrow = model.bodies.get("hand")?.children.find((each) => each instanceof ArrowHelper);
   sign?.show({ ...STILL, wrench: [0, 0, 1, 0, 0, 0] });
   expect(arrow?.visible).toBe(false);
@@ -92,7 +92,7 @@ test("rays end where the sensors saw something within their range", () => {
   };
   const description = robot({ bodies: [body("base", "")], ranges });
   const model = new RobotModel(description);
-  const [sign] = addSigns(model, description, 1);
+  const [sign] = addAnnotations(model, description, 1);
   sign?.show({ ...STILL, ranges: [1, 2, 9, 0.01, 3] });
   const rays = model.bodies.get("base")?.children.find((each) => each instanceof LineSegments);
   const geometry = rays?.geometry as BufferGeometry | undefined;

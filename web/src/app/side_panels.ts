@@ -1,0 +1,149 @@
+import { ChartSampler } from "../charts/chart_sampler";
+import { ChartsDrawer } from "../charts/charts_drawer";
+import type { ConsoleEngine } from "../engine/console_engine";
+import { readFragment } from "../util/url_fragment";
+import type { PageAction } from "../input/shortcuts";
+import { replayHash } from "../replay/replay_link";
+import { countUnread, createUnread, markRead } from "../session/unread_notes";
+import { Pad } from "../input/gamepad";
+import { GamepadStorage } from "../input/gamepad_storage";
+import { watchPageKeys } from "./shortcut_listener";
+import type { ConsoleApi } from "../transport/signalling/console_api";
+import { SessionApi } from "../transport/signalling/session_api";
+import { createAuditSheet } from "../ui/session/audit_sheet";
+import { createDelayPanel } from "../ui/status/delay_panel";
+import type { Panel } from "../ui/elements/dom";
+import { createInviteSheet } from "../ui/session/invite_sheet";
+import { createKeysSheet } from "../ui/driving/keys_sheet";
+import { createLogPanel } from "../ui/status/log_panel";
+import { createNotesPanel } from "../ui/session/notes_panel";
+import { createGamepadSheet } from "../ui/gamepad/gamepad_sheet";
+import { createPageTools, type PageTools } from "../ui/status/page_tools";
+import { createParticipantsPanel } from "../ui/session/participants_panel";
+import { createRecordButton } from "../ui/session/record_button";
+import { createSettingsPanel } from "../ui/driving/settings_panel";
+import { Sheets, type SheetContent } from "../ui/elements/sheet";
+import { createStreamTable } from "../ui/status/stream_table";
+import { Tabs } from "../ui/elements/tabs";
+import type { ViewGrid } from "../ui/views/view_grid";
+
+/** What a dialogue makes inert. The control seat, the banner and STOP stay in reach. */
+const BEHIND_SHEETS = ".bar, .views, .rail, .arm, .axis-panel, .stick";
+
+/** What stands beside the pictures and needs none: tabs, dialogues, charts, their buttons and keys. */
+export class SidePanels {
+  readonly record: Panel;
+  readonly tools: Panel;
+  readonly tabs: Tabs;
+  readonly charts: ChartsDrawer;
+  readonly sheets: Sheets;
+  private readonly unread = createUnread();
+  private readonly pageTools: PageTools;
+  private readonly session: SessionApi;
+  private readonly keys = once(() => createKeysSheet(this.engine));
+  private readonly pads: () => SheetContent;
+  private readonly inviting = once(() => createInviteSheet(this.engine, this.session));
+  private readonly auditing = once(() => createAuditSheet(this.session));
+
+  /** `redraw`: at once, after something was pressed. */
+  constructor(
+    private readonly engine: ConsoleEngine,
+    private readonly grid: ViewGrid,
+    root: HTMLElement,
+    api: ConsoleApi,
+    private readonly redraw: () => void,
+  ) {
+    const { controls } = engine;
+    const pad = (controls.pad ??= new Pad(controls.events, new GamepadStorage()));
+    this.pads = once(() => createGamepadSheet(pad));
+    this.session = new SessionApi(api);
+    this.sheets = new Sheets(() => root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
+    this.record = createRecordButton(engine, this.session);
+    this.pageTools = createPageTools({
+      charts: () => this.act("charts"),
+      keys: () => this.act("keys"),
+      pads: () => this.act("pads"),
+      scene: () => this.toggleScene(),
+    });
+    this.tools = {
+      element: this.pageTools.bar,
+      update: () => this.pageTools.update(engine, grid.sceneSwitch?.isOn === true),
+    };
+    this.tabs = this.createTabs();
+    const sampler = new ChartSampler(engine);
+    engine.charts = sampler;
+    this.charts = new ChartsDrawer(sampler, (open) => root.classList.toggle("shows-charts", open));
+    addEventListener("keydown", (event) => {
+      if (event.code === "Escape") this.sheets.close();
+    });
+    watchPageKeys(engine, (action) => this.act(action));
+  }
+
+  countNews(): number {
+    const { notes, welcome } = this.engine.state;
+    return countUnread(this.unread, notes, welcome?.peer ?? null);
+  }
+
+  private act(action: PageAction): void {
+    if (action === "keys") this.sheets.open(this.keys());
+    else if (action === "pads") this.sheets.open(this.pads());
+    else if (this.sheets.isOpen) return;
+    else if (action === "charts") this.charts.toggle();
+    else if (action === "freeze") this.charts.freeze();
+    else void this.charts.save();
+  }
+
+  private toggleScene(): void {
+    this.grid.sceneSwitch?.toggle();
+    this.redraw();
+  }
+
+  private createTabs(): Tabs {
+    const { engine } = this;
+    const status = [
+      { element: this.pageTools.details, update: () => undefined },
+      createStreamTable(engine),
+      createDelayPanel(engine, () => this.grid.mainStream()),
+      createSettingsPanel(engine),
+      createLogPanel(engine),
+    ];
+    const people = createParticipantsPanel(engine, {
+      invite: () => this.sheets.open(this.inviting()),
+      audit: () => this.sheets.open(this.auditing()),
+      recordings: openRecordings,
+    });
+    const notes = createNotesPanel(engine);
+    const reading: Panel = {
+      element: notes.element,
+      update: (now) => {
+        notes.update(now);
+        if (!document.hidden && notes.element.checkVisibility()) markRead(this.unread, engine.state.notes);
+      },
+    };
+    const news = (): number => this.countNews();
+    const count = (): string =>
+      engine.state.participants.length > 0 ? `${engine.state.participants.length}` : "";
+    return new Tabs("Session", [
+      { name: "Status", panels: status, badge: () => "", calls: () => false },
+      { name: "People", panels: [people], badge: count, calls: () => false },
+      {
+        name: "Notes",
+        panels: [reading],
+        badge: () => (news() > 0 ? `${news()}` : ""),
+        calls: () => news() > 0,
+      },
+    ]);
+  }
+}
+
+/** In a tab of its own: this one goes on. */
+function openRecordings(): void {
+  const { token } = readFragment(location.hash);
+  window.open(`./recordings${replayHash({ token: token ?? "", recording: null, event: null })}`, "_blank");
+}
+
+/** Makes it when it is first wanted. */
+function once<Made>(make: () => Made): () => Made {
+  let made: { readonly value: Made } | null = null;
+  return () => (made ??= { value: make() }).value;
+}

@@ -1,0 +1,125 @@
+import { eventAfter, eventGap, isNewer } from "../gate/serial";
+
+export type Pacing = "feedback" | "media";
+
+/** Why no new command may be sent now, or that it may. */
+export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture" | "sound";
+
+export interface CommandGate {
+  pacing: Pacing;
+  tolerance: number; // events, of the picture; 4
+  minIntervalMs: number; // between two events; 40
+  event: number | null; // newest feedback; null before the first
+  issue: number; // newest issue of that event
+  nonce: number; // of that issue: a command names it, as proof that it was seen
+  inFlight: number | null; // the event sent and not yet answered
+  lastSentMs: number; // -Infinity before the first
+  shown: number | null; // stamp of the picture on screen
+  heard: HeardSound | null; // null: nothing is heard, and nothing is waited for
+}
+
+/** The sound that plays now; of several the one that is farthest behind. */
+export interface HeardSound {
+  readonly stamp: number;
+  readonly tolerance: number; // events
+}
+
+/** The next event and the issue of the feedback that it answers. */
+export interface NextCommand {
+  readonly event: number;
+  readonly issue: number;
+  readonly nonce: number; // of that issue
+}
+
+export function createCommandGate(pacing: Pacing, tolerance: number, minIntervalMs: number): CommandGate {
+  return {
+    pacing,
+    tolerance,
+    minIntervalMs,
+    event: null,
+    issue: 0,
+    nonce: 0,
+    inFlight: null,
+    lastSentMs: -Infinity,
+    shown: null,
+    heard: null,
+  };
+}
+
+/** The operator chose otherwise. */
+export function setPacing(gate: CommandGate, pacing: Pacing, tolerance: number): void {
+  gate.pacing = pacing;
+  gate.tolerance = tolerance;
+}
+
+/** Takes a feedback; says whether it was news. */
+export function takeFeedback(gate: CommandGate, event: number, issue: number, nonce = 0): boolean {
+  if (gate.event === event) {
+    if (issue <= gate.issue) return false;
+    gate.issue = issue;
+    gate.nonce = nonce;
+    return true;
+  }
+  if (gate.event !== null && !isNewer(event, gate.event)) return false;
+  gate.event = event;
+  gate.issue = issue;
+  gate.nonce = nonce;
+  if (gate.inFlight !== null && !isNewer(gate.inFlight, event)) gate.inFlight = null;
+  return true;
+}
+
+/** Takes a refusal; says whether it ended the flight. */
+export function takeRefusal(gate: CommandGate, event: number): boolean {
+  if (gate.inFlight !== event) return false;
+  gate.inFlight = null;
+  return true;
+}
+
+/** A new event was sent; repeats of it are not told. */
+export function noteSent(gate: CommandGate, now: number): void {
+  if (gate.event === null) return;
+  gate.inFlight = eventAfter(gate.event);
+  gate.lastSentMs = now;
+}
+
+/** A picture with this stamp is now on screen. */
+export function noteShown(gate: CommandGate, stamp: number): void {
+  gate.shown = stamp;
+}
+
+/** What is heard now; null: nothing. */
+export function noteHeard(gate: CommandGate, heard: HeardSound | null): void {
+  gate.heard = heard;
+}
+
+/** Of several stamps the one that lags `event` most; null of none. */
+export function farthestBehind(event: number, stamps: readonly number[]): number | null {
+  if (stamps.length === 0) return null;
+  return stamps.reduce((farthest, stamp) =>
+    eventGap(event, stamp) > eventGap(event, farthest) ? stamp : farthest,
+  );
+}
+
+export function gateState(gate: CommandGate, now: number): GateState {
+  if (gate.event === null) return "no_feedback";
+  if (gate.inFlight !== null) return "in_flight";
+  if (now - gate.lastSentMs < gate.minIntervalMs) return "rate";
+  if (gate.pacing !== "media") return "open";
+  if (!isNear(gate.event, gate.shown, gate.tolerance)) return "picture";
+  const { heard } = gate;
+  return heard === null || isNear(gate.event, heard.stamp, heard.tolerance) ? "open" : "sound";
+}
+
+export function nextCommand(gate: CommandGate): NextCommand | null {
+  return gate.event === null ? null : { event: eventAfter(gate.event), issue: gate.issue, nonce: gate.nonce };
+}
+
+/**
+ * Near enough to stay within tolerance when the next feedback comes, one event on. At tolerance 0 none is: there the
+ * medium of the newest event must do.
+ */
+function isNear(event: number, stamp: number | null, tolerance: number): boolean {
+  if (stamp === null) return false;
+  const gap = eventGap(event, stamp);
+  return -tolerance <= gap && gap <= Math.max(tolerance - 1, 0);
+}

@@ -1,0 +1,38 @@
+import type { HeldInputs } from "./axis_mapping";
+
+/** Sticks tremble by themselves; a change smaller than this is no sign of a hand. Share of the full travel. */
+const TREMOR = 0.03;
+
+/** What is held, compared with what was held when it last changed: a deadman that is taped down changes nothing. */
+export interface InputActivity {
+  keys: string; // pressed
+  values: readonly number[]; // of pad and touch
+  changes: number;
+}
+
+export function createInputActivity(): InputActivity {
+  return { keys: "", values: [], changes: 0 };
+}
+
+/** Takes what is held now; returns a text that stays the same while no hand shows. */
+export function noteInput(activity: InputActivity, held: HeldInputs): string {
+  const keys = [...held.keys].sort().join();
+  const values = [...valuesOf(held.pad), ...valuesOf(held.touch)];
+  if (keys !== activity.keys || isMoved(values, activity.values)) {
+    activity.keys = keys;
+    activity.values = values;
+    activity.changes += 1;
+  }
+  return String(activity.changes);
+}
+
+function valuesOf(inputs: Readonly<Record<string, number>> | null): number[] {
+  return inputs === null ? [] : Object.values(inputs);
+}
+
+function isMoved(values: readonly number[], before: readonly number[]): boolean {
+  return (
+    values.length !== before.length ||
+    values.some((value, at) => Math.abs(value - (before[at] ?? 0)) > TREMOR)
+  );
+}

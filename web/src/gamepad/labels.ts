@@ -1,0 +1,84 @@
+import { CALIBRATION_STEPS, type Calibration, type CalibrationStep } from "./calibration";
+import type { PadSetup } from "./profile";
+
+type ControlName = CalibrationStep["name"];
+
+/** What a part of a pad is for, as a list says it. */
+export const CONTROL_NAMES: Readonly<Record<ControlName, string>> = {
+  deadman: "Hold to move",
+  arm: "Arm",
+  stop: "STOP",
+  slow: "Slow",
+  turbo: "Turbo",
+  layer: "Next layer",
+  left_x: "Left stick, sideways",
+  left_y: "Left stick, up and down",
+  right_x: "Right stick, sideways",
+  right_y: "Right stick, up and down",
+  left_trigger: "Left trigger",
+  right_trigger: "Right trigger",
+  cross_up: "Cross up",
+  cross_right: "Cross right",
+  cross_down: "Cross down",
+  cross_left: "Cross left",
+};
+
+const ASKED: Readonly<Record<ControlName, readonly [what: string, about: string]>> = {
+  deadman: [
+    "Press the button to hold while driving",
+    "A shoulder button is best. The robot moves only while it is held.",
+  ],
+  arm: ["Press the button that arms", "Usually Start or Options."],
+  stop: ["Press the button that stops the robot", "One that a thumb finds without looking."],
+  left_x: ["Push the left stick all the way right, then all the way left", "Then let it go."],
+  left_y: ["Push the left stick all the way up, then all the way down", "Then let it go."],
+  right_x: ["Push the right stick all the way right, then all the way left", "Then let it go."],
+  right_y: ["Push the right stick all the way up, then all the way down", "Then let it go."],
+  left_trigger: ["Pull the left trigger to its end, then let it go", "Skip it if the pad has none."],
+  right_trigger: ["Pull the right trigger to its end, then let it go", "Skip it if the pad has none."],
+  cross_up: ["Press up on the cross", "The directional pad. Skip it if there is none."],
+  cross_right: ["Press right on the cross", "Skip it if there is none."],
+  cross_down: ["Press down on the cross", "Skip it if there is none."],
+  cross_left: ["Press left on the cross", "Skip it if there is none."],
+  slow: ["Press the button for slow", "Held together with the other, for careful work. May be skipped."],
+  turbo: [
+    "Press the button for turbo",
+    "Held for the turbo speed, never above the robot's limits. May be skipped.",
+  ],
+  layer: [
+    "Press the button for the next layer",
+    "What the sticks move, where a robot has several sets. May be skipped.",
+  ],
+};
+
+export interface CalibrationPrompt {
+  readonly what: string;
+  readonly about: string;
+  readonly trouble: string; // "" when there is none
+}
+
+/** What the user is to do now. */
+export function calibrationPrompt(calibration: Calibration): CalibrationPrompt {
+  const asked = CALIBRATION_STEPS[calibration.at];
+  if (asked === undefined) return { what: "", about: "", trouble: "" };
+  const [what, about] = ASKED[asked.name];
+  const taken = calibration.taken;
+  const name = taken === null ? undefined : CONTROL_NAMES[taken as ControlName];
+  return {
+    what,
+    about,
+    trouble: name === undefined ? "" : `That one is already “${name}”. Use another one.`,
+  };
+}
+
+/** What a list says of a pad. */
+export function setupLabel(setup: PadSetup, inUse: boolean): string {
+  const how =
+    setup.layout === null ? "needs calibration" : setup.calibrated ? "calibrated here" : "standard mapping";
+  return inUse ? `in use · ${how}` : how;
+}
+
+/** "120 %" */
+export function percent(share: number): string {
+  return `${Math.round(share * 100)} %`;
+}

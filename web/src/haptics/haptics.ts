@@ -1,0 +1,80 @@
+import type { ArmConditions } from "../drive/arming";
+import type { ConsoleState } from "../session/console_state";
+import { contactStrength, feelingOf, forceOf } from "./contact_force";
+import { clearTrace, createForceTrace, noteForce } from "./force_trace";
+import type { Rumble } from "./rumble";
+import type { ContactTone } from "./contact_tone";
+import type { Feedback, ForceFeeling } from "../protocol/wire";
+
+const REFRESH_MS = 50;
+const FELT_MS = 1000; // a force that was measured longer ago is not felt
+
+/** What the operator may feel, and with which pad. */
+export interface HapticsContext {
+  readonly state: Pick<ConsoleState, "robot" | "settings">;
+  readonly controls: { readonly pad: { readonly state: { readonly gamepad: Gamepad } | null } | null };
+  readonly streams: { isAudible(): boolean };
+  readonly measuredMs: number | null; // when the newest feedback came
+  isArmed(): boolean;
+  conditions(now: number): Pick<ArmConditions, "connected" | "stopped" | "visible">;
+}
+
+/** Lets the operator feel a contact as rumble and hear it as a tone: from the feedback itself, before any picture of it. */
+export class Haptics {
+  readonly trace = createForceTrace();
+  private force = 0; // N
+  rumble: Rumble | null = null; // as the tone: until its code is there
+  tone: ContactTone | null = null;
+  private dueMs = 0;
+
+  constructor(private readonly context: HapticsContext) {}
+
+  took(feedback: Feedback, now: number): void {
+    this.force = forceOf(feedback.wrench);
+    noteForce(this.trace, feedback.event, this.force);
+    this.feel(now);
+  }
+
+  /** Called at a fixed rate: effects end by themselves and are renewed. */
+  step(now: number): void {
+    if (now >= this.dueMs) this.feel(now);
+  }
+
+  /** Nothing is felt or heard until the next feeling. */
+  still(): void {
+    this.rumble?.stop();
+    this.tone?.sound(0);
+  }
+
+  /** What was felt belonged to a connection that ended. */
+  forget(): void {
+    this.still();
+    this.force = 0;
+    clearTrace(this.trace);
+  }
+
+  close(): void {
+    this.still();
+    this.tone?.close();
+  }
+
+  private feel(now: number): void {
+    this.dueMs = now + REFRESH_MS;
+    const { context } = this;
+    const { settings } = context.state;
+    const by = this.feeling(now);
+    const strength = by === null ? 0 : contactStrength(this.force, by);
+    const pad = settings.rumble && context.isArmed() ? context.controls.pad?.state : null;
+    this.rumble?.feel(pad?.gamepad ?? null, strength, now);
+    this.tone?.sound(settings.contactTone && context.streams.isAudible() ? strength : 0);
+  }
+
+  /** How a contact feels; null while nothing may be felt. */
+  private feeling(now: number): ForceFeeling | null {
+    const { visible, stopped, connected } = this.context.conditions(now);
+    const { robot } = this.context.state;
+    const { measuredMs } = this.context;
+    if (!visible || stopped || !connected || robot === null) return null;
+    return measuredMs !== null && now - measuredMs < FELT_MS ? feelingOf(robot.description) : null;
+  }
+}

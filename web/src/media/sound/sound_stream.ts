@@ -1,0 +1,131 @@
+import { judge } from "../../gate/media_gate";
+import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../../gate/gate_counters";
+import { START_MS, createSoundGate, isConcealed, observeSound } from "../../gate/sound_gate";
+import { findMark } from "../../gate/stamp_table";
+import type { MediaSection } from "../../transport/webrtc/media_section";
+import type { StreamInfo } from "../../protocol/wire";
+import type { StampReader } from "../../transport/encoded_transform/stamp_reader";
+import { PacketSound } from "./packet_sound";
+import { RenderLog } from "../render_log";
+import { SoundOutput } from "./sound_output";
+import type { SoundSource } from "./sound_source";
+import { TrackSound } from "./track_sound";
+
+/** One microphone: the segment being played is judged, and heard only while it passes. */
+export class SoundStream {
+  readonly gate = createSoundGate();
+  readonly log = new RenderLog();
+  isOpen = false;
+  playing: number | null = null; // stamp of the sound that plays, heard or too old to be; null: none does
+  private readonly source: SoundSource;
+  private readonly output: SoundOutput;
+  private droppedAtStart: number; // before decoding, to begin with the newest
+
+  constructor(
+    readonly info: StreamInfo,
+    readonly section: MediaSection,
+    reader: StampReader | null,
+    audio: AudioContext,
+    private readonly context: () => GateContext,
+  ) {
+    this.source = sourceOf(section, info.codec, reader, audio);
+    this.output = new SoundOutput(audio, this.source.node);
+    this.droppedAtStart = section.stamps?.dropped ?? 0;
+    if (section.stamps !== null) section.stamps.onstamp = () => this.arrived();
+  }
+
+  /** Judges what plays now. Called at every feedback and every few milliseconds. */
+  observe(context: GateContext, audible: boolean): void {
+    const playing = this.source.playing();
+    const { stamps } = this.section;
+    const mark = playing === undefined || stamps === null ? UNMARKED : findMark(stamps.table, playing);
+    const before = this.gate.counts.rendered;
+    const passes = playing !== undefined && this.judge(playing, mark, context, audible, performance.now());
+    if (this.gate.counts.rendered > before) this.note(mark ?? UNMARKED, context);
+    this.isOpen = passes && audible;
+    this.output.open(this.isOpen);
+    const isReal = playing !== undefined && !this.isStarting() && !isConcealed(this.gate, performance.now());
+    this.playing = isReal && audible ? (mark?.stamp ?? null) : null;
+  }
+
+  private judge(
+    playing: number,
+    mark: FrameMark | undefined,
+    context: GateContext,
+    audible: boolean,
+    now: number,
+  ): boolean {
+    const waiting = this.source.waiting(playing);
+    const passes = observeSound(this.gate, playing, mark, context, audible, now, waiting);
+    const { gap } = this.gate.counts;
+    if (context.gate === "event" && gap !== null && gap >= context.tolerance) this.source.hurry();
+    this.source.catchUp(playing, this.gate.isTooOld, (time) => this.wouldPass(time, context));
+    const isEarly = now - (this.gate.playsSinceMs ?? now) < START_MS;
+    if (this.isStarting() || (isEarly && this.source.leavesOut()))
+      this.droppedAtStart = this.section.stamps?.dropped ?? 0;
+    return passes;
+  }
+
+  private note(mark: FrameMark, context: GateContext): void {
+    const { gap } = this.gate.counts;
+    const { feedback } = context;
+    this.log.add({ stamp: mark.stamp, gap, feedback, at: performance.now(), age: ageOf(mark, context) });
+  }
+
+  /** A segment came; what is dropped before it is decoded is never observed. */
+  private arrived(): void {
+    const { stamps } = this.section;
+    if (stamps === null || stamps.newest === null) return;
+    const mark = findMark(stamps.table, stamps.newest) ?? UNMARKED;
+    const { feedback, tolerance, gate } = this.context();
+    noteSeen(this.gate.counts, judge(feedback, mark.stamp, tolerance, gate, null).gap);
+  }
+
+  private wouldPass(rtpTimestamp: number, context: GateContext): boolean {
+    const { stamps } = this.section;
+    const mark = stamps === null ? undefined : findMark(stamps.table, rtpTimestamp);
+    if (mark === undefined) return false;
+    const { feedback, tolerance, gate } = context;
+    return judge(feedback, mark.stamp, tolerance, gate, ageOf(mark, context)).verdict === "render";
+  }
+
+  /** Whether the browser still plays what waited while it opened its sound device. */
+  isStarting(): boolean {
+    return this.gate.starting && this.gate.playing !== null;
+  }
+
+  /** Put to the gate, and dropped before. */
+  received(): number {
+    return this.gate.counts.received + this.dropped();
+  }
+
+  /** Discarded at the gate, and before decoding. */
+  discarded(): number {
+    return this.gate.counts.discarded + this.dropped();
+  }
+
+  private dropped(): number {
+    return (this.section.stamps?.dropped ?? 0) - this.droppedAtStart;
+  }
+
+  level(): number {
+    return this.isOpen ? this.output.level() : 0;
+  }
+
+  close(): void {
+    this.output.close();
+    this.source.close();
+  }
+}
+
+function sourceOf(
+  section: MediaSection,
+  codec: string,
+  reader: StampReader | null,
+  context: AudioContext,
+): SoundSource {
+  const { track, stamps } = section;
+  if (stamps?.packets === true) return new PacketSound(stamps, codec, context);
+  if (track === null) throw new TypeError("sound without a track and without packets");
+  return new TrackSound(section, track, reader, codec === "PCMU" ? 8000 : 48_000, context);
+}

@@ -1,0 +1,28 @@
+import type { Refusal } from "../protocol/wire";
+
+type RefusalReason = Refusal["reason"];
+
+/** What an operator reads for each refusal. */
+export const REFUSAL_LABELS: Readonly<Record<RefusalReason, string>> = {
+  late: "It came too late: the feedback it answers is too old",
+  out_of_order: "It is not the next event",
+  rested: "The robot was told to rest before it arrived",
+  stopped: "The robot is stopped",
+  not_a_number: "A value was not a number",
+  wrong_size: "It did not have one value for each axis",
+  malformed: "The console could not read it",
+  no_seat: "You do not hold the control seat",
+  seat_taken: "Somebody else holds the control seat",
+  declined: "Whoever drives said no, or did not answer",
+  not_neutral: "The robot asks for a neutral command first: let go, then arm",
+  unseen: "It did not name the feedback that it answers",
+  stale_reset: "Somebody pressed STOP again: look at the newest stop before you reset",
+  too_soon: "The stop is less than a second old: wait a moment",
+  not_kept: "The robot could not write the reset to its disk: it stays stopped",
+  locked_out: "Somebody at the robot has locked it",
+  warning: "The robot warns before it moves: wait a moment",
+  silenced: "A supervisor silenced the stops of your link",
+  too_often: "That is too much at once: wait a moment",
+  not_allowed: "Your link does not permit it",
+  link_down: "The console has no link to the robot",
+};

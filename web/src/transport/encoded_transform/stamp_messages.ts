@@ -1,0 +1,37 @@
+/** Between the page and the transform worker. */
+import type { GateMode } from "../../gate/media_gate";
+import type { FrameMark } from "../../gate/gate_counters";
+
+/** Options of one RTCRtpScriptTransform. */
+export interface TransformOptions {
+  readonly receiver: number; // our own number of the receiver
+  readonly kind: "audio" | "video";
+  readonly trailer: boolean; // the carrier is the trailer
+  readonly packets: boolean; // sound that the page decodes and plays, and not the browser
+}
+
+/** Page to worker, at every feedback and change of settings: what sound is judged against. */
+export interface SoundContext {
+  readonly feedback: number | null;
+  readonly tolerance: number;
+  readonly gate: GateMode;
+}
+
+/** Page to worker: leave out sound of this receiver that is older than `before`, to work off a backlog. */
+export interface SoundSkip {
+  readonly receiver: number;
+  readonly before: number; // RTP timestamp
+}
+
+/** Worker to page, for every encoded frame. */
+export interface FrameNote {
+  readonly receiver: number;
+  readonly rtpTimestamp: number;
+  readonly mark: FrameMark;
+  readonly dropped: boolean; // too old already or skipped; never decoded
+  readonly packet: ArrayBuffer | null; // what the page decodes, without the trailer
+}
+
+export function isFrameNote(value: unknown): value is FrameNote {
+  return typeof value === "object" && value !== null && "receiver" in value && "rtpTimestamp" in value;
+}

@@ -1,0 +1,27 @@
+import { holdsSeat } from "../../session/console_state";
+import { limitLabels } from "../../drive/limit_labels";
+import type { ConsoleEngine } from "../../engine/console_engine";
+import { h, setHidden, type Panel } from "../elements/dom";
+
+/** At the foot of the large view: what slows the robot down, or keeps it from moving on. */
+export function createLimitsStrip(engine: ConsoleEngine): Panel {
+  const element = h("ul", "limits", { "aria-label": "What limits the robot", "aria-live": "polite" });
+  let shown = "";
+  return {
+    element,
+    update() {
+      const { state } = engine;
+      const share = holdsSeat(state) ? engine.speedShare : (state.speedCap?.share ?? 1);
+      const words = limitLabels(state.feedback, state.robot?.description ?? null, state.speedCap, share);
+      const key = JSON.stringify(words);
+      if (key === shown) return;
+      shown = key;
+      setHidden(element, words.length === 0);
+      element.replaceChildren(
+        ...words.map((each) =>
+          h("li", "limit", { "data-tone": each.tone }, h("span", "limit-text", {}, each.text)),
+        ),
+      );
+    },
+  };
+}

@@ -1,0 +1,144 @@
+import type { PadLayout } from "../../gamepad/layout";
+import { padName, setupOf } from "../../gamepad/profile";
+import { MAX_STORE_CHARS } from "../../gamepad/profile_file";
+import type { Pad } from "../../input/gamepad";
+import { saveFile } from "../elements/save_file";
+import { button, h, setData, setHidden, setText } from "../elements/dom";
+import { ControlsView } from "./live_inputs";
+import { PadList } from "./pad_list";
+import { ShapingForm } from "./shaping_form";
+import { CalibrationWizard } from "./calibration_wizard";
+import type { SheetContent } from "../elements/sheet";
+
+/** Which pad drives, what its parts do, and how it feels. */
+export function createGamepadSheet(pad: Pad): SheetContent {
+  return new PadSheet(pad);
+}
+
+class PadSheet implements SheetContent {
+  readonly name = "pads";
+  readonly title = "Gamepads";
+  readonly element = h("div", "sheet-body pads");
+  private readonly list: PadList;
+  private readonly overview = h("div", "pad-overview");
+  private readonly wizard: CalibrationWizard;
+  private readonly controls = new ControlsView();
+  private readonly heading = h("h3", "list-head");
+  private readonly current = h("section", "pad-current", { "aria-label": "Gamepad in use" });
+  private readonly forget = button("field-button", "Forget calibration", () => this.forgetCurrent());
+  private readonly words = h("p", "form-trouble", { role: "alert" });
+  private readonly form = new ShapingForm((shaping) => {
+    const state = this.pad.state;
+    if (state === null) return;
+    const { calibrated, layout } = state.setup;
+    this.pad.storage.save({ id: state.id, layout: calibrated ? layout : null, shaping });
+  });
+  private calibrated: Gamepad | null = null; // being calibrated
+  private frame = 0;
+
+  constructor(private readonly pad: Pad) {
+    this.list = new PadList(pad, { calibrate: (gamepad) => this.calibrate(gamepad) });
+    this.wizard = new CalibrationWizard({
+      save: (layout) => this.keep(layout),
+      cancel: () => this.leaveWizard(),
+    });
+    this.current.append(this.heading, this.controls.element, this.form.element);
+    this.overview.append(this.list.element, this.current, this.createFoot(), this.words);
+    this.element.append(this.overview, this.wizard.element);
+  }
+
+  opened(): void {
+    this.leaveWizard();
+    const step = (now: number): void => {
+      this.frame = requestAnimationFrame(step);
+      this.update(now);
+    };
+    step(performance.now());
+  }
+
+  closed(): void {
+    cancelAnimationFrame(this.frame);
+    this.leaveWizard();
+  }
+
+  private update(now: number): void {
+    setHidden(this.overview, this.calibrated !== null);
+    setHidden(this.wizard.element, this.calibrated === null);
+    if (this.calibrated !== null) this.updateWizard(this.calibrated, now);
+    else this.updateOverview();
+  }
+
+  private updateOverview(): void {
+    this.list.update();
+    const { state, storage } = this.pad;
+    setHidden(this.current, state?.ready !== true);
+    setHidden(this.forget, state?.setup.calibrated !== true);
+    if (storage.trouble !== null) setText(this.words, storage.trouble);
+    if (state === null || !state.ready) return;
+    setText(this.heading, state.name);
+    this.controls.update(state);
+    // Of the profiles as they are now: the pad itself is read a moment later.
+    this.form.show(setupOf(state.gamepad, storage.saved.profiles).shaping);
+  }
+
+  private updateWizard(gamepad: Gamepad, now: number): void {
+    // Some browsers hand out a new object with every reading.
+    const live = this.pad.all().find((each) => each.index === gamepad.index && each.id === gamepad.id);
+    if (live === undefined) {
+      this.leaveWizard();
+      setText(this.words, `${padName(gamepad.id)} is gone: nothing was changed`);
+      return;
+    }
+    this.wizard.update(live, setupOf(live, this.pad.storage.saved.profiles).shaping, now);
+  }
+
+  private calibrate(gamepad: Gamepad): void {
+    this.calibrated = gamepad;
+    this.pad.suspend(true);
+    setData(this.element, "mode", "wizard");
+    setText(this.words, "");
+    this.wizard.begin();
+  }
+
+  private leaveWizard(): void {
+    this.calibrated = null;
+    this.pad.suspend(false);
+    setData(this.element, "mode", "overview");
+    setText(this.words, "");
+    setHidden(this.overview, false);
+    setHidden(this.wizard.element, true);
+  }
+
+  private keep(layout: PadLayout): void {
+    const gamepad = this.calibrated;
+    if (gamepad === null) return;
+    const { shaping } = setupOf(gamepad, this.pad.storage.saved.profiles);
+    this.pad.storage.save({ id: gamepad.id, layout, shaping });
+    this.pad.choose(gamepad);
+    this.leaveWizard();
+  }
+
+  private forgetCurrent(): void {
+    const state = this.pad.state;
+    if (state !== null) this.pad.storage.forget(state.id);
+  }
+
+  private createFoot(): HTMLElement {
+    const file = h("input", "", { type: "file", accept: "application/json,.json", hidden: "" });
+    file.addEventListener("change", () => void this.importFile(file));
+    const load = button("field-button", "Import…", () => file.click());
+    const keep = button("field-button", "Export", () => {
+      saveFile(new Blob([this.pad.storage.export()], { type: "application/json" }), "lockstep-pads.json");
+    });
+    return h("div", "pad-foot", {}, this.forget, h("span", "pad-spread"), load, keep, file);
+  }
+
+  private async importFile(file: HTMLInputElement): Promise<void> {
+    const chosen = file.files?.[0];
+    file.value = "";
+    if (chosen === undefined) return;
+    const text = chosen.size > 4 * MAX_STORE_CHARS ? "" : await chosen.text();
+    const trouble = this.pad.storage.import(text);
+    setText(this.words, trouble ?? "");
+  }
+}

@@ -1,0 +1,296 @@
+import type { ConsoleEngine } from "../../engine/console_engine";
+import { note, robotIsUp } from "../../session/console_state";
+import { feedbackAge } from "../../drive/feedback_age";
+import { sourceLabel } from "../../session/source_labels";
+import { layoutViews, smallShape, type MovableCard, type ViewLayout } from "./view_layout";
+import { stalenessOf } from "../../engine/report";
+import type { StreamInfo } from "../../protocol/wire";
+import { h, setData, setHidden, setText } from "../elements/dom";
+import type { SceneSwitch } from "../../scene/scene_switch";
+import type { SceneView } from "../../scene/scene_view";
+
+interface View {
+  readonly name: string;
+  readonly element: HTMLElement;
+  readonly caption: HTMLElement;
+  readonly detail: HTMLElement;
+  readonly veil: HTMLElement;
+  readonly veilWords: HTMLElement;
+  readonly swap: HTMLButtonElement;
+  readonly canvas: HTMLCanvasElement | null; // null: the scene
+}
+
+const SCENE = "3D scene";
+const SCENE_SHAPE = 4 / 3;
+const CARD_WIDTH = 150;
+const CARD_HEIGHT = 64;
+const TOO_SLOW = "The 3D scene was closed: this machine draws it too slowly";
+
+/** One view large, the others small; a click on a small one swaps it in. */
+export class ViewGrid {
+  readonly element = h("main", "views", { "aria-label": "Views" });
+  readonly gauges = h("div", "gauges");
+  card: HTMLElement | null = null; // that may stand at the end of a row of small views, where the style sheet lets it
+  scene: SceneView | null = null; // until its code is there
+  sceneSwitch: SceneSwitch | null = null; // comes with the scene
+  private readonly views = new Map<string, View>(); // cameras in their order, then the scene while it is there
+  private sceneView: View | null = null;
+  private main: string | null = null;
+  private epoch: string | null = null;
+  private shapes = ""; // of the pictures, as they were last laid out
+  private cardHeight = 0; // in its own place
+
+  constructor() {
+    this.element.append(this.gauges);
+    const sizes = new ResizeObserver(() => this.fit());
+    sizes.observe(this.element);
+    sizes.observe(this.gauges);
+  }
+
+  takeScene(scene: SceneView, sceneSwitch: SceneSwitch): void {
+    this.sceneView = this.createView(SCENE, SCENE, null, scene.element);
+    this.scene = scene;
+    this.sceneSwitch = sceneSwitch;
+  }
+
+  /** The canvas of a stream; the same one again after a reconnect. */
+  canvas(info: StreamInfo): HTMLCanvasElement {
+    const known = this.views.get(info.stream)?.canvas;
+    if (known) return known;
+    const canvas = h("canvas", "picture", { "data-stream": info.stream, width: "640", height: "480" });
+    this.addView(this.createView(info.stream, info.label, canvas, canvas));
+    if (this.main === null) this.swapIn(info.stream);
+    return canvas;
+  }
+
+  /** The camera in the large view, or the first one while the scene is large. */
+  mainStream(): string | null {
+    if (this.main !== null && this.main !== SCENE) return this.main;
+    return [...this.views.keys()].find((name) => name !== SCENE) ?? null;
+  }
+
+  /** The camera in the large view; null while the scene is there. */
+  largeStream(): string | null {
+    return this.main === SCENE ? null : this.main;
+  }
+
+  update(engine: ConsoleEngine, now: number): void {
+    this.element.classList.toggle("is-locked", engine.isArmed());
+    this.followEpoch(engine.state.robot?.epoch ?? null);
+    if (this.scene !== null && this.sceneView !== null)
+      this.updateScene(this.scene, this.sceneView, engine, now);
+    for (const view of this.views.values()) if (view.canvas !== null) showVeil(engine, view, now);
+    if (this.shapes !== this.shapesNow()) this.fit();
+  }
+
+  private updateScene(scene: SceneView, view: View, engine: ConsoleEngine, now: number): void {
+    if (scene.hasSettled(now) && engine.ticker.isHeldUp(now)) this.dropScene(scene, engine);
+    if (scene.hasFailed && this.sceneSwitch?.isWanted === false) this.sceneSwitch.giveUp();
+    this.sceneSwitch?.update(engine, now);
+    this.showScene(scene, view, engine);
+    scene.take(engine.state.feedback);
+    scene.update();
+    if (this.views.has(SCENE)) this.showSceneVeil(scene, view, engine, now);
+  }
+
+  /** The scene stands on the page or it does not: nothing is kept free for one that is not there. */
+  private showScene(scene: SceneView, view: View, engine: ConsoleEngine): void {
+    const isOn = this.sceneSwitch?.isOn === true;
+    const description = engine.state.robot?.description;
+    if (isOn && description !== undefined) scene.open(description);
+    if (isOn === this.views.has(SCENE)) return;
+    if (isOn) this.addView(view);
+    else this.removeScene(scene, view);
+  }
+
+  private removeScene(scene: SceneView, view: View): void {
+    scene.close();
+    this.views.delete(SCENE);
+    view.element.remove();
+    if (this.main === SCENE) this.main = this.mainStream();
+    this.arrange();
+  }
+
+  /** The scene is judged like a picture: by how far its event is from the feedback. */
+  private showSceneVeil(scene: SceneView, view: View, engine: ConsoleEngine, now: number): void {
+    const { event, gap } = scene.statistics();
+    const staleness = scene.staleness(feedbackAge(engine.measuredMs, now));
+    const words = event === null && staleness === null ? null : (unreachableWords(engine) ?? staleness);
+    setHidden(view.veil, words === null);
+    view.element.classList.toggle("is-stale", words !== null);
+    if (words !== null) setText(view.veilWords, words);
+    const { video } = engine.state.settings.tolerance;
+    const unknown = scene.lacksJoints ? " · not all joints measured" : "";
+    setText(
+      view.detail,
+      event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}${unknown}`,
+    );
+    setData(view.element, "gap", words === null ? "good" : "bad");
+    setHidden(view.swap, this.isLarge(view) && scene.isFull);
+  }
+
+  /** Nothing may keep STOP waiting, so a scene that this machine cannot draw fast enough goes. */
+  private dropScene(scene: SceneView, engine: ConsoleEngine): void {
+    if (scene.isFull) scene.unload();
+    else this.sceneSwitch?.giveUp();
+    const camera = [...this.views.keys()].find((name) => name !== SCENE);
+    if (camera !== undefined && this.main === SCENE) this.swapIn(camera);
+    note(engine.state, "warning", TOO_SLOW, Date.now());
+  }
+
+  /** The scene lives as long as the bridge whose robot it shows. */
+  private followEpoch(epoch: string | null): void {
+    if (epoch === null || epoch === this.epoch) return;
+    if (this.epoch !== null) this.scene?.renew();
+    this.epoch = epoch;
+  }
+
+  private createView(
+    name: string,
+    label: string,
+    canvas: HTMLCanvasElement | null,
+    content: HTMLElement,
+  ): View {
+    const caption = h("span", "view-label", {}, label);
+    const detail = h("span", "view-detail");
+    const veilWords = h("strong", "veil-words");
+    const about = h("span", "veil-about", {}, "This picture does not show the robot's present state");
+    const veil = h("div", "veil", {}, h("div", "veil-plate", {}, veilWords, about));
+    const swap = h("button", "view-swap", { type: "button", "aria-label": `Show ${label} large` });
+    swap.addEventListener("click", () => this.swapIn(name));
+    const bar = h("figcaption", "view-caption", {}, caption, detail);
+    const element = h("figure", "view", { "data-view": name }, content, veil, bar, swap);
+    setHidden(veil, true);
+    return { name, element, caption, detail, veil, veilWords, swap, canvas };
+  }
+
+  private addView(view: View): void {
+    const hasScene = this.views.delete(SCENE);
+    this.views.set(view.name, view);
+    if (hasScene && this.sceneView !== null) this.views.set(SCENE, this.sceneView);
+    this.element.append(view.element);
+    this.arrange();
+  }
+
+  private swapIn(name: string): void {
+    this.main = name;
+    if (name === SCENE) this.scene?.load();
+    else this.scene?.unload();
+    this.arrange();
+  }
+
+  /** Whether it has the large place: where there is no camera, the scene has. */
+  private isLarge(view: View): boolean {
+    return view.name === (this.main ?? SCENE);
+  }
+
+  private arrange(): void {
+    let place = 0;
+    for (const view of this.views.values()) {
+      const isLarge = this.isLarge(view);
+      setData(view.element, "place", isLarge ? "main" : "small");
+      view.element.style.order = String(isLarge ? 0 : place + 1);
+      view.element.style.setProperty("--slot", String(place));
+      if (!isLarge) place += 1;
+      setHidden(view.swap, isLarge);
+    }
+    this.element.style.setProperty("--small", String(Math.max(1, place)));
+    this.fit();
+  }
+
+  /** Gives the others the room that the large picture leaves. */
+  private fit(): void {
+    this.shapes = this.shapesNow();
+    const style = getComputedStyle(this.element);
+    const gap = parseFloat(style.columnGap);
+    let large = SCENE_SHAPE;
+    const small: number[] = [];
+    for (const view of this.views.values()) {
+      const shape = shapeOf(view);
+      view.element.style.setProperty("--shape", String(smallShape(shape)));
+      if (this.isLarge(view)) large = shape;
+      else small.push(shape);
+    }
+    const gauges = [...this.gauges.children]
+      .map((gauge) => gauge.clientHeight)
+      .filter((height) => height > 0);
+    const card = this.movableCard();
+    const hasCard = this.card?.dataset.beside === "true"; // now: the room has its height already
+    const plan = layoutViews({
+      width: this.element.clientWidth - 2 * parseFloat(style.paddingLeft),
+      height:
+        this.element.clientHeight - 2 * parseFloat(style.paddingTop) - (hasCard ? (card?.height ?? 0) : 0),
+      gap,
+      large,
+      small,
+      gauges,
+      card,
+    });
+    this.element.style.setProperty("--columns", rowColumns(small.length, gauges.length > 0));
+    this.lay(plan, plan.run === "row" ? rowWidth(small, plan.size, gap) : 0);
+  }
+
+  private lay({ run, size, tight, card }: ViewLayout, taken: number): void {
+    setData(this.element, "run", run);
+    setData(this.element, "tight", String(tight));
+    this.element.style.setProperty("--size", `${size}px`);
+    if (this.card === null) return;
+    setData(this.card, "beside", String(card));
+    this.card.style.setProperty("--size", `${size}px`);
+    this.card.style.setProperty("--taken", `${taken}px`);
+  }
+
+  /** null: this screen has a place of its own for the card. */
+  private movableCard(): MovableCard | null {
+    if (this.card === null) return null;
+    const style = getComputedStyle(this.card);
+    if (style.getPropertyValue("--moves") !== "1") return null;
+    if (this.card.dataset.beside !== "true") this.cardHeight = this.card.offsetHeight;
+    return { height: this.cardHeight, leastWidth: CARD_WIDTH, leastHeight: CARD_HEIGHT };
+  }
+
+  private shapesNow(): string {
+    return [...this.views.values()].map((view) => shapeOf(view).toFixed(3)).join(" ");
+  }
+}
+
+/** Of a row: the last one takes the rest. A column of their own for gauges that are not there would leave a gap. */
+function rowColumns(small: number, hasGauges: boolean): string {
+  const before = hasGauges ? small : small - 1;
+  return before > 0 ? `repeat(${before}, auto) minmax(0, 1fr)` : "minmax(0, 1fr)";
+}
+
+/** Of small views of these shapes, with a gap behind each. */
+function rowWidth(small: readonly number[], height: number, gap: number): number {
+  return small.reduce((width, shape) => width + smallShape(shape) * height + gap, 0);
+}
+
+function shapeOf({ canvas }: View): number {
+  return canvas === null || canvas.height === 0 ? SCENE_SHAPE : canvas.width / canvas.height;
+}
+
+function showVeil(engine: ConsoleEngine, view: View, now: number): void {
+  const video = engine.streams.videos.get(view.name);
+  const words = veilWords(engine, view, now);
+  setHidden(view.veil, words === null);
+  view.element.classList.toggle("is-stale", words !== null);
+  if (words !== null) setText(view.veilWords, words);
+  const gap = video?.gate.counts.gap ?? null;
+  const tolerance = engine.state.settings.tolerance.video;
+  setText(view.detail, gap === null ? "" : `gap ${gap} of ${tolerance}`);
+  setData(view.element, "gap", gap !== null && Math.abs(gap) > tolerance ? "bad" : "good");
+}
+
+function veilWords(engine: ConsoleEngine, view: View, now: number): string | null {
+  const video = engine.streams.videos.get(view.name);
+  if (video === undefined) return "Not connected";
+  const unreachable = unreachableWords(engine);
+  if (unreachable !== null) return unreachable;
+  const source = engine.state.sources.find((each) => each.stream === view.name);
+  return (source && sourceLabel(source)) ?? stalenessOf(engine.streams, video, now);
+}
+
+function unreachableWords(engine: ConsoleEngine): string | null {
+  if (engine.state.welcome === null) return "Not connected";
+  return engine.state.robot !== null && !robotIsUp(engine.state) ? "Robot unreachable" : null;
+}

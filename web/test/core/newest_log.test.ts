@@ -1,8 +1,0 @@
-import { expect, it } from "vitest";
-import { NewestLog } from "../../src/core/newest_log";
-
-it("keeps the newest entries, oldest first", () => {
-  const log = new NewestLog<number>(3);
-  for (const entry of [1, 2, 3, 4]) log.add(entry);
-  expect(log.all()).toEqual([2, 3, 4]);
-});

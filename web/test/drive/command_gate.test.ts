@@ -1,0 +1,115 @@
+import { describe, expect, it } from "vitest";
+import {
+  createCommandGate,
+  farthestBehind,
+  gateState,
+  nextCommand,
+  noteHeard,
+  noteSent,
+  noteShown,
+  takeFeedback,
+  takeRefusal,
+  type CommandGate,
+  type Pacing,
+} from "../../src/drive/command_gate";
+import { MAX_EVENT } from "../../src/gate/serial";
+import { readVectors } from "../vectors";
+
+interface Step {
+  at: number;
+  do: { feedback?: [number, number]; sent?: boolean; refused?: number; shown?: number };
+  then: string;
+  next?: { event: number; issue: number };
+}
+
+interface PacingCase {
+  name: string;
+  pacing: Pacing;
+  tolerance: number;
+  min_interval_ms: number;
+  steps: Step[];
+}
+
+const { cases } = readVectors("pacing") as { cases: PacingCase[] };
+
+function act(gate: CommandGate, { at, do: { feedback, sent, refused, shown } }: Step): void {
+  if (feedback !== undefined) takeFeedback(gate, feedback[0], feedback[1]);
+  if (sent === true) noteSent(gate, at);
+  if (refused !== undefined) takeRefusal(gate, refused);
+  if (shown !== undefined) noteShown(gate, shown);
+}
+
+/** The newest feedback and the picture on screen are of event 20. */
+function openGate(pacing: Pacing): CommandGate {
+  const gate = createCommandGate(pacing, 4, 0);
+  takeFeedback(gate, 20, 1);
+  noteShown(gate, 20);
+  return gate;
+}
+
+describe("the command gate", () => {
+  it("has a table of cases", () => expect(cases.length).toBeGreaterThan(15));
+
+  it.each(cases)("$name", ({ pacing, tolerance, min_interval_ms, steps }) => {
+    const gate = createCommandGate(pacing, tolerance, min_interval_ms);
+    for (const step of steps) {
+      act(gate, step);
+      expect(gateState(gate, step.at)).toBe(step.then);
+      if (step.next !== undefined) expect(nextCommand(gate)).toMatchObject(step.next);
+    }
+  });
+
+  it("cannot send before the first feedback", () => {
+    const gate = createCommandGate("feedback", 4, 0);
+    noteSent(gate, 0);
+    expect(gate.inFlight).toBeNull();
+    expect(nextCommand(gate)).toBeNull();
+  });
+
+  describe("with sound that is heard", () => {
+    const heard = (stamp: number, tolerance = 6) => ({ stamp, tolerance });
+
+    it("paced by media waits until the sound stays within tolerance when the next feedback comes", () => {
+      const gate = openGate("media");
+      noteHeard(gate, heard(14));
+      expect(gateState(gate, 0)).toBe("sound");
+      noteHeard(gate, heard(15));
+      expect(gateState(gate, 0)).toBe("open");
+    });
+
+    it("waits for sound only while some is heard", () => {
+      const gate = openGate("media");
+      noteHeard(gate, heard(1));
+      expect(gateState(gate, 0)).toBe("sound");
+      noteHeard(gate, null);
+      expect(gateState(gate, 0)).toBe("open");
+    });
+
+    it("paced by media with tolerance 0 waits for the sound of the newest event", () => {
+      const gate = openGate("media");
+      noteHeard(gate, heard(19, 0));
+      expect(gateState(gate, 0)).toBe("sound");
+      noteHeard(gate, heard(20, 0));
+      expect(gateState(gate, 0)).toBe("open");
+    });
+
+    it("says the picture before the sound", () => {
+      const gate = openGate("media");
+      takeFeedback(gate, 30, 1);
+      noteHeard(gate, heard(1));
+      expect(gateState(gate, 0)).toBe("picture");
+    });
+
+    it("paced by feedback does not wait for it", () => {
+      const gate = openGate("feedback");
+      noteHeard(gate, heard(1));
+      expect(gateState(gate, 0)).toBe("open");
+    });
+
+    it("goes by the microphone that is farthest behind, across the wrap too", () => {
+      expect(farthestBehind(20, [])).toBeNull();
+      expect(farthestBehind(20, [18, 15, 19])).toBe(15);
+      expect(farthestBehind(2, [1, MAX_EVENT - 1, MAX_EVENT])).toBe(MAX_EVENT - 1);
+    });
+  });
+});
