@@ -12,7 +12,7 @@ export interface Axis {
   readonly rest: number;
 }
 
-/** An axis that moves a joint: the joint's velocity is `gain` x (the axis' value - its rest value). None: the gain changes with the posture, and the robot adapter says what the axes do to the joint now. */
+/** An axis that moves a joint: the joint's velocity is `gain` x (the axis' value - its rest value). None: the gain changes with the posture, and the robot adapter computes the axes' effect on the joint. */
 export interface AxisGain {
   readonly axis: string;
   readonly gain: number | null;
@@ -47,7 +47,7 @@ export interface BodyJoint {
   readonly axis: readonly [number, number, number];
 }
 
-/** Axes that together are the twist of a body, for what the 3D view draws as commanded; "" where there is none. */
+/** Axes that together are the twist of a body, for the commanded pose in the 3D view; "" without such an axis. */
 export interface BodyTwist {
   readonly body: string;
   readonly frame: string;
@@ -349,20 +349,20 @@ export interface SeatRelease {
   readonly type: "seat_release";
 }
 
-/** Ask for the control seat; answered by `seat` to all, or by a refusal. While somebody else holds it the request is put to that person, unless `only_if_free`: then it is refused. */
+/** Ask for the control seat; answered by `seat` to all, or by a refusal. While another peer holds it the request is put to that peer, unless `only_if_free`: then it is refused. */
 export interface SeatRequest {
   readonly type: "seat_request";
   readonly only_if_free?: boolean;
 }
 
-/** A supervisor takes the seat from whoever holds it, at once. */
+/** A supervisor takes the seat from its holder, at once. */
 export interface SeatTake {
   readonly type: "seat_take";
 }
 
 export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken;
 
-/** A note that somebody wrote, with the event it belongs to. Newcomers get the last ones. */
+/** A participant's note, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {
   readonly type: "note_shared";
   readonly id: number;
