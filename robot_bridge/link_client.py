@@ -91,10 +91,9 @@ class RobotLink:
             LinkRefused: the bridge said goodbye; the detail begins with its stable name, as in "taken: ...".
             HandshakeError: the process there is not a bridge of this protocol version.
         """
-        loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(CONNECT_TIMEOUT):
-                await loop.create_connection(lambda: self._transport, self._host, self._port, ssl=self._tls)
+                await self._open()
                 self._tick()
                 while self._session.hello is None and self._session.ended is None:
                     self._news.clear()
@@ -108,6 +107,15 @@ class RobotLink:
         if self._session.hello is None:
             await self.close()
             raise self._error()
+
+    async def _open(self) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            await loop.create_connection(lambda: self._transport, self._host, self._port, ssl=self._tls)
+        except BaseException as error:
+            # uvloop closes the transport, does not tell its protocol, and raises where that writes a goodbye.
+            self._transport.connection_lost(error if isinstance(error, Exception) else None)
+            raise
 
     def send(self, message: LinkMessage) -> None:
         """Send without waiting; while the socket is full only the newest of each kind is kept.

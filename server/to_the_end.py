@@ -4,11 +4,21 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-__all__ = ["in_thread", "to_the_end"]
+__all__ = ["ending", "in_thread", "to_the_end"]
 
 DISK_SECONDS = 3.0  # then a disk does not answer, and the end waits for it no longer
 
 Result = TypeVar("Result")
+
+
+def ending() -> bool:
+    """Whether the running task has been cancelled.
+
+    A loop that goes on after any exception asks: an exception that clean-up raises replaces the cancellation, which is
+    told only once.
+    """
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0
 
 
 async def to_the_end(coroutine: Coroutine[Any, Any, object]) -> None:

@@ -4,11 +4,15 @@ What takes long runs first, files that need a browser between those that do not:
 Files whose tests share one console among all files are the last with browsers: it does not idle beside the others.
 """
 
+import asyncio
+import functools
 import gc
+import inspect
 import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import structlog
@@ -37,12 +41,14 @@ structlog.configure(
 )
 
 
+LIMIT = 0.9  # of the time of pytest-timeout, so that the test says where it waited
 SLOW = ("slow", "browser", "long")
 _homes = itertools.count()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
+        _bound(item)
         if not (is_real(_module(item)) or any(item.get_closest_marker(each) for each in SLOW)):
             item.add_marker(pytest.mark.fast)
     places = _places(items)
@@ -52,6 +58,23 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish() -> None:
     gc.freeze()
     gc.enable()
+
+
+def _bound(item: pytest.Item) -> None:
+    """What a test awaits ends in time. pytest-timeout raises from a signal, which a callback of the loop swallows."""
+    assert isinstance(item, pytest.Function)
+    test = item.obj
+    if not inspect.iscoroutinefunction(test):
+        return
+    marker = item.get_closest_marker("timeout")
+    seconds = float(marker.args[0] if marker is not None else item.config.getini("timeout"))
+
+    @functools.wraps(test)
+    async def bounded(*args: Any, **kwargs: Any) -> None:
+        async with asyncio.timeout(LIMIT * seconds):
+            await test(*args, **kwargs)
+
+    item.obj = bounded
 
 
 def _module(item: pytest.Item) -> str:

@@ -24,6 +24,7 @@ from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
 from server.stop_presses import NewPress, Press
 from server.stop_service import SILENCED, StopAnswer, StopOutcome
+from server.to_the_end import ending
 
 __all__ = ["FleetSession"]
 
@@ -132,7 +133,7 @@ class FleetSession:
             except Exception:
                 metrics.session_failures.labels(self.name).inc()
                 log.exception("the session of this robot has failed")
-                if _ending():
+                if ending():
                     return
             self.settled.set()
             if loop.time() - since > HEALTHY_AFTER:
@@ -168,9 +169,3 @@ class FleetSession:
         else:
             clock = here.console.clock
             self.pulse.look(now, up=here.console.robot.up, epoch=clock.epoch, event=clock.event)
-
-
-def _ending() -> bool:
-    """Whether this task was told to end, and a fault in ending has hidden that."""
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0

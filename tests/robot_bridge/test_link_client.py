@@ -1,9 +1,10 @@
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 import pytest
+import uvloop
 
 from robot_bridge.link_client import MAX_INBOX, RobotLink
 from robot_bridge.protocol.errors import HandshakeError, LinkError, LinkLost, LinkRefused
@@ -264,3 +265,26 @@ async def test_the_round_trip_includes_a_tick_and_little_else() -> None:
             await driver.drive()
             trips.append(loop.time() - started)
         assert min(trips) < 0.03
+
+
+async def cancelled_as_it_opens() -> None:
+    async with fake_bridge(wire(HELLO)) as bridge:
+        link = RobotLink("127.0.0.1", bridge.port, "operator")
+        connecting = asyncio.ensure_future(link.connect())
+        made = link._transport.connection_made
+
+        def cancel(transport: asyncio.BaseTransport) -> None:
+            made(transport)
+            connecting.cancel()
+
+        link._transport.connection_made = cancel  # type: ignore[method-assign]
+        with pytest.raises(asyncio.CancelledError):
+            await connecting
+
+
+@pytest.mark.parametrize("loop", [asyncio.new_event_loop, uvloop.new_event_loop])
+def test_a_link_that_is_cancelled_as_it_opens_ends_as_cancelled(
+    loop: Callable[[], asyncio.AbstractEventLoop],
+) -> None:
+    with asyncio.Runner(loop_factory=loop) as runner:
+        runner.run(cancelled_as_it_opens())

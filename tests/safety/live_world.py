@@ -26,6 +26,7 @@ from tests.server.rig import PATIENCE
 __all__ = ["ConsoleProcess", "Judge", "LinkPath", "Player", "Robot"]
 
 START_SECONDS = 40.0  # a busy machine that imports everything
+END_SECONDS = 30.0
 LITTLE = 40  # bytes of a file that still fit on a full disk
 LOST_AFTER = 1.5  # s of a console's silence
 
@@ -166,7 +167,7 @@ class Robot:
         if self._process is None or self._process.returncode is not None:
             return
         self._process.send_signal(how)
-        await self._process.wait()
+        await ended(self._process, "the bridge")
         await self._read_to_the_end()
         self.records.append({"kind": "ended", "in_order": how is not signal.SIGKILL})
 
@@ -224,6 +225,17 @@ class Robot:
             await self._reading
 
 
+async def ended(process: Process, name: str) -> None:
+    """Returns when a process that was told to end has; kills it and fails where it goes on."""
+    try:
+        async with asyncio.timeout(END_SECONDS):
+            await process.wait()
+    except TimeoutError:
+        process.kill()
+        await process.wait()
+        raise AssertionError(f"{name} was told to end, and had not {END_SECONDS:.0f} s later") from None
+
+
 class ConsoleProcess:
     """`lockstep serve` on the same port and the same state folder in every run."""
 
@@ -277,7 +289,7 @@ class ConsoleProcess:
         if self._process is None or self._process.returncode is not None or self._reading is None:
             return
         self._process.send_signal(how)
-        await self._process.wait()
+        await ended(self._process, "the console")
         await self._reading
 
     def fail_disk(self, random: Random) -> None:

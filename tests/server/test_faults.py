@@ -1,8 +1,5 @@
-import asyncio
-import gc
 from typing import Any
 
-from aiortc import InvalidStateError
 from prometheus_client import CollectorRegistry, Counter
 from structlog.testing import capture_logs
 
@@ -31,28 +28,6 @@ def test_every_fault_is_counted_and_a_place_that_goes_on_failing_does_not_flood_
     with capture_logs() as logs:
         faults.caught("quality", ValueError("planted"))
     assert len(logs) == 1
-
-
-async def test_that_aiortc_goes_on_connecting_a_peer_that_has_ended_is_no_fault() -> None:
-    """In a task that nobody awaits. What a callback of ours raises by that name is one."""
-    faults, registry, _ = _faults()
-
-    def fail() -> None:
-        raise InvalidStateError("RTCIceTransport is closed")
-
-    async def connect() -> None:
-        fail()
-
-    loop = asyncio.get_running_loop()
-    loop.set_exception_handler(faults.uncaught)
-    task = loop.create_task(connect())
-    await asyncio.wait([task])
-    del task
-    gc.collect()
-    assert _count(registry, "loop") is None
-    loop.call_soon(fail)
-    await asyncio.sleep(0)
-    assert _count(registry, "loop") == 1
 
 
 def test_what_nobody_awaited_is_a_fault_of_the_loop() -> None:
