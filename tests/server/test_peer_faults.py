@@ -193,11 +193,12 @@ async def _nine_others() -> AsyncIterator[tuple[Rig, list[_Viewer]]]:
 
 
 def _faults(rig: Rig) -> dict[str, float]:
+    """Those of the console. The viewers are aiortc's, in the same loop: what their tasks leave behind is theirs."""
     return {
         sample.labels["where"]: sample.value
         for family in rig.services.metrics.internal_errors.collect()
         for sample in family.samples
-        if sample.name.endswith("_total")
+        if sample.name.endswith("_total") and sample.labels["where"] != "loop"
     }
 
 

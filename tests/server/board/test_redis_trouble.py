@@ -202,7 +202,7 @@ async def test_encrypted_and_with_a_password(tmp_path: Path) -> None:
 
 
 async def test_a_user_who_may_do_no_more_than_the_guide_says_suffices(server: RedisServer) -> None:
-    (rules,) = re.findall(r"An ACL may grant `(.*)` and the commands\n`(.*)`", GUIDE.read_text())
+    (rules,) = re.findall(r"An ACL may grant\s`(.*)`\sand the commands\s`(.*)`", GUIDE.read_text())
     commands = [f"+{command.lower()}" for command in rules[1].split()]
     async with server.client() as client:
         user = ("ACL", "SETUSER", "ann", "on", f">{PASSWORD}", *rules[0].split(), *commands)

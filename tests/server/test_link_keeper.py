@@ -1,0 +1,60 @@
+"""A robot link is kept until its keeper is cancelled."""
+
+import asyncio
+from typing import Any, Self
+
+import pytest
+
+from robot_bridge.protocol.messages import LinkRole
+from server.backoff import Backoff
+from server.link_access import LinkAccess
+from server.link_keeper import LinkKeeper
+
+
+class Sink:
+    def __init__(self) -> None:
+        self.failed: list[Exception] = []
+
+    def link_opened(self, *_: Any) -> None:
+        raise AssertionError("it never opens")
+
+    def link_received(self, *_: Any) -> None:
+        raise AssertionError("it never opens")
+
+    def link_closed(self, role: LinkRole, detail: str) -> None:
+        pass
+
+    def link_failed(self, role: LinkRole, error: Exception) -> None:
+        self.failed.append(error)
+
+
+class FailsAsItEnds:
+    """A link whose clean-up raises."""
+
+    waiting: asyncio.Event
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        pass
+
+    async def __aenter__(self) -> Self:
+        self.waiting.set()
+        try:
+            await asyncio.get_running_loop().create_future()
+        finally:
+            raise RuntimeError("the handler is closed")
+
+    async def __aexit__(self, *_: object) -> None:
+        pass
+
+
+async def test_a_fault_in_ending_does_not_hide_that_it_was_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    FailsAsItEnds.waiting = asyncio.Event()
+    monkeypatch.setattr("server.link_keeper.RobotLink", FailsAsItEnds)
+    sink = Sink()
+    keeper = LinkKeeper("127.0.0.1", 1, "operator", sink, Backoff(0.01, 0.01), LinkAccess())
+    async with asyncio.timeout(20):
+        running = asyncio.ensure_future(keeper.run())
+        await FailsAsItEnds.waiting.wait()
+        running.cancel()
+        await asyncio.wait([running])
+    assert [str(error) for error in sink.failed] == ["the handler is closed"]
