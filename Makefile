@@ -13,9 +13,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 # with an extra, and fail on the day of that package's next release. `pip check` says whether one is missing.
 INSTALL_LOCK := $(PIP) install --no-deps --require-hashes -r
 ARGS ?=
-# A file's tests share what they start. Most wait more than they compute, so that there are more workers than cores.
-# Browsers take what there is: their tests run after the others.
-WORKERS ?= 6
+# A file's tests share what they start. Many wait more than they compute, so that there are more workers than cores; not
+# many more, or their robots and consoles are late. Browsers take what there is: their tests run after the others.
+WORKERS ?= 3
 BROWSERS ?= 2
 PARALLEL := --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.

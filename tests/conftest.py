@@ -9,8 +9,9 @@ import functools
 import gc
 import inspect
 import itertools
+import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.fast)
     places = _places(items)
     items.sort(key=lambda item: places[item.path])
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Pytest parses the source of a failed test. Python 3.11 gives up, and the whole run ends, where a collection in
+    the midst of that logs a traceback, as of a task that was never awaited: that is parsed too (CPython issue 106905).
+    """
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def pytest_collection_finish() -> None:
@@ -110,6 +125,17 @@ def own_state_directory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[No
         patch.setenv("LOCKSTEP_STATE_DIR", str(tmp_path_factory.mktemp("state")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state-home")))  # of bridges
         yield
+
+
+@pytest.fixture(autouse=True)
+def logs_as_before() -> Iterator[None]:
+    """A command that a test runs in this process configures logs for its standard error, which pytest then closes."""
+    before, handlers = structlog.get_config(), logging.root.handlers[:]
+    yield
+    structlog.configure(**before)
+    for handler in logging.root.handlers[:]:
+        if handler not in handlers and type(handler) is logging.StreamHandler:
+            logging.root.removeHandler(handler)
 
 
 @pytest.fixture(autouse=True)

@@ -13,7 +13,7 @@ class TurnSettings:
     transmissions: int = 7  # of one request on UDP (Rc)
     last_wait: float = 8.0  # after the last transmission (Rm times `rto`), and on a stream after the only one: 39.5 s
     lifetime: int = 600  # of the allocation, that we ask for; servers give less where they like
-    refresh_share: float = 0.8  # of its lifetime, after which an allocation is refreshed
+    refresh_share: float = 0.5  # of its lifetime, after which an allocation is refreshed; the rest is for repeats
     refresh_again: float = 5.0  # after an unanswered refresh, as while a network is cut
     rebind_interval: float = 240.0  # a permission ends after 300 s (RFC 8656 9), a channel after 600 s (12)
     refused_seconds: float = 30.0  # for which nothing is asked for a peer that the server has refused

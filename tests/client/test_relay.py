@@ -90,7 +90,7 @@ async def test_a_session_outlives_the_credentials_that_it_began_with_and_a_resta
         await console.take_seat()
         forward = [0.1] * len(console.description.axes)
         await drive_on(console, [0.0] * len(forward))
-        # The allocation is renewed after 9.6 s, long after its credentials' end.
+        # The allocation is renewed after 6 s, after its credentials' end.
         await eventually(lambda: "refreshed" in turn.log.read_text(), 40.0)
         assert time.time() > asked[0] + 3
         await drive_on(console, forward)

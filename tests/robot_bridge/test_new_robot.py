@@ -58,10 +58,16 @@ def test_its_own_test_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert "3 passed" in run(folder, "pytest", "-q", "-p", "no:asyncio", "-p", "no:cacheprovider")
 
 
-def test_what_it_writes_passes_ruff_and_mypy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_it_writes_passes_ruff(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = written(tmp_path, monkeypatch)
     run(folder, "ruff", "check", "--no-cache", ".")
     run(folder, "ruff", "format", "--no-cache", "--check", ".")
+
+
+@pytest.mark.long
+def test_what_it_writes_passes_mypy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mypy reads all of the bridge for it, without a cache."""
+    folder = written(tmp_path, monkeypatch)
     run(folder, "mypy", "--cache-dir", str(tmp_path / "mypy"), MYPYPATH=str(ROOT))
 
 

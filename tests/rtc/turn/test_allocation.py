@@ -102,8 +102,8 @@ def test_address_and_channels_are_refreshed_for_as_long_as_it_lives() -> None:
     pair = Pair(TurnServer(lifetime=100))
     pair.send(b"x")
     pair.run(1000)
-    assert pair.server.methods.count(Method.REFRESH) == 12
-    assert pair.server.asked == [600] + [100] * 12
+    assert pair.server.methods.count(Method.REFRESH) == 20
+    assert pair.server.asked == [600] + [100] * 20
     assert pair.server.methods.count(Method.CHANNEL_BIND) == 5
     pair.send(b"y")
     assert pair.server.relayed[-1] == (b"y", PEER)
