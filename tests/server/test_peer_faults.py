@@ -1,5 +1,6 @@
 """Whatever serving one peer raises ends that peer, by name, counted and logged once; nobody else notices."""
 
+import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any, NoReturn, cast
@@ -202,6 +203,11 @@ def _faults(rig: Rig) -> dict[str, float]:
     }
 
 
+def _of_aiortc() -> set[asyncio.Task[Any]]:
+    """Its tasks: a connection that is closed while it connects leaves some."""
+    return {task for task in asyncio.all_tasks() if "aiortc" in repr(task)}
+
+
 async def _gone(rig: Rig, peer: WebRtcPeer) -> None:
     await eventually(lambda: peer not in rig.webrtc_peers)
 
@@ -261,7 +267,7 @@ async def test_a_fault_while_an_offer_is_answered_refuses_it_by_name_and_keeps_n
 
 async def test_a_fault_when_the_transport_connects_ends_that_peer_alone() -> None:
     async with running_rig() as rig, _watching(rig, "operator") as other:
-        victim = _Viewer()
+        others, victim = _of_aiortc(), _Viewer()
         try:
             with pytest.MonkeyPatch.context() as patch:
                 answer = await rig.http.post(
@@ -275,6 +281,8 @@ async def test_a_fault_when_the_transport_connects_ends_that_peer_alone() -> Non
                 await eventually(lambda: len(rig.webrtc_peers) == 1)
         finally:
             await victim.close()
+            for task in _of_aiortc() - others:
+                task.cancel()
         assert _faults(rig) == {"peer answer": 1}
         assert rig.count("lockstep_peers_ended_total", why="internal error") == 1
         await _everything_is_given_back(rig, [other])
