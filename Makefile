@@ -14,9 +14,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 INSTALL_LOCK := $(PIP) install --no-deps --require-hashes -r
 ARGS ?=
 # A file's tests share what they start. Many wait more than they compute, so that there are more workers than cores; not
-# many more, or their robots and consoles are late. Browsers take what there is: their tests run after the others.
+# many more, or their robots and consoles are late. Browsers take what there is: their tests run after the others, alone.
 WORKERS ?= 3
-BROWSERS ?= 2
+BROWSERS ?= 1
 PARALLEL := --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.
 unexport PYTHONDONTWRITEBYTECODE
