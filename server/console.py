@@ -64,7 +64,7 @@ from server.speed_cap import SpeedCap
 from server.stop_keeper import StopKeeper
 from server.stop_presses import new_press
 from server.stop_service import StopService
-from server.to_the_end import ending
+from server.to_the_end import pause
 from server.versions import console_version, description_hash, page_build
 
 __all__ = ["Console", "FeedbackViewer", "MediaFeed"]
@@ -419,6 +419,4 @@ class Console:
                 await task()
             except Exception as error:
                 self._metrics.faults.caught(name, error, what="a background task, which runs again")
-            if ending():
-                return
-            await asyncio.sleep(RESTART_AFTER)
+            await pause(RESTART_AFTER)

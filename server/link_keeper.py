@@ -14,7 +14,7 @@ from robot_bridge.protocol.messages import LinkMessage, LinkRole
 from server.backoff import Backoff
 from server.link_access import LinkAccess
 from server.loop_turns import turns_of_loop
-from server.to_the_end import ending
+from server.to_the_end import pause
 
 __all__ = ["LinkKeeper", "LinkSink"]
 
@@ -89,9 +89,7 @@ class LinkKeeper:
             except Exception as error:
                 self._sink.link_failed(self._role, error)
                 self._sink.link_closed(self._role, FAULT)
-            if ending():
-                return
-            await asyncio.sleep(self._backoff.next())
+            await pause(self._backoff.next())
 
     async def _once(self) -> None:
         loop = asyncio.get_running_loop()

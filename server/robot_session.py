@@ -29,7 +29,7 @@ from server.services import Services
 from server.settings import Settings
 from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
-from server.to_the_end import ending
+from server.to_the_end import pause
 from server.voice import VoiceService
 
 __all__ = ["run_on", "running_session"]
@@ -87,9 +87,7 @@ async def run_on(name: str, run: Callable[[], Awaitable[None]], faults: Faults) 
             await run()
         except Exception as error:
             faults.caught(name, error, what="a background task, which runs again")
-            if ending():
-                return
-            await asyncio.sleep(RESTART_AFTER)
+            await pause(RESTART_AFTER)
         else:
             return
 

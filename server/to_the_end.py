@@ -4,21 +4,23 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-__all__ = ["ending", "in_thread", "to_the_end"]
+__all__ = ["in_thread", "pause", "to_the_end"]
 
 DISK_SECONDS = 3.0  # then a disk does not answer, and the end waits for it no longer
 
 Result = TypeVar("Result")
 
 
-def ending() -> bool:
-    """Whether the running task has been cancelled.
+async def pause(seconds: float) -> None:
+    """Sleep, in a loop that tries again after an exception.
 
-    A loop that goes on after any exception asks: an exception that clean-up raises replaces the cancellation, which is
-    told only once.
+    Raises CancelledError at once in a task that was cancelled before: asyncio raises that only once, and an exception
+    of clean-up may have replaced it.
     """
     task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
+    await asyncio.sleep(seconds)
 
 
 async def to_the_end(coroutine: Coroutine[Any, Any, object]) -> None:

@@ -58,8 +58,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Pytest parses the source of a failed test. Python 3.11 gives up, and the whole run ends, where a collection in
-    the midst of that logs a traceback, as of a task that was never awaited: that is parsed too (CPython issue 106905).
+    """No garbage is collected while pytest parses the source of a failed test.
+
+    A collection may log a traceback, as of a task that nobody awaited, and Python 3.11 parses source for that too. The
+    parser is not reentrant there: it raises SystemError, which ends the whole run (pytest issue 10763).
     """
     collecting = gc.isenabled()
     gc.disable()
@@ -76,7 +78,8 @@ def pytest_collection_finish() -> None:
 
 
 def _bound(item: pytest.Item) -> None:
-    """What a test awaits ends in time. pytest-timeout raises from a signal, which a callback of the loop swallows."""
+    """End in time what a test awaits. pytest-timeout raises in a signal handler; asyncio only logs what is raised while
+    it runs a callback, and the test would wait for ever."""
     assert isinstance(item, pytest.Function)
     test = item.obj
     if not inspect.iscoroutinefunction(test):

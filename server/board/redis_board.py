@@ -40,6 +40,7 @@ from server.board.seal import Seal
 from server.board.stop_desk import StopDesk
 from server.board.tile import Tile, loud, within_bounds
 from server.stop_presses import Press, new_press
+from server.to_the_end import pause
 
 __all__ = ["RedisBoard"]
 
@@ -172,7 +173,7 @@ class RedisBoard:
                 self._metrics.failures.labels("internal").inc()
                 log.exception("the board's session failed")
                 self._lost(BoardTrouble("a fault of this console"))
-            await asyncio.sleep(backoff.next())
+            await pause(backoff.next())
 
     # a session: from one connection until it is lost
 

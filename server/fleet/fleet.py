@@ -26,7 +26,7 @@ from server.state import robot_place
 from server.stop_presses import Press
 from server.stop_service import SILENCED
 from server.sweeper import sweep_forever
-from server.to_the_end import ending
+from server.to_the_end import pause
 
 __all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
 
@@ -219,9 +219,7 @@ class Fleet:
                 await task()
             except Exception as error:
                 self.metrics.faults.caught(name, error, what="a background task, which runs again")
-            if ending():
-                return
-            await asyncio.sleep(RESTART_AFTER)
+            await pause(RESTART_AFTER)
 
 
 def fleet_of(connection: HTTPConnection) -> Fleet:

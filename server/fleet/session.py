@@ -24,7 +24,7 @@ from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
 from server.stop_presses import NewPress, Press
 from server.stop_service import SILENCED, StopAnswer, StopOutcome
-from server.to_the_end import ending
+from server.to_the_end import pause
 
 __all__ = ["FleetSession"]
 
@@ -133,12 +133,10 @@ class FleetSession:
             except Exception:
                 metrics.session_failures.labels(self.name).inc()
                 log.exception("the session of this robot has failed")
-                if ending():
-                    return
             self.settled.set()
             if loop.time() - since > HEALTHY_AFTER:
                 self._backoff.healthy()
-            await asyncio.sleep(self._backoff.next())
+            await pause(self._backoff.next())
 
     async def _live(
         self,

@@ -21,6 +21,7 @@ from server.relay.publication import Engine, Publication
 from server.relay.relay_settings import RelaySettings
 from server.relay.station import Station
 from server.relay.tickets import RelayTicket
+from server.to_the_end import pause
 
 __all__ = ["RelayDesk", "RelayedMedia", "RelayedPeer"]
 
@@ -178,7 +179,7 @@ class RelayDesk:
                 self._lost(origin, type(error).__name__)
             if self._clock() - began > HEALTHY_SECONDS:
                 backoff.healthy()
-            await asyncio.sleep(backoff.next())
+            await pause(backoff.next())
 
     def _order(self, station: Station) -> tuple[float, int]:
         """Those that failed lately come last, and of those the one that failed just now: it may be dead."""
@@ -266,7 +267,7 @@ class RelayDesk:
                 self._gone(station, "")
             if self._clock() - began > HEALTHY_SECONDS:
                 backoff.healthy()
-            await asyncio.sleep(backoff.next())
+            await pause(backoff.next())
 
     async def _feed(self, origin: Station, station: Station, publication: Publication) -> None:
         async with self._engine.pass_on(origin, station, publication) as link:

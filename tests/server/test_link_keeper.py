@@ -29,32 +29,41 @@ class Sink:
 
 
 class FailsAsItEnds:
-    """A link whose clean-up raises."""
+    """A link whose clean-up raises, the first time."""
 
+    tried: list[Self]
     waiting: asyncio.Event
 
     def __init__(self, *_: Any, **__: Any) -> None:
-        pass
+        self.tried.append(self)
 
     async def __aenter__(self) -> Self:
         self.waiting.set()
         try:
             await asyncio.get_running_loop().create_future()
-        finally:
-            raise RuntimeError("the handler is closed")
+        except asyncio.CancelledError:
+            if len(self.tried) > 1:
+                raise
+            raise RuntimeError("the handler is closed") from None
+        return self
 
     async def __aexit__(self, *_: object) -> None:
         pass
 
 
 async def test_a_fault_in_ending_does_not_hide_that_it_was_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
-    FailsAsItEnds.waiting = asyncio.Event()
+    FailsAsItEnds.tried, FailsAsItEnds.waiting = [], asyncio.Event()
     monkeypatch.setattr("server.link_keeper.RobotLink", FailsAsItEnds)
     sink = Sink()
     keeper = LinkKeeper("127.0.0.1", 1, "operator", sink, Backoff(0.01, 0.01), LinkAccess())
-    async with asyncio.timeout(20):
-        running = asyncio.ensure_future(keeper.run())
-        await FailsAsItEnds.waiting.wait()
-        running.cancel()
-        await asyncio.wait([running])
+    running = asyncio.ensure_future(keeper.run())
+    await FailsAsItEnds.waiting.wait()
+    FailsAsItEnds.waiting.clear()
+    running.cancel()
+    again = asyncio.ensure_future(FailsAsItEnds.waiting.wait())
+    await asyncio.wait([running, again], return_when=asyncio.FIRST_COMPLETED)
+    again.cancel()
+    running.cancel()
+    await asyncio.wait([running])
+    assert len(FailsAsItEnds.tried) == 1, "it connected again"
     assert [str(error) for error in sink.failed] == ["the handler is closed"]

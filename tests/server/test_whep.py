@@ -291,6 +291,8 @@ async def test_only_what_an_observer_sends_waits_for_its_turn(
         assert (await rig.http.post("/whep", content=await _real_offer(), headers=headers)).status_code == 201
     (named,) = connected
     assert named["turns"].may_go_at_once() is not waits
+    # An acknowledgement to whoever drives waits for the next feedback and no longer.
+    assert (named["settings"].sctp.acknowledgement_delay > 0.05) is waits
 
 
 async def test_what_may_be_posted_is_said_and_there_is_nothing_to_get() -> None:

@@ -18,6 +18,7 @@ class Relays:
 
     def __init__(self) -> None:
         self.down: set[str] = set()
+        self.fails_as_it_ends = False
         self.tried: list[str] = []
         self.carrying: dict[str, Publication] = {}
         self.changed = asyncio.Event()
@@ -33,6 +34,8 @@ class Relays:
             yield publication
         finally:
             del self.carrying[station.name]
+            if self.fails_as_it_ends:
+                raise RelayError("no answer to the farewell")
 
     @asynccontextmanager
     async def pass_on(self, origin: Station, station: Station, publication: Publication) -> AsyncIterator[Watched]:
@@ -81,3 +84,21 @@ async def test_of_two_relays_that_failed_lately_the_one_that_failed_just_now_is_
         for task in (asked, running):
             task.cancel()
         await asyncio.gather(asked, running, return_exceptions=True)
+
+
+async def test_a_relay_that_does_not_answer_the_farewell_does_not_keep_the_console_from_ending() -> None:
+    relays = Relays()
+    settings = RelaySettings(relay=("janus:ws://a.example/1",), observers_direct=0)
+    desk = RelayDesk(settings, relays, lambda: [Watching()], _good, lambda: 100.0)
+    asked = asyncio.create_task(desk.ticket(None, ""))
+    running = asyncio.create_task(desk.run())
+    await relays.until_carried_by("0")
+    relays.fails_as_it_ends = True
+    for task in (asked, running):
+        task.cancel()
+    _, going_on = await asyncio.wait([running], timeout=20)
+    relays.fails_as_it_ends = False
+    running.cancel()
+    await asyncio.gather(asked, running, return_exceptions=True)
+    assert not going_on
+    assert relays.tried == ["0"]
