@@ -128,5 +128,5 @@ web/node_modules/.installed: web/package-lock.json
 
 server/web_dist/index.html: web/node_modules/.installed $(filter-out web/node_modules/%,$(WEB_SOURCES))
 	@echo "Building the page"
-	@cd web && npm run --silent build
+	@cd web && npm run --silent build -- --logLevel error
 	@touch $@
