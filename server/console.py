@@ -64,7 +64,7 @@ from server.speed_cap import SpeedCap
 from server.stop_keeper import StopKeeper
 from server.stop_presses import new_press
 from server.stop_service import StopService
-from server.to_the_end import pause
+from server.to_the_end import attempt
 from server.versions import console_version, description_hash, page_build
 
 __all__ = ["Console", "FeedbackViewer", "MediaFeed"]
@@ -416,7 +416,7 @@ class Console:
         """Runs `task` again when it fails: a fault of ours in one place must not take the seat's watchdog with it."""
         while True:
             try:
-                await task()
+                await attempt(task())
             except Exception as error:
                 self._metrics.faults.caught(name, error, what="a background task, which runs again")
-            await pause(RESTART_AFTER)
+            await asyncio.sleep(RESTART_AFTER)

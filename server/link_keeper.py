@@ -14,7 +14,7 @@ from robot_bridge.protocol.messages import LinkMessage, LinkRole
 from server.backoff import Backoff
 from server.link_access import LinkAccess
 from server.loop_turns import turns_of_loop
-from server.to_the_end import pause
+from server.to_the_end import attempt
 
 __all__ = ["LinkKeeper", "LinkSink"]
 
@@ -83,13 +83,13 @@ class LinkKeeper:
         """Until cancelled."""
         while True:
             try:
-                await self._once()
+                await attempt(self._once())
             except LinkError as error:
                 self._sink.link_closed(self._role, error.detail)
             except Exception as error:
                 self._sink.link_failed(self._role, error)
                 self._sink.link_closed(self._role, FAULT)
-            await pause(self._backoff.next())
+            await asyncio.sleep(self._backoff.next())
 
     async def _once(self) -> None:
         loop = asyncio.get_running_loop()

@@ -29,7 +29,7 @@ from server.services import Services
 from server.settings import Settings
 from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
-from server.to_the_end import pause
+from server.to_the_end import attempt
 from server.voice import VoiceService
 
 __all__ = ["run_on", "running_session"]
@@ -84,10 +84,10 @@ async def run_on(name: str, run: Callable[[], Awaitable[None]], faults: Faults) 
     """Until cancelled, or until it is done. What serves besides takes nobody's control and no STOP with it."""
     while True:
         try:
-            await run()
+            await attempt(run())
         except Exception as error:
             faults.caught(name, error, what="a background task, which runs again")
-            await pause(RESTART_AFTER)
+            await asyncio.sleep(RESTART_AFTER)
         else:
             return
 

@@ -1,26 +1,46 @@
 """What must not be cancelled in the middle, because it would leave something open."""
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any, TypeVar
 
-__all__ = ["in_thread", "pause", "to_the_end"]
+import structlog
+
+__all__ = ["attempt", "in_thread", "to_the_end"]
+
+log = structlog.get_logger(__name__)
 
 DISK_SECONDS = 3.0  # then a disk does not answer, and the end waits for it no longer
 
 Result = TypeVar("Result")
 
 
-async def pause(seconds: float) -> None:
-    """Sleep, in a loop that tries again after an exception.
+async def attempt(work: Awaitable[Result]) -> Result:
+    """Await it, for a loop that goes on after an exception; returns or raises what it does.
 
-    Raises CancelledError at once in a task that was cancelled before: asyncio raises that only once, and an exception
-    of clean-up may have replaced it.
+    A caller that is cancelled meanwhile gets CancelledError whatever the work raises as it ends, which is logged:
+    asyncio cancels only once, and an exception of clean-up would replace that. RuntimeError if the work was cancelled
+    and the caller was not. The work has a task of its own, for a TaskGroup (Python 3.11) leaves a cancellation of its
+    own counted, which nobody could tell from the caller's.
     """
-    task = asyncio.current_task()
-    if task is not None and task.cancelling():
-        raise asyncio.CancelledError
-    await asyncio.sleep(seconds)
+    caller = asyncio.current_task()
+    if caller is None:
+        raise RuntimeError("an attempt needs a task")
+    before = caller.cancelling()
+    task = asyncio.ensure_future(work)
+    try:
+        return await task
+    except asyncio.CancelledError:
+        if caller.cancelling() > before:
+            raise
+        raise RuntimeError("it was cancelled, and its caller was not") from None
+    except Exception:
+        if caller.cancelling() > before:
+            log.exception("failed as it ended")
+        raise
+    finally:
+        if caller.cancelling() > before:
+            raise asyncio.CancelledError
 
 
 async def to_the_end(coroutine: Coroutine[Any, Any, object]) -> None:

@@ -40,7 +40,7 @@ from server.board.seal import Seal
 from server.board.stop_desk import StopDesk
 from server.board.tile import Tile, loud, within_bounds
 from server.stop_presses import Press, new_press
-from server.to_the_end import pause
+from server.to_the_end import attempt
 
 __all__ = ["RedisBoard"]
 
@@ -164,7 +164,7 @@ class RedisBoard:
         self._revocations.listen(self._wake.set)
         while True:
             try:
-                await self._session(backoff)
+                await attempt(self._session(backoff))
             except* BoardError as group:
                 error = _first(group)
                 self._count(error)
@@ -173,7 +173,7 @@ class RedisBoard:
                 self._metrics.failures.labels("internal").inc()
                 log.exception("the board's session failed")
                 self._lost(BoardTrouble("a fault of this console"))
-            await pause(backoff.next())
+            await asyncio.sleep(backoff.next())
 
     # a session: from one connection until it is lost
 

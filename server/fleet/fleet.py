@@ -26,7 +26,7 @@ from server.state import robot_place
 from server.stop_presses import Press
 from server.stop_service import SILENCED
 from server.sweeper import sweep_forever
-from server.to_the_end import pause
+from server.to_the_end import attempt
 
 __all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
 
@@ -216,10 +216,10 @@ class Fleet:
         """Runs `task` again when it fails."""
         while True:
             try:
-                await task()
+                await attempt(task())
             except Exception as error:
                 self.metrics.faults.caught(name, error, what="a background task, which runs again")
-            await pause(RESTART_AFTER)
+            await asyncio.sleep(RESTART_AFTER)
 
 
 def fleet_of(connection: HTTPConnection) -> Fleet:

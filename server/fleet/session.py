@@ -24,7 +24,7 @@ from server.state_dir import StateDir
 from server.stop_keeper import StopKeeper
 from server.stop_presses import NewPress, Press
 from server.stop_service import SILENCED, StopAnswer, StopOutcome
-from server.to_the_end import pause
+from server.to_the_end import attempt
 
 __all__ = ["FleetSession"]
 
@@ -129,14 +129,14 @@ class FleetSession:
         while True:
             since = loop.time()
             try:
-                await self._live(house, directory, metrics, told, stops)
+                await attempt(self._live(house, directory, metrics, told, stops))
             except Exception:
                 metrics.session_failures.labels(self.name).inc()
                 log.exception("the session of this robot has failed")
             self.settled.set()
             if loop.time() - since > HEALTHY_AFTER:
                 self._backoff.healthy()
-            await pause(self._backoff.next())
+            await asyncio.sleep(self._backoff.next())
 
     async def _live(
         self,

@@ -21,7 +21,7 @@ from server.relay.publication import Engine, Publication
 from server.relay.relay_settings import RelaySettings
 from server.relay.station import Station
 from server.relay.tickets import RelayTicket
-from server.to_the_end import pause
+from server.to_the_end import attempt
 
 __all__ = ["RelayDesk", "RelayedMedia", "RelayedPeer"]
 
@@ -170,7 +170,7 @@ class RelayDesk:
             began = self._clock()
             origin = min(self.stations, key=self._order)
             try:
-                await self._carry(origin)
+                await attempt(self._carry(origin))
             except (RelayError, MediaError, OSError, ConnectionError) as error:
                 self._lost(origin, str(error))
             except Exception as error:
@@ -179,7 +179,7 @@ class RelayDesk:
                 self._lost(origin, type(error).__name__)
             if self._clock() - began > HEALTHY_SECONDS:
                 backoff.healthy()
-            await pause(backoff.next())
+            await asyncio.sleep(backoff.next())
 
     def _order(self, station: Station) -> tuple[float, int]:
         """Those that failed lately come last, and of those the one that failed just now: it may be dead."""
@@ -260,14 +260,14 @@ class RelayDesk:
         while True:
             began = self._clock()
             try:
-                await self._feed(origin, station, publication)
+                await attempt(self._feed(origin, station, publication))
             except RelayError as error:
                 self._lost(station, str(error))
             finally:
                 self._gone(station, "")
             if self._clock() - began > HEALTHY_SECONDS:
                 backoff.healthy()
-            await pause(backoff.next())
+            await asyncio.sleep(backoff.next())
 
     async def _feed(self, origin: Station, station: Station, publication: Publication) -> None:
         async with self._engine.pass_on(origin, station, publication) as link:

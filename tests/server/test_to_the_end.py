@@ -7,7 +7,7 @@ from contextlib import suppress
 import pytest
 
 from server import to_the_end
-from server.to_the_end import in_thread, pause
+from server.to_the_end import attempt, in_thread
 
 
 async def test_whoever_is_cancelled_while_a_thread_writes_ends_when_that_has_ended() -> None:
@@ -54,7 +54,7 @@ async def test_what_a_thread_returns_or_raises_is_told() -> None:
         await in_thread(lambda: 1 // 0)
 
 
-async def test_a_loop_whose_cancellation_was_replaced_by_a_fault_of_clean_up_ends_at_its_next_pause() -> None:
+async def test_a_loop_whose_cancellation_was_replaced_by_a_fault_of_clean_up_ends_all_the_same() -> None:
     tries = 0
 
     async def work() -> None:
@@ -70,10 +70,11 @@ async def test_a_loop_whose_cancellation_was_replaced_by_a_fault_of_clean_up_end
     async def run_on() -> None:
         while True:
             with suppress(RuntimeError):
-                await work()
-            await pause(0.0)
+                await attempt(work())
+            await asyncio.sleep(0)
 
     running = asyncio.create_task(run_on())
+    await asyncio.sleep(0)
     await asyncio.sleep(0)
     running.cancel()
     for _ in range(5):
@@ -85,8 +86,44 @@ async def test_a_loop_whose_cancellation_was_replaced_by_a_fault_of_clean_up_end
     assert tries == 1
 
 
-async def test_a_pause_of_a_task_that_goes_on_is_a_sleep() -> None:
-    loop = asyncio.get_running_loop()
-    began = loop.time()
-    await pause(0.01)
-    assert loop.time() - began >= 0.009
+async def test_a_loop_goes_on_after_one_of_several_tasks_of_its_work_failed() -> None:
+    tries = 0
+
+    async def fail() -> None:
+        await asyncio.sleep(0)
+        raise ConnectionError("lost")
+
+    async def work() -> None:
+        nonlocal tries
+        tries += 1
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(fail())
+            tasks.create_task(asyncio.Event().wait())
+
+    for _ in range(3):
+        with pytest.raises(ExceptionGroup):
+            await attempt(work())
+    assert tries == 3
+    running = asyncio.current_task()
+    assert running is not None
+    assert running.cancelling() == 0
+
+
+async def test_work_that_was_cancelled_by_itself_is_a_fault_and_not_the_end_of_its_caller() -> None:
+    async def work() -> None:
+        raise asyncio.CancelledError
+
+    with pytest.raises(RuntimeError, match="its caller was not"):
+        await attempt(work())
+
+
+async def test_an_attempt_returns_or_raises_what_its_work_does() -> None:
+    async def seven() -> int:
+        return 7
+
+    async def fail() -> None:
+        raise ZeroDivisionError
+
+    assert await attempt(seven()) == 7
+    with pytest.raises(ZeroDivisionError):
+        await attempt(fail())
