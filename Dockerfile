@@ -13,11 +13,9 @@ ENV PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_
 WORKDIR /src
 COPY requirements.lock ./
 RUN pip install --no-deps --require-hashes -r requirements.lock
-COPY pyproject.toml README.md LICENSE NOTICE ./
+COPY LICENSE NOTICE ./
+COPY protocol ./protocol
 COPY robot_bridge ./robot_bridge
-COPY rtc ./rtc
-COPY server ./server
-COPY client ./client
 # A new volume takes over the owner of the folder that it covers.
 RUN useradd --system --create-home --uid 10001 lockstep \
     && install -d -o lockstep -g lockstep -m 0755 /run/lockstep /run/lockstep/link /run/lockstep/turn \
@@ -27,7 +25,7 @@ FROM base AS robot
 RUN apt-get update \
     && apt-get install -y --no-install-recommends libegl1 libgl1-mesa-dri \
     && rm -rf /var/lib/apt/lists/*
-RUN pip install --no-build-isolation --no-deps .
+RUN pip install --no-build-isolation --no-deps ./protocol ./robot_bridge
 USER lockstep
 WORKDIR /home/lockstep
 EXPOSE 5600
@@ -35,8 +33,10 @@ ENTRYPOINT ["lockstep", "robot"]
 CMD ["mobile-manipulator", "--host", "0.0.0.0", "--port", "5600"]
 
 FROM base AS console
-COPY --from=page /src/server/web_dist ./server/web_dist
-RUN pip install --no-build-isolation --no-deps .
+COPY rtc ./rtc
+COPY server ./server
+COPY --from=page /src/server/lockstep/server/web_dist ./server/lockstep/server/web_dist
+RUN pip install --no-build-isolation --no-deps ./protocol ./rtc ./robot_bridge ./server
 USER lockstep
 WORKDIR /home/lockstep
 EXPOSE 8000

@@ -3,6 +3,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PAGE := server/lockstep/server/web_dist/index.html
+PARTS := protocol rtc robot_bridge client server
 ROS2 := .ros2
 RUN_PACKAGES := libegl1 libgl1-mesa-dri
 GSTREAMER_PACKAGES := python3-gi gir1.2-gst-plugins-bad-1.0 gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice gstreamer1.0-x
@@ -22,13 +24,19 @@ PARALLEL := --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-unit test-web test-browser test-fast test-long check format bench fuzz lock generate clean
+.PHONY: help setup run page dist test test-unit test-web test-browser test-fast test-long check format bench fuzz lock generate clean
 
 help: ## List the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/  make \1|\2/' | column -t -s '|'
 
-setup: $(VENV)/.runtime server/web_dist/index.html ## Install what the console and the simulated robot need
+setup: $(VENV)/.runtime ## Install what the console and the simulated robot need; build the page where there is none
 	@scripts/system-packages $(RUN_PACKAGES)
+	@[ -f $(PAGE) ] || $(MAKE) --no-print-directory page
+
+page: $(PAGE) ## Build the page from web/
+
+dist: $(VENV)/.runtime $(PAGE) ## Build the wheels of all parts into dist/, the page inside
+	@$(BIN)/python -m scripts.build_wheels dist
 
 run: setup ## Start the simulated robot and the console, and print the links (ARGS="--port 9000" …)
 	@exec $(BIN)/lockstep up $(ARGS)
@@ -49,7 +57,7 @@ test-web: web/node_modules/.installed
 test-unit: $(VENV)/.dev $(ROS2)/.installed
 	$(BIN)/python -m pytest -q -m "not browser and not long" -n $(WORKERS) $(PARALLEL)
 
-test-browser: $(VENV)/.dev $(ROS2)/.installed server/web_dist/index.html
+test-browser: $(VENV)/.dev $(ROS2)/.installed $(PAGE)
 	$(BIN)/python -m pytest -q -m "browser and not long" -n $(BROWSERS) $(PARALLEL) \
 	  $$(grep -rlF mark.browser tests --include='test_*.py' | sort)
 
@@ -61,7 +69,7 @@ check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, dependencies, ge
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/deptry --no-ansi .
+	for part in . $(PARTS); do $(BIN)/deptry --no-ansi --config $$part/pyproject.toml $$part || exit 1; done
 	$(BIN)/python -m scripts.generate_wire --check
 	cd web && npm run --silent check
 	$(BIN)/python -m scripts.audit
@@ -72,7 +80,7 @@ format: $(VENV)/.dev web/node_modules/.installed ## Format the code
 
 bench: $(VENV)/.dev setup ## Measure; results belong in docs/performance.md (ARGS="--json results.json")
 	@scripts/system-packages $(TEST_PACKAGES)
-	$(BIN)/python -m bench $(ARGS)
+	$(BIN)/python -m lockstep.bench $(ARGS)
 
 FUZZ_SECONDS ?= 60
 
@@ -85,23 +93,27 @@ generate: $(VENV)/.dev web/node_modules/.installed ## Write the JSON Schemas and
 	$(BIN)/python -m scripts.generate_wire
 	cd web && npm run --silent generate
 
+# The parts of this repository are no packages of an index.
+OWN := lockstep-bridge lockstep-client lockstep-console lockstep-protocol lockstep-rtc
+LOCK := uv pip compile --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q $(addprefix --no-emit-package ,$(OWN))
+
 lock: ## Resolve the pinned, hashed dependencies again (needs uv)
-	uv pip compile pyproject.toml --extra build --extra redis --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements.lock
-	uv pip compile pyproject.toml --extra build --extra redis --extra dev -c requirements.lock --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q -o requirements-dev.lock
-	uv pip compile requirements-ros2.in -c requirements-dev.lock --generate-hashes --no-emit-index-url --no-header --universal --python-version 3.11 --upgrade -q -o requirements-ros2.lock
+	$(LOCK) pyproject.toml --extra build --extra redis -o requirements.lock
+	$(LOCK) pyproject.toml --extra build --extra redis --extra dev -c requirements.lock -o requirements-dev.lock
+	$(LOCK) requirements-ros2.in -c requirements-dev.lock --python-version 3.11 -o requirements-ros2.lock
 
 clean: ## Remove what the commands above made
-	rm -rf $(VENV) $(ROS2) web/node_modules server/web_dist
+	rm -rf $(VENV) $(ROS2) web/node_modules $(dir $(PAGE)) dist
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Lockstep needs Python 3.11 or newer"; exit 1; }
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || scripts/system-packages python3-venv
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.runtime: requirements.lock pyproject.toml | $(BIN)/python
+$(VENV)/.runtime: requirements.lock pyproject.toml $(PARTS:=/pyproject.toml) | $(BIN)/python
 	@echo "Installing the Python packages"
 	@$(INSTALL_LOCK) requirements.lock
-	@$(PIP) install --no-build-isolation --no-deps -e .
+	@$(PIP) install --no-build-isolation --no-deps $(addprefix -e ./,$(PARTS)) -e .
 	@$(PIP) check
 	@touch $@
 
@@ -126,7 +138,7 @@ web/node_modules/.installed: web/package-lock.json
 	@cd web && npm ci --silent --no-audit --no-fund
 	@touch $@
 
-server/web_dist/index.html: web/node_modules/.installed $(filter-out web/node_modules/%,$(WEB_SOURCES))
+$(PAGE): web/node_modules/.installed $(filter-out web/node_modules/%,$(WEB_SOURCES))
 	@echo "Building the page"
 	@cd web && npm run --silent build -- --logLevel error
 	@touch $@

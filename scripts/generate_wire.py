@@ -11,11 +11,11 @@ from typing import Any, get_args
 
 import msgspec
 
-from robot_bridge.protocol.console import ClientMessage, ServerMessage
-from robot_bridge.protocol.messages import LinkMessage
-from server.fleet.fleet_openapi import fleet_openapi
-from server.openapi import openapi_document
-from server.recording.records import OWN_RECORDS
+from lockstep.protocol.console import ClientMessage, ServerMessage
+from lockstep.protocol.messages import LinkMessage
+from lockstep.server.fleet.openapi import fleet_openapi
+from lockstep.server.recording.format.records import OWN_RECORDS
+from lockstep.server.routes.openapi import openapi_document
 
 SCHEMAS = Path(__file__).resolve().parent.parent / "docs" / "schemas"
 

@@ -19,7 +19,7 @@ import pytest
 import structlog
 from hypothesis import HealthCheck, settings
 
-from robot_bridge.robots.mujoco_view.graphics import choose_graphics
+from lockstep.robot_bridge.robots.mujoco_view.graphics import choose_graphics
 from tests.needs import is_real
 
 # Until all tests are collected: what is made by then stays, and is not looked through again and again, which would hold
@@ -30,8 +30,8 @@ choose_graphics()  # before a test file imports mujoco
 settings.register_profile("any-machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any-machine")  # no test asserts a time
 
-# As a console of its own process logs, see server/logs.py. What structlog does unless told otherwise draws each
-# traceback with all its variables: that held robots in a test's process up for seconds.
+# As a console of its own process logs, see lockstep.server.telemetry.logs. What structlog does unless told otherwise
+# draws each traceback with all its variables: that held robots in a test's process up for seconds.
 structlog.configure(
     processors=[
         structlog.contextvars.merge_contextvars,

@@ -15,9 +15,9 @@ from tests.needs import is_real
     ("name", "expected"),
     [
         ("subprocess", True),
-        ("robot_bridge.bridge", True),
+        ("lockstep.robot_bridge.bridge", True),
         ("robot_bridge.bridges", False),
-        ("robot_bridge.event_core", False),
+        ("lockstep.robot_bridge.control.event_core", False),
         ("tests.support.stack", True),
     ],
 )

@@ -108,7 +108,7 @@ export default defineConfig({
   base: "./",
   plugins: [fontLicence, firstModules, firstScript, packed],
   build: {
-    outDir: "../server/web_dist",
+    outDir: "../server/lockstep/server/web_dist",
     emptyOutDir: true,
     license: { fileName: "licenses.md" },
     target: "es2023",

@@ -4,7 +4,7 @@ import asyncio
 import math
 import sys
 
-from client import Console, ConsoleError
+from lockstep.client import Console, ConsoleError
 
 
 async def main(link: str) -> None:

@@ -8,12 +8,12 @@ import sys
 
 import pytest
 
-from bench.driving import drive_on
-from bench.hostile.crowd import KINDS
-from bench.hostile.run import memory_of
-from bench.processes import running_process
-from bench.stack import Stack, running_stack
-from client import Console
+from lockstep.bench.driving import drive_on
+from lockstep.bench.hostile.crowd import KINDS
+from lockstep.bench.hostile.run import memory_of
+from lockstep.bench.processes import running_process
+from lockstep.bench.stack import Stack, running_stack
+from lockstep.client import Console
 
 SECONDS = 240.0  # a busy machine; never waited for in full
 MEMORY = 150.0  # MiB that the crowd may cost: 60 peers that have not connected yet, and the encoders of one more tier
@@ -41,7 +41,7 @@ async def test_an_operator_drives_on_among_peers_that_misbehave(monkeypatch: pyt
         first = last = await drive_on(console, rest)
         memory = memory_of(stack.console)
         arguments = (stack.observer, stack.operator, stack.bridge.address, str(len(KINDS)), "1")
-        command = (sys.executable, "-m", "bench.hostile.crowd", *arguments)
+        command = (sys.executable, "-m", "lockstep.bench.hostile.crowd", *arguments)
         async with asyncio.timeout(SECONDS):
             async with running_process(*command) as (crowd, _):
                 while not await _all_of_it_was_refused(stack):

@@ -1,4 +1,4 @@
-"""What `python -m bench.quality` counts, and the repair of losses in simulated time."""
+"""What `python -m lockstep.bench.quality` counts, and the repair of losses in simulated time."""
 
 import asyncio
 import json
@@ -6,12 +6,12 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from bench.emulator import load_profile
-from bench.quality.cli import app
-from bench.quality.freezes import freezes
-from bench.quality.repair import simulate
-from bench.quality.stage import driving, running_console
-from bench.quality.summary import summarise
+from lockstep.bench.emulator import load_profile
+from lockstep.bench.quality.cli import app
+from lockstep.bench.quality.freezes import freezes
+from lockstep.bench.quality.repair import simulate
+from lockstep.bench.quality.stage import driving, running_console
+from lockstep.bench.quality.summary import summarise
 
 
 def test_an_interval_much_longer_than_usual_is_a_freeze() -> None:

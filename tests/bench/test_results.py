@@ -1,5 +1,5 @@
-from bench.results import Result
-from bench.table import render_markdown, render_table
+from lockstep.bench.results import Result
+from lockstep.bench.table import render_markdown, render_table
 
 
 def figure(value: float | None, **fields: object) -> Result:

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from bench import sections
-from bench.cli import SECTIONS, measure
-from bench.context import Context
-from bench.driving import console_trips, link_trips
-from bench.event_log import robot_times
-from bench.sections import command_to_feedback, datagrams, scene
-from bench.stack import running_bridge, running_stack
-from client import Console
-from robot_bridge.link_client import RobotLink
+from lockstep.bench import sections
+from lockstep.bench.cli import SECTIONS, measure
+from lockstep.bench.context import Context
+from lockstep.bench.driving import console_trips, link_trips
+from lockstep.bench.event_log import robot_times
+from lockstep.bench.sections import command_to_feedback, datagrams, scene
+from lockstep.bench.stack import running_bridge, running_stack
+from lockstep.client import Console
+from lockstep.robot_bridge.link.link_client import RobotLink
 
 
 async def test_every_trip_through_a_console_is_one_event_that_the_robot_executed() -> None:
@@ -74,8 +74,8 @@ async def test_a_section_that_fails_is_named_and_the_others_are_measured(monkeyp
     async def nothing() -> list[str]:
         return []
 
-    monkeypatch.setattr("bench.cli.available_robots", nothing)
-    monkeypatch.setattr("bench.sections.lossy.run", fail)
+    monkeypatch.setattr("lockstep.bench.cli.available_robots", nothing)
+    monkeypatch.setattr("lockstep.bench.sections.lossy.run", fail)
     measured = await measure(["lossy", "command_to_feedback"], quick=True)
     assert measured.failed == {"lossy": "RuntimeError: no such luck"}
     assert measured.busy_percent.keys() == {"lossy", "command_to_feedback"}

@@ -1,6 +1,6 @@
 """Makers of messages for the client's tests."""
 
-from robot_bridge.protocol.messages import Feedback, Refusal, RefusalReason, StopState
+from lockstep.protocol.messages import Feedback, Refusal, RefusalReason, StopState
 
 
 def feedback(

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from bench.driving import drive_on
-from bench.emulator import Constant, Impairment, Network, Uniform, even_profile, independent
-from client import CommandRefused, Console, ConsoleLost, StopUnconfirmed
+from lockstep.bench.driving import drive_on
+from lockstep.bench.emulator import Constant, Impairment, Network, Uniform, even_profile, independent
+from lockstep.client import CommandRefused, Console, ConsoleLost, StopUnconfirmed
 from tests.client.truth import collecting, drawn_event, executed_after, until_logged
 from tests.support.stack import Stack, running_stack
 

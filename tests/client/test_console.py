@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from bench.driving import drive_on
-from client import (
+from lockstep.bench.driving import drive_on
+from lockstep.client import (
     CommandError,
     CommandRefused,
     Console,
@@ -15,7 +15,7 @@ from client import (
     SeatRefused,
     SignallingRefused,
 )
-from robot_bridge.protocol.carriers import Carrier
+from lockstep.protocol.carriers import Carrier
 from tests.client.truth import collecting, drawn_event, executed_after, logged_stamps, until_logged
 from tests.support.stack import Stack
 

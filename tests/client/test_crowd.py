@@ -7,8 +7,8 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any, cast
 
-from bench.driving import drive_on
-from client import Console
+from lockstep.bench.driving import drive_on
+from lockstep.client import Console
 from tests.support.stack import running_stack
 
 KEPT = 12  # steps between pictures

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from client.command_gate import CommandGate
-from client.pilot import Pilot
-from robot_bridge.protocol.messages import Command, StopState
+from lockstep.client.control.command_gate import CommandGate
+from lockstep.client.control.command_sender import CommandSender
+from lockstep.protocol.messages import Command, StopState
 from tests.client.helpers import feedback, refusal
 from tests.client.vectors import load_vectors
 
@@ -19,7 +19,7 @@ class Person:
     """Somebody with a program that drives whenever it may."""
 
     def __init__(self) -> None:
-        self.pilot = Pilot(CommandGate("feedback", 4, 0.0), NEUTRAL)
+        self.pilot = CommandSender(CommandGate("feedback", 4, 0.0), NEUTRAL)
         self.pilot.seated()
         self.wants: list[float] | None = None
         self._sent = 0

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from bench.driving import drive_on
-from client import CommandRefused, Console, SeatRefused
-from robot_bridge.protocol.serial import event_after
+from lockstep.bench.driving import drive_on
+from lockstep.client import CommandRefused, Console, SeatRefused
+from lockstep.protocol.serial import event_after
 from tests.client.truth import until_logged
 from tests.support.stack import Stack
 

@@ -6,13 +6,13 @@ import socket
 
 import pytest
 
-from bench.driving import drive_on
-from client import Console
-from client.errors import ConnectFailed, SignallingRefused
-from client.whep import Whep
-from rtc.ice.settings import IceSettings
-from rtc.peer import PeerSettings
-from rtc.sdp import Fragment
+from lockstep.bench.driving import drive_on
+from lockstep.client import Console
+from lockstep.client.errors import ConnectFailed, SignallingRefused
+from lockstep.client.transport.whep import Whep
+from lockstep.rtc.ice.settings import IceSettings
+from lockstep.rtc.peer import PeerSettings
+from lockstep.rtc.sdp import Fragment
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 
 CANDIDATE = re.compile(r"^a=candidate:(\S+ \d+ \S+ \d+) (\S+) (\d+) typ host", re.MULTILINE)
@@ -137,7 +137,7 @@ async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was() -> No
 @pytest.fixture
 def hasty_consent(monkeypatch: pytest.MonkeyPatch) -> None:
     hasty = PeerSettings(ice=IceSettings(consent_seconds=1.0, consent_interval=(0.05, 0.1), connect_seconds=5.0))
-    monkeypatch.setattr("server.whep.OF_DRIVERS", hasty)
+    monkeypatch.setattr("lockstep.server.routes.whep.OF_DRIVERS", hasty)
 
 
 async def _lapse(rig: Rig, paths: Paths) -> None:
@@ -209,7 +209,7 @@ async def test_an_answer_that_cannot_be_used_leaves_the_old_path_as_it_was(monke
             async def spoilt(whep: Whep, resource: str, fragment: str, answer: str = answer) -> str:
                 return answer
 
-            monkeypatch.setattr("client.whep.Whep.restart_ice", spoilt)
+            monkeypatch.setattr("lockstep.client.transport.whep.Whep.restart_ice", spoilt)
             with pytest.raises(ConnectFailed):
                 await console.restart_ice()
         await console.drive([0.0] * len(console.description.axes))

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from client.command_gate import CommandGate
-from client.pilot import Pilot
+from lockstep.client.control.command_gate import CommandGate
+from lockstep.client.control.command_sender import CommandSender
 from tests.client.helpers import feedback
 from tests.client.vectors import load_vectors
 
@@ -13,7 +13,7 @@ CASES: list[dict[str, Any]] = load_vectors("learning.json")["cases"]
 MOVING = [1.0]
 
 
-def command(pilot: Pilot, event: int, at: float, answer_after: float) -> list[float]:
+def command(pilot: CommandSender, event: int, at: float, answer_after: float) -> list[float]:
     """Send one command and answer it; when it was sent, in ms after `at`."""
     sends = []
     now = at
@@ -27,7 +27,7 @@ def command(pilot: Pilot, event: int, at: float, answer_after: float) -> list[fl
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
 def test_what_is_learnt_and_copied_follows_the_shared_table(case: dict[str, Any]) -> None:
-    pilot = Pilot(CommandGate("feedback", 4, 0.0), [0.0])
+    pilot = CommandSender(CommandGate("feedback", 4, 0.0), [0.0])
     event = 1
     pilot.feedback(feedback(event), 0.0)
     for step in case["steps"]:

@@ -1,7 +1,7 @@
 """When the command in flight is repeated, and what is learnt from its answer."""
 
-from client.pilot import ECHO, ECHOES, LOSSY_SPELL, SALVO, SALVO_SPACING
-from client.repeat_timer import FLOOR, INITIAL
+from lockstep.client.control.command_sender import ECHO, ECHOES, LOSSY_SPELL, SALVO, SALVO_SPACING
+from lockstep.client.control.repeat_timer import FLOOR, INITIAL
 from tests.client.helpers import feedback
 from tests.client.pilots import FAST, commands, flying, new_pilot
 

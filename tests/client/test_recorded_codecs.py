@@ -9,13 +9,13 @@ from pathlib import Path
 import av
 import httpx
 
-from bench.driving import drive_on
-from client import Console
-from robot_bridge.robots.event_strip import read_event_strip
-from server.recording import export_mp4
-from server.recording.pictures import RecordedPictures
-from server.recording.reader import RecordingReader
-from server.recording.verify_file import verify_file
+from lockstep.bench.driving import drive_on
+from lockstep.client import Console
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
+from lockstep.server.recording.export import export_mp4
+from lockstep.server.recording.reading.pictures import RecordedPictures
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.verify.verify_file import verify_file
 from tests.support.stack import Stack, running_stack
 
 EVENTS = 60

@@ -9,18 +9,18 @@ from typing import Any, NamedTuple
 import av
 import pytest
 
-from bench.driving import drive_on
-from bench.emulator import Network, load_profile
-from client import Console
-from robot_bridge.robots.event_strip import read_event_strip
-from server.cli_audit import verify_audit
-from server.evidence.anchors import parse_anchor
-from server.evidence.signer import evidence_signer
-from server.recording.payload import own_record_of
-from server.recording.reader import Record, RecordingReader
-from server.recording.records import CommandRecord, FeedbackRecord
-from server.recording.verify_file import verify_file
-from server.state_dir import StateDir
+from lockstep.bench.driving import drive_on
+from lockstep.bench.emulator import Network, load_profile
+from lockstep.client import Console
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
+from lockstep.server.cli.audit import verify_audit
+from lockstep.server.evidence.anchors import parse_anchor
+from lockstep.server.evidence.signer import evidence_signer
+from lockstep.server.recording.format.payload import own_record_of
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord
+from lockstep.server.recording.reading.reader import Record, RecordingReader
+from lockstep.server.recording.verify.verify_file import verify_file
+from lockstep.server.util.state_dir import StateDir
 from tests.client.truth import until_logged
 from tests.support.stack import Stack, running_stack
 

@@ -5,12 +5,12 @@ import signal
 import time
 from pathlib import Path
 
-from bench.driving import drive_on
-from client import Console
-from server.recording.reader import RecordingReader
-from server.recording.settings import RecordingSettings
-from server.recording.shelf import Shelf
-from server.recording.verify_file import verify_file
+from lockstep.bench.driving import drive_on
+from lockstep.client import Console
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.recording_store import RecordingStore
+from lockstep.server.recording.settings import RecordingSettings
+from lockstep.server.recording.verify.verify_file import verify_file
 from tests.support.stack import running_stack
 
 EVENTS = 40
@@ -37,7 +37,7 @@ async def test_a_killed_consoles_recording_opens_and_is_completed(tmp_path: Path
     executed = {each["event"]: each["time"] for each in log if each["kind"] == "executed"}
     latest = max(executed.values())
     assert before.last_event >= max(event for event, at in executed.items() if at < latest - LOST - SLOW or event == 2)
-    assert Shelf(directory, RecordingSettings()).recover() == 1
+    assert RecordingStore(directory, RecordingSettings()).recover() == 1
     verdict = verify_file(path)
     assert [name for name, check in verdict.checks.items() if not check.ok] == ["signed"], "it has no closing signature"
     assert verdict.signature.state == "open"

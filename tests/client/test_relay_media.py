@@ -5,13 +5,13 @@ import asyncio
 import msgspec
 import pytest
 
-from client import relay
-from client.errors import ConnectFailed
-from client.relay import RelayMedia, RelayTicket
+from lockstep.client.errors import ConnectFailed
+from lockstep.client.transport import sfu_media
+from lockstep.client.transport.sfu_media import RelayMedia, RelayTicket
 
 
 async def test_a_relay_that_is_no_janus_is_refused_by_name() -> None:
-    told = {"engine": "mediasoup", "relay": "0", "url": "wss://host", "feed": 7, "streams": []}
+    told = {"engine": "mediasoup", "sfu_media": "0", "url": "wss://host", "feed": 7, "streams": []}
     ticket = msgspec.convert(told, RelayTicket)
     with pytest.raises(ConnectFailed, match="not through a mediasoup"):
         RelayMedia(ticket, lambda _: None)
@@ -19,9 +19,9 @@ async def test_a_relay_that_is_no_janus_is_refused_by_name() -> None:
 
 @pytest.mark.parametrize("late_from", [0.0, 60.0], ids=["a process that is always held up", "one that never is"])
 async def test_a_relay_that_says_nothing_is_given_up_by(late_from: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(relay, "SILENCE_SECONDS", 0.02)
-    monkeypatch.setattr(relay, "HELD_UP_SECONDS", late_from)
-    told = {"engine": "janus", "relay": "0", "url": "ws://host", "feed": 7, "room": 1, "streams": []}
+    monkeypatch.setattr(sfu_media, "SILENCE_SECONDS", 0.02)
+    monkeypatch.setattr(sfu_media, "HELD_UP_SECONDS", late_from)
+    told = {"engine": "janus", "sfu_media": "0", "url": "ws://host", "feed": 7, "room": 1, "streams": []}
     media = RelayMedia(msgspec.convert(told, RelayTicket), lambda _: None)
     try:
         async with asyncio.timeout(20):

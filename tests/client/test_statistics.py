@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from client.statistics import (
+from lockstep.client.statistics import (
     RATE_WINDOW,
     ConsoleStatistics,
     EventRate,
@@ -12,7 +12,7 @@ from client.statistics import (
     StreamStatistics,
     percentiles,
 )
-from robot_bridge.protocol.serial import MAX_EVENT
+from lockstep.protocol.serial import MAX_EVENT
 
 
 def test_percentiles_are_of_nearest_rank() -> None:

@@ -5,8 +5,8 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
-from client import Console, Picture
-from robot_bridge.robots.event_strip import read_event_strip
+from lockstep.client import Console, Picture
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from tests.support.stack import Stack
 
 __all__ = ["collecting", "drawn_event", "executed_after", "logged_stamps", "until_logged"]

@@ -9,9 +9,9 @@ import httpx
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.chromium import running_chromium
-from bench.browsers.console_page import ConsolePage
-from bench.free_port import free_port
+from lockstep.bench.browsers.chromium import running_chromium
+from lockstep.bench.browsers.console_page import ConsolePage
+from lockstep.bench.free_port import free_port
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser

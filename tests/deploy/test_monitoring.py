@@ -8,10 +8,10 @@ import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
+from lockstep.server.media.metrics import MediaMetrics
+from lockstep.server.telemetry.metrics import Metrics
 from scripts.generate_dashboard import PATH as DASHBOARD
 from scripts.generate_dashboard import dashboard, main
-from server.media.metrics import MediaMetrics
-from server.metrics import Metrics
 
 ROOT = Path(__file__).resolve().parents[2]
 PROMETHEUS = ROOT / "deploy" / "prometheus"

@@ -4,8 +4,8 @@ import inspect
 import re
 from pathlib import Path
 
-from robot_bridge import cli as robot_cli
-from server.settings import Settings
+from lockstep.robot_bridge import cli as robot_cli
+from lockstep.server.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]
 OTHERS = {  # not the programs' own

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.liveness import ALARM, LIMIT
+from lockstep.robot_bridge.watchdog.liveness import ALARM, LIMIT
 
 UNITS = sorted((Path(__file__).resolve().parents[2] / "deploy" / "systemd").glob("*.service"))
 

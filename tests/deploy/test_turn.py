@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from aioice import stun, turn
 
-from bench.free_port import free_port
-from rtc.interfaces import own_addresses
+from lockstep.bench.free_port import free_port
+from lockstep.rtc.interfaces import own_addresses
 
 START_TURN = Path(__file__).resolve().parents[2] / "deploy" / "start-turn"
 SECRET, REALM = "only for tests, only on this machine", "lockstep.test"

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-DIST = ROOT / "server" / "web_dist"
+DIST = ROOT / "server" / "lockstep" / "server" / "web_dist"
 
 
 def test_the_built_page_has_the_licence_of_every_package_in_it() -> None:

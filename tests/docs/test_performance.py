@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from bench.cli import SECTIONS
-from bench.results import Result
-from bench.table import render_markdown
+from lockstep.bench.cli import SECTIONS
+from lockstep.bench.results import Result
+from lockstep.bench.table import render_markdown
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "performance.md").read_text()

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from server.limit_settings import LimitSettings
-from server.settings import Settings
+from lockstep.server.http.limit_settings import LimitSettings
+from lockstep.server.settings import Settings
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "security.md").read_text()

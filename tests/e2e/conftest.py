@@ -14,9 +14,9 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
 
-from bench.browsers.chromium import running_chromium
-from bench.browsers.firefox import Firefox, running_firefox
-from bench.browsers.sound_card import SoundCard, running_sound_card
+from lockstep.bench.browsers.chromium import running_chromium
+from lockstep.bench.browsers.firefox import Firefox, running_firefox
+from lockstep.bench.browsers.sound_card import SoundCard, running_sound_card
 from tests.e2e.as_new import as_new
 from tests.support.stack import Stack, running_stack
 

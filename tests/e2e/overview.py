@@ -4,7 +4,7 @@ from typing import Any
 
 from playwright.async_api import Page
 
-from bench.browsers.chromium import missed_in_page
+from lockstep.bench.browsers.chromium import missed_in_page
 
 __all__ = ["in_view", "stats", "until"]
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from playwright.async_api import Browser
 
-from bench.browsers.chromium import PAD
-from bench.browsers.console_page import SMALL_WINDOW, ConsolePage
+from lockstep.bench.browsers.chromium import PAD
+from lockstep.bench.browsers.console_page import SMALL_WINDOW, ConsolePage
 
 __all__ = ["TAMPER", "alter", "open_tampered", "say"]
 

@@ -8,8 +8,8 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page
 
-from bench.browsers.chromium import open_page
-from bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.chromium import open_page
+from lockstep.bench.browsers.console_page import ConsolePage
 from tests.e2e.accessibility import findings
 from tests.e2e.overview import in_view, until
 from tests.e2e.tamper import alter, open_tampered, say

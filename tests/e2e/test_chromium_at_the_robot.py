@@ -10,14 +10,14 @@ import msgspec
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
-from bench.browsers.console_page import RB, ConsolePage, open_console
-from bench.processes import running_process
-from robot_bridge.bridge import Bridge
-from robot_bridge.protocol.description import Axis, RobotDescription, StartWarning
-from robot_bridge.robots.base import Measurement
-from robot_bridge.robots.planar.description import DESCRIPTION
-from robot_bridge.robots.planar.robot import PlanarRobot
-from robot_bridge.settings import BridgeSettings
+from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from lockstep.bench.processes import running_process
+from lockstep.protocol.description import Axis, RobotDescription, StartWarning
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.base import Measurement
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.support.stack import Stack, running_console
 
 pytestmark = pytest.mark.browser

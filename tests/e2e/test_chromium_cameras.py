@@ -6,7 +6,7 @@ import httpx
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import open_console
+from lockstep.bench.browsers.console_page import open_console
 from tests.server.media.sources.media_files import film, tone
 from tests.support.stack import running_stack
 

@@ -10,8 +10,8 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Response, expect
 
-from bench.browsers.chromium import open_page
-from bench.free_port import free_port
+from lockstep.bench.browsers.chromium import open_page
+from lockstep.bench.free_port import free_port
 from tests.e2e.overview import in_view, stats, until
 from tests.support.fleet_entry import running_entry
 from tests.support.redis_server import RedisServer

@@ -3,7 +3,7 @@
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]

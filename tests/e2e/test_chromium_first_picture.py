@@ -8,7 +8,7 @@ import httpx
 import pytest
 from playwright.async_api import Browser, Page, Route
 
-from bench.browsers.console_page import open_console
+from lockstep.bench.browsers.console_page import open_console
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser

@@ -10,10 +10,10 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
-from bench.browsers.chromium import open_page
-from bench.browsers.console_page import ConsolePage
-from bench.driving import drive_on
-from client import Console
+from lockstep.bench.browsers.chromium import open_page
+from lockstep.bench.browsers.console_page import ConsolePage
+from lockstep.bench.driving import drive_on
+from lockstep.client import Console
 from tests.e2e.overview import in_view, stats, until
 from tests.support.stack import Stack, running_fleet
 

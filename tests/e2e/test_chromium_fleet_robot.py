@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, expect
 
-from bench.browsers.console_page import open_console
+from lockstep.bench.browsers.console_page import open_console
 from tests.support.stack import running_fleet
 
 pytestmark = pytest.mark.browser

@@ -3,7 +3,7 @@
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
-from bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, expect
 
-from bench.browsers.console_page import open_console
-from server.recording.verify_file import verify_file
+from lockstep.bench.browsers.console_page import open_console
+from lockstep.server.recording.verify.verify_file import verify_file
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser

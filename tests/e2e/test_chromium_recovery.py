@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import RB, ConsolePage, open_console
-from client import Console
+from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from lockstep.client import Console
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser
@@ -46,10 +46,10 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
 # Read by every Python that starts: the bridge's planar robot hangs once in a tick, where there is a file, for ever.
 HANGS_ONCE = """
 import sys
-if "robot_bridge" in sys.orig_argv:
+if "lockstep.robot_bridge" in sys.orig_argv:
     import os, time
-    from robot_bridge import liveness
-    from robot_bridge.robots.planar.robot import PlanarRobot
+    from lockstep.robot_bridge.watchdog import liveness
+    from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
     liveness.LIMIT = 1.0
     tick = PlanarRobot.tick
     def hang(robot):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import RB, open_console
+from lockstep.bench.browsers.console_page import RB, open_console
 from tests.support.stack import running_stack
 from tests.support.turn_server import TURN_SECRET, TurnServer, running_turn_server
 

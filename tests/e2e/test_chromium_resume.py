@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, expect
 
-from bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from tests.support.movable_path import movable_path
 from tests.support.stack import Stack
 

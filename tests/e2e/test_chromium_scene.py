@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import ConsolePage, open_console
-from server.scene_page import HOOK
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.server.scene.page import HOOK
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser

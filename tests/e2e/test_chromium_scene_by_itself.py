@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from playwright.async_api import Browser, Locator, expect
 
-from bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.console_page import ConsolePage
 from tests.e2e.machine import open_on_machine
 from tests.e2e.tamper import TAMPER
 from tests.support.stack import Stack

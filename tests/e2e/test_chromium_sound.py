@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import open_console
-from bench.browsers.sound_card import SoundCard, tone_level
-from client import Console
+from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.browsers.sound_card import SoundCard, tone_level
+from lockstep.client import Console
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser

@@ -3,8 +3,8 @@
 import pytest
 from playwright.async_api import Browser, expect
 
-from bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
-from server.scene_page import HOOK
+from lockstep.bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
+from lockstep.server.scene.page import HOOK
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
-from bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from tests.e2e.tamper import open_tampered
 from tests.support.stack import Stack, running_stack
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 
-from bench.browsers.console_page import ConsolePage, open_console
-from bench.emulator.errors import NamespacesUnavailable
-from bench.relay.stage import FIRST_PORT, RelayStage, relay_stage
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.emulator.errors import NamespacesUnavailable
+from lockstep.bench.relay.stage import FIRST_PORT, RelayStage, relay_stage
 
 # As behind a proxy that lets no WebSocket of the console pass; those of relays do.
 NO_LINES = """

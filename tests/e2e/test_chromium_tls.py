@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.chromium import PAD
-from bench.browsers.console_page import RB, ConsolePage
-from rtc.interfaces import own_addresses
+from lockstep.bench.browsers.chromium import PAD
+from lockstep.bench.browsers.console_page import RB, ConsolePage
+from lockstep.rtc.interfaces import own_addresses
 from tests.support.stack import running_stack
 
 pytestmark = pytest.mark.browser

@@ -3,7 +3,7 @@
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import FORWARD, RB, START, STOP_BUTTON, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import FORWARD, RB, START, STOP_BUTTON, ConsolePage, open_console
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser

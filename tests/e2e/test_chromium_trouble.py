@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.async_api import Browser, Page, Route, expect
 
-from bench.browsers.console_page import open_console
+from lockstep.bench.browsers.console_page import open_console
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.console_page import ConsolePage
 from tests.e2e.machine import open_on_machine
 from tests.server.media.sources.media_files import film
 from tests.support.stack import Stack, running_stack

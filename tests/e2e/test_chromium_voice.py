@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from playwright.async_api import Browser, expect
 
-from bench.browsers.chromium import running_chromium
-from bench.browsers.console_page import ConsolePage, open_console
-from bench.browsers.sound_card import SoundCard, running_sound_card, tone_level
+from lockstep.bench.browsers.chromium import running_chromium
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.sound_card import SoundCard, running_sound_card, tone_level
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser

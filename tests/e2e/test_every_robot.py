@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
 from tests.support.c_robot import running_c_robot
 from tests.support.ros2 import EXAMPLES, have_ros, ros_python, running_ros_robot
 from tests.support.stack import Stack, running_console, running_stack

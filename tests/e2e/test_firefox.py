@@ -2,9 +2,9 @@
 
 import pytest
 
-from bench.browsers.firefox import Firefox
-from bench.browsers.sound_card import SoundCard
-from bench.emulator import Network
+from lockstep.bench.browsers.firefox import Firefox
+from lockstep.bench.browsers.sound_card import SoundCard
+from lockstep.bench.emulator import Network
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]

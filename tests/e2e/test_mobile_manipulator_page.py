@@ -7,7 +7,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser
 
-from bench.browsers.console_page import open_console
+from lockstep.bench.browsers.console_page import open_console
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser

@@ -9,10 +9,10 @@ import httpx
 import pytest
 from playwright.async_api import Browser, Page, expect
 
-from bench.browsers.chromium import open_page
-from bench.browsers.console_page import READ_STRIP, ConsolePage, open_console
-from bench.emulator import Network
-from server.recording.reader import Record, RecordingReader
+from lockstep.bench.browsers.chromium import open_page
+from lockstep.bench.browsers.console_page import READ_STRIP, ConsolePage, open_console
+from lockstep.bench.emulator import Network
+from lockstep.server.recording.reading.reader import Record, RecordingReader
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]

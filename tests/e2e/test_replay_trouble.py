@@ -10,11 +10,11 @@ import httpx
 import pytest
 from playwright.async_api import Browser, Page, expect
 
-from bench.browsers.chromium import open_page
-from bench.browsers.console_page import READ_STRIP, ConsolePage
-from bench.driving import drive_on
-from client import Console
-from server.recording.reader import RecordingReader
+from lockstep.bench.browsers.chromium import open_page
+from lockstep.bench.browsers.console_page import READ_STRIP, ConsolePage
+from lockstep.bench.driving import drive_on
+from lockstep.client import Console
+from lockstep.server.recording.reading.reader import RecordingReader
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]

@@ -7,7 +7,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
 
-from bench.browsers.console_page import LEFT_Y, RB, open_console
+from lockstep.bench.browsers.console_page import LEFT_Y, RB, open_console
 from tests.support.ros2 import EXAMPLES, RosRobot, have_ros, ros_python, running_ros_robot
 from tests.support.stack import Stack, running_stack
 

@@ -6,11 +6,11 @@ out, and what is accepted is a message that belongs there and survives being wri
 
 import math
 
-from robot_bridge.protocol.console import ClientMessage, decode_client_message, encode_console_message
-from robot_bridge.protocol.messages import Command
-from server.channels import CHANNELS, MAX_MESSAGE, ChannelName, channel_name, parse_message
-from server.errors import BinaryMessage, ChannelError, MessageTooLarge, UnknownChannel
-from server.scene_proxy import is_allowed
+from lockstep.protocol.console import ClientMessage, decode_client_message, encode_console_message
+from lockstep.protocol.messages import Command
+from lockstep.server.errors import BinaryMessage, ChannelError, MessageTooLarge, UnknownChannel
+from lockstep.server.peers.channels import CHANNELS, MAX_MESSAGE, ChannelName, channel_name, parse_message
+from lockstep.server.routes.scene_proxy import is_allowed
 
 __all__ = ["try_input"]
 

@@ -6,14 +6,14 @@ line, or the frames of a TCP connection. Only the documented errors come out, an
 
 from random import Random
 
-from rtc.addresses import Path
-from rtc.ice.agent import Agent
-from rtc.ice.candidates import CandidateError, parse_candidate
-from rtc.ice.credentials import Credentials
-from rtc.ice.gathering import gather
-from rtc.ice.port import Port
-from rtc.ice.tcp import TcpFraming, frame
-from rtc.stun import StunError, is_authentic, parse, serialize, transaction_of, username_of
+from lockstep.rtc.addresses import Path
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.candidates import CandidateError, parse_candidate
+from lockstep.rtc.ice.credentials import Credentials
+from lockstep.rtc.ice.gathering import gather
+from lockstep.rtc.ice.port import Port
+from lockstep.rtc.ice.tcp import TcpFraming, frame
+from lockstep.rtc.stun import StunError, is_authentic, parse, serialize, transaction_of, username_of
 
 __all__ = ["HERE", "PASSWORD", "THERE", "try_input"]
 

@@ -15,15 +15,10 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import cast
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_acceptor import LinkAcceptor
-from robot_bridge.link_server import LinkPeer
-from robot_bridge.link_session import HELLO_TIMEOUT, SILENCE, ClientSession
-from robot_bridge.link_transport import TICK_INTERVAL
-from robot_bridge.protocol.errors import MessageError
-from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, frame
-from robot_bridge.protocol.link_secret import LinkSecret
-from robot_bridge.protocol.messages import (
+from lockstep.protocol.errors import MessageError
+from lockstep.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, frame
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.messages import (
     Command,
     Hello,
     LinkMessage,
@@ -36,9 +31,14 @@ from robot_bridge.protocol.messages import (
     decode_message,
     encode_message,
 )
-from robot_bridge.protocol.serial import event_after, event_gap
-from robot_bridge.robots.planar.robot import PlanarRobot
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.serial import event_after, event_gap
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_acceptor import LinkAcceptor
+from lockstep.robot_bridge.link.link_server import LinkPeer
+from lockstep.robot_bridge.link.link_session import HELLO_TIMEOUT, SILENCE, ClientSession
+from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL
+from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
+from lockstep.robot_bridge.settings import BridgeSettings
 
 __all__ = ["SCENES", "try_input"]
 

@@ -8,8 +8,8 @@ import functools
 
 from OpenSSL import SSL
 
-from rtc.certificate import Certificate
-from rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsState, dtls_context
+from lockstep.rtc.certificate import Certificate
+from lockstep.rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsState, dtls_context
 from tests.rtc.dtls_pair import DtlsPair
 
 __all__ = ["try_input"]

@@ -1,12 +1,12 @@
 """What RTP and RTCP of a peer must withstand: only RtpError comes out, and what is read goes through every stage."""
 
-from rtc.demux import DatagramKind, datagram_kind
-from rtc.rtp.errors import RtpError
-from rtc.rtp.incoming import IncomingParameters, IncomingStream
-from rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
-from rtc.rtp.packet import RtpPacket
-from rtc.rtp.rtcp import RtcpPacket, pack_rtcp, parse_rtcp
-from rtc.rtp.stage import RoundTrip
+from lockstep.rtc.demux import DatagramKind, datagram_kind
+from lockstep.rtc.rtp.errors import RtpError
+from lockstep.rtc.rtp.incoming import IncomingParameters, IncomingStream
+from lockstep.rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
+from lockstep.rtc.rtp.packet import RtpPacket
+from lockstep.rtc.rtp.rtcp import RtcpPacket, pack_rtcp, parse_rtcp
+from lockstep.rtc.rtp.stage import RoundTrip
 
 __all__ = ["try_input"]
 

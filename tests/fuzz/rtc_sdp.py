@@ -1,6 +1,14 @@
 """What the session descriptions of `rtc/` must withstand: only SdpError comes out, and what is read can be written."""
 
-from rtc.sdp import LocalMedia, SdpError, answer_to, check_answer, parse_description, parse_fragment, write_description
+from lockstep.rtc.sdp import (
+    LocalMedia,
+    SdpError,
+    answer_to,
+    check_answer,
+    parse_description,
+    parse_fragment,
+    write_description,
+)
 from tests.rtc.sdp.samples import H264, OPUS, RTX, TRANSPORT, VP8
 
 __all__ = ["try_input"]

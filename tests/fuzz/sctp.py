@@ -6,9 +6,9 @@ lets time pass first, and chunks, which get a valid header in front. `Victim` as
 
 import contextlib
 
-from rtc.dcep import DcepError, decode_open
-from rtc.sctp.errors import SctpParseError
-from rtc.sctp.packet import decode_packet
+from lockstep.rtc.dcep import DcepError, decode_open
+from lockstep.rtc.sctp.errors import SctpParseError
+from lockstep.rtc.sctp.packet import decode_packet
 from tests.rtc.sctp.hostile import Victim
 
 __all__ = ["SCENES", "pack", "try_input"]

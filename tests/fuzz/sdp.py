@@ -9,14 +9,21 @@ import random
 
 from OpenSSL import SSL
 
-from rtc.certificate import Certificate
-from rtc.dtls import dtls_context
-from rtc.peer import Peer
-from rtc.sdp import LocalMedia, SdpError, SessionDescription, parse_description, write_description, write_fragment
-from server.agreed_channels import agreed_channels
-from server.errors import BadSdp, BadSdpFragment
-from server.media.codec_choice import known_codecs
-from server.offer import MAX_CANDIDATES, MAX_SECTIONS, parse_fragment, parse_offer
+from lockstep.rtc.certificate import Certificate
+from lockstep.rtc.dtls import dtls_context
+from lockstep.rtc.peer import Peer
+from lockstep.rtc.sdp import (
+    LocalMedia,
+    SdpError,
+    SessionDescription,
+    parse_description,
+    write_description,
+    write_fragment,
+)
+from lockstep.server.errors import BadSdp, BadSdpFragment
+from lockstep.server.media.codecs.codec_choice import known_codecs
+from lockstep.server.peers.agreed_channels import agreed_channels
+from lockstep.server.webrtc.sdp_offer import MAX_CANDIDATES, MAX_SECTIONS, parse_fragment, parse_offer
 
 __all__ = ["try_input"]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import msgspec
 
-from robot_bridge.protocol.framing import frame
-from robot_bridge.protocol.link_secret import LinkSecret
-from robot_bridge.protocol.messages import (
+from lockstep.protocol.framing import frame
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.messages import (
     Challenge,
     Command,
     EventNotice,
@@ -26,7 +26,7 @@ from robot_bridge.protocol.messages import (
     Stop,
     encode_message,
 )
-from robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 
 __all__ = ["CORPUS", "seeds"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from robot_bridge.protocol.console import (
+from lockstep.protocol.console import (
     ClientMessage,
     Rename,
     Report,
@@ -17,7 +17,7 @@ from robot_bridge.protocol.console import (
     StreamReport,
     encode_console_message,
 )
-from robot_bridge.protocol.messages import Command, Ping, Reset, Rest, Stop
+from lockstep.protocol.messages import Command, Ping, Reset, Rest, Stop
 from tests.server.offers import offer, section
 
 __all__ = ["channel_seeds", "sdp_seeds", "write"]

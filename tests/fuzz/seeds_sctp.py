@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from rtc.dcep import ACK, Open, Reliability
-from rtc.sctp.chunks import (
+from lockstep.rtc.dcep import ACK, Open, Reliability
+from lockstep.rtc.sctp.chunks import (
     BEGIN,
     END,
     IMMEDIATE,

@@ -26,20 +26,23 @@ TARGETS = {
     "robot_link": Target(
         "tests.fuzz.robot_link",
         (  # not the ticks: watching those would leave a tenth of the inputs a second
-            "robot_bridge.event_core",
-            "robot_bridge.link_server",
-            "robot_bridge.link_session",
-            "robot_bridge.link_transport",
-            "robot_bridge.protocol",
+            "lockstep.robot_bridge.control.event_core",
+            "lockstep.robot_bridge.link.link_server",
+            "lockstep.robot_bridge.link.link_session",
+            "lockstep.robot_bridge.link.link_transport",
+            "lockstep.protocol",
         ),
     ),
-    "sdp": Target("tests.fuzz.sdp", ("server.offer", "server.whep", "aiortc.sdp")),
-    "rtc_dtls": Target("tests.fuzz.rtc_dtls", ("rtc.dtls",)),
-    "rtc_sdp": Target("tests.fuzz.rtc_sdp", ("rtc.sdp",)),
-    "ice": Target("tests.fuzz.ice", ("rtc.stun", "rtc.ice", "rtc.demux")),
-    "sctp": Target("tests.fuzz.sctp", ("rtc.sctp", "rtc.channels", "rtc.dcep")),
-    "rtc_rtp": Target("tests.fuzz.rtc_rtp", ("rtc.rtp",)),
-    "channels": Target("tests.fuzz.channels", ("server.channels", "server.scene_proxy", "robot_bridge.protocol")),
+    "sdp": Target("tests.fuzz.sdp", ("lockstep.server.webrtc.sdp_offer", "lockstep.server.routes.whep", "aiortc.sdp")),
+    "rtc_dtls": Target("tests.fuzz.rtc_dtls", ("lockstep.rtc.dtls",)),
+    "rtc_sdp": Target("tests.fuzz.rtc_sdp", ("lockstep.rtc.sdp",)),
+    "ice": Target("tests.fuzz.ice", ("lockstep.rtc.stun", "lockstep.rtc.ice", "lockstep.rtc.demux")),
+    "sctp": Target("tests.fuzz.sctp", ("lockstep.rtc.sctp", "lockstep.rtc.channels", "lockstep.rtc.dcep")),
+    "rtc_rtp": Target("tests.fuzz.rtc_rtp", ("lockstep.rtc.rtp",)),
+    "channels": Target(
+        "tests.fuzz.channels",
+        ("lockstep.server.peers.channels", "lockstep.server.routes.scene_proxy", "lockstep.protocol"),
+    ),
 }
 
 

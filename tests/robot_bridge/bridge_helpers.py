@@ -9,10 +9,8 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.framing import FrameReader, frame
-from robot_bridge.protocol.messages import (
+from lockstep.protocol.framing import FrameReader, frame
+from lockstep.protocol.messages import (
     Command,
     Feedback,
     Hello,
@@ -23,10 +21,12 @@ from robot_bridge.protocol.messages import (
     decode_message,
     encode_message,
 )
-from robot_bridge.protocol.serial import FIRST_EVENT, event_after
-from robot_bridge.robots.base import MediaSource
-from robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.serial import FIRST_EVENT, event_after
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.robots.base import MediaSource
+from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
+from lockstep.robot_bridge.settings import BridgeSettings
 
 __all__ = [
     "Addressed",

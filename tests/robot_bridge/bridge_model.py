@@ -6,19 +6,10 @@ books of its own, by other rules than the cores', and raises as soon as somethin
 
 from collections.abc import Callable
 
-from robot_bridge.event_core import Answered, EventCore, Executed, Refused
-from robot_bridge.protocol.messages import (
-    Command,
-    Feedback,
-    LinkMessage,
-    Refusal,
-    Reset,
-    Rest,
-    Stop,
-    StopTaken,
-)
-from robot_bridge.stop_latch import LEAST_STOP, ResetRefused, ResetTaken, ResetWaits, StopLatch
-from robot_bridge.stop_store import Found, Kept, start_of
+from lockstep.protocol.messages import Command, Feedback, LinkMessage, Refusal, Reset, Rest, Stop, StopTaken
+from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed, Refused
+from lockstep.robot_bridge.stop.stop_latch import LEAST_STOP, ResetRefused, ResetTaken, ResetWaits, StopLatch
+from lockstep.robot_bridge.stop.stop_store import Found, Kept, start_of
 from tests.robot_bridge.core_helpers import AXES, MAX_AGE, MEASURED
 
 __all__ = ["BridgeModel", "MotionWitness"]

@@ -1,10 +1,10 @@
 """Small builders for tests of the bridge's cores."""
 
-from robot_bridge.event_core import CommandOutcome, EventCore, Refused
-from robot_bridge.protocol.description import Axis
-from robot_bridge.protocol.messages import Command
-from robot_bridge.protocol.serial import MAX_EVENT
-from robot_bridge.robots.base import Measurement
+from lockstep.protocol.description import Axis
+from lockstep.protocol.messages import Command
+from lockstep.protocol.serial import MAX_EVENT
+from lockstep.robot_bridge.control.event_core import CommandOutcome, EventCore, Refused
+from lockstep.robot_bridge.robots.base import Measurement
 
 __all__ = ["AXES", "MAX_AGE", "MEASURED", "NONCE", "command", "core_at", "fresh_core", "reason"]
 

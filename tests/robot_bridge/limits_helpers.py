@@ -3,18 +3,10 @@
 import math
 from collections.abc import Sequence
 
-from robot_bridge.axis_shaper import AxisShaper
-from robot_bridge.check_description import check_description
-from robot_bridge.motion_limits import MotionLimits
-from robot_bridge.protocol.description import (
-    Axis,
-    AxisGain,
-    Geofence,
-    Joint,
-    PlanarBase,
-    PositionLimit,
-    RobotDescription,
-)
+from lockstep.protocol.description import Axis, AxisGain, Geofence, Joint, PlanarBase, PositionLimit, RobotDescription
+from lockstep.robot_bridge.control.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.motion_limits import MotionLimits
+from lockstep.robot_bridge.description.check_description import check_description
 
 __all__ = ["DT", "LIFT", "ExactBase", "ExactLift", "base_description", "inside"]
 

@@ -12,30 +12,16 @@ from typing import ClassVar, cast
 import msgspec
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.errors import DescriptionError, ListenError, RobotFailed
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.errors import LinkLost
-from robot_bridge.protocol.messages import (
-    EventNotice,
-    Feedback,
-    Goodbye,
-    Media,
-    Rest,
-    Stop,
-)
-from robot_bridge.protocol.serial import FIRST_EVENT, MAX_EVENT, event_gap
-from robot_bridge.robots.base import Measurement, MediaSource, Stamper
-from robot_bridge.settings import BridgeSettings
-from tests.robot_bridge.bridge_helpers import (
-    DRIVE,
-    NEUTRAL,
-    RecordingRobot,
-    log_lines,
-    operator,
-    running_bridge,
-)
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.errors import LinkLost
+from lockstep.protocol.messages import EventNotice, Feedback, Goodbye, Media, Rest, Stop
+from lockstep.protocol.serial import FIRST_EVENT, MAX_EVENT, event_gap
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.errors import DescriptionError, ListenError, RobotFailed
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Stamper
+from lockstep.robot_bridge.settings import BridgeSettings
+from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL, RecordingRobot, log_lines, operator, running_bridge
 
 MARGIN = 0.05  # s between the bridge's reading of the clock and the test's, on a busy machine
 
@@ -98,8 +84,8 @@ async def test_when_the_operator_link_ends_the_robot_comes_to_rest_long_before_h
 
 DRIVE_FOREVER = """
 import asyncio, sys
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.messages import Command, Feedback
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.protocol.messages import Command, Feedback
 
 async def main():
     async with RobotLink("127.0.0.1", int(sys.argv[1]), "operator") as link:
@@ -266,7 +252,7 @@ async def test_what_is_captured_before_a_feedback_is_measured_belongs_to_the_eve
 
 
 async def test_the_counters_are_logged_at_intervals(caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level(logging.INFO, "robot_bridge.bridge")
+    caplog.set_level(logging.INFO, "lockstep.robot_bridge.bridge")
     robot = RecordingRobot()
     async with Bridge(robot, BridgeSettings(port=0, log_interval=0.01)) as bridge, operator(bridge) as driver:
         await driver.refused(driver.command([0.0]))

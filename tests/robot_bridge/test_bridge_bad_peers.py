@@ -7,11 +7,9 @@ from random import Random
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.errors import LinkRefused
-from robot_bridge.protocol.framing import frame
-from robot_bridge.protocol.messages import (
+from lockstep.protocol.errors import LinkRefused
+from lockstep.protocol.framing import frame
+from lockstep.protocol.messages import (
     Feedback,
     Goodbye,
     Hello,
@@ -23,15 +21,10 @@ from robot_bridge.protocol.messages import (
     Stop,
     encode_message,
 )
-from robot_bridge.settings import BridgeSettings
-from tests.robot_bridge.bridge_helpers import (
-    NEUTRAL,
-    PATIENCE,
-    RecordingRobot,
-    operator,
-    raw_link,
-    running_bridge,
-)
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.settings import BridgeSettings
+from tests.robot_bridge.bridge_helpers import NEUTRAL, PATIENCE, RecordingRobot, operator, raw_link, running_bridge
 
 ROLES: tuple[LinkRole, ...] = ("events", "media")
 

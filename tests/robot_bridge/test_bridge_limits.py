@@ -5,9 +5,9 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from robot_bridge.robots.planar.description import RADIUS
-from robot_bridge.robots.planar.robot import PlanarState
-from robot_bridge.robots.planar.room import CHARGER
+from lockstep.robot_bridge.robots.planar.description import RADIUS
+from lockstep.robot_bridge.robots.planar.robot import PlanarState
+from lockstep.robot_bridge.robots.planar.room import CHARGER
 from tests.robot_bridge.bridge_helpers import NEUTRAL, RecordingRobot, log_lines, operator, running_bridge
 
 FAST = 0.2  # m/s

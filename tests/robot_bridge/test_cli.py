@@ -10,16 +10,16 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from robot_bridge import cli
-from robot_bridge.errors import RobotUnavailable
-from robot_bridge.link_client import RobotLink
-from robot_bridge.link_tls import LinkTls
-from robot_bridge.protocol.errors import LinkRefused
-from robot_bridge.protocol.link_secret import LinkSecret
-from robot_bridge.protocol.messages import Feedback, Stop, StopTaken
-from robot_bridge.robots.base import Robot
-from robot_bridge.stop_latch import StopRecord
-from robot_bridge.stop_store import Kept, StopStore
+from lockstep.protocol.errors import LinkRefused
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.messages import Feedback, Stop, StopTaken
+from lockstep.robot_bridge import cli
+from lockstep.robot_bridge.errors import RobotUnavailable
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.link.link_tls import LinkTls
+from lockstep.robot_bridge.robots.base import Robot
+from lockstep.robot_bridge.stop.stop_latch import StopRecord
+from lockstep.robot_bridge.stop.stop_store import Kept, StopStore
 from tests.support.certificates import Authority
 
 
@@ -27,7 +27,7 @@ from tests.support.certificates import Authority
 async def test_it_prints_its_address_once_ready_and_leaves_cleanly(how: signal.Signals, tmp_path: Path) -> None:
     log = tmp_path / "events.jsonl"
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "robot_bridge", "planar", "--port", "0", "--json", "--event-log", str(log)),
+        *(sys.executable, "-m", "lockstep.robot_bridge", "planar", "--port", "0", "--json", "--event-log", str(log)),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
     )
@@ -53,7 +53,7 @@ async def test_it_prints_its_address_once_ready_and_leaves_cleanly(how: signal.S
 
 async def test_what_is_printed_after_the_address_holds_up_nothing_when_nobody_reads_it() -> None:
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "robot_bridge", "planar", "--port", "0", "--json"),
+        *(sys.executable, "-m", "lockstep.robot_bridge", "planar", "--port", "0", "--json"),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
     )
@@ -72,7 +72,7 @@ async def test_what_is_printed_after_the_address_holds_up_nothing_when_nobody_re
 async def planar_bridge(*options: str) -> AsyncIterator[tuple[str, int]]:
     """`lockstep robot planar` on any free port, and its address."""
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "robot_bridge", "planar", "--port", "0", "--json", *options),
+        *(sys.executable, "-m", "lockstep.robot_bridge", "planar", "--port", "0", "--json", *options),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
     )
@@ -106,7 +106,7 @@ async def test_a_second_bridge_of_the_same_robot_is_refused_and_told_what_to_do(
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     async with planar_bridge():
-        command = (sys.executable, "-m", "robot_bridge", "planar", "--port", "0")
+        command = (sys.executable, "-m", "lockstep.robot_bridge", "planar", "--port", "0")
         second = await asyncio.create_subprocess_exec(*command, stderr=asyncio.subprocess.PIPE)
         async with asyncio.timeout(20):
             _, said = await second.communicate()
@@ -186,7 +186,7 @@ async def test_the_secret_of_the_environment_is_asked_for_and_tls_shows_in_the_a
     authority = Authority(tmp_path)
     certificate = authority.issue("bridge")
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "robot_bridge", "planar", "--port", "0", "--json", "--host", "0.0.0.0"),
+        *(sys.executable, "-m", "lockstep.robot_bridge", "planar", "--port", "0", "--json", "--host", "0.0.0.0"),
         *("--link-tls-cert", str(certificate)),
         stdout=asyncio.subprocess.PIPE,
         env={**os.environ, "LOCKSTEP_LINK_SECRET": secret.reveal()},

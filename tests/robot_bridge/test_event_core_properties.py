@@ -4,9 +4,9 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from robot_bridge.event_core import Answered, EventCore, Executed
-from robot_bridge.protocol.messages import Command, Feedback
-from robot_bridge.protocol.serial import MAX_EVENT, event_after, event_gap
+from lockstep.protocol.messages import Command, Feedback
+from lockstep.protocol.serial import MAX_EVENT, event_after, event_gap
+from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed
 from tests.robot_bridge.core_helpers import AXES, MAX_AGE, MEASURED, NEUTRAL, reason
 
 values = st.sampled_from([[0.5, 0.2], [-1.0, 0.3], NEUTRAL])

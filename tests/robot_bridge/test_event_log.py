@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge import event_log
-from robot_bridge.event_log import EventLog
+from lockstep.robot_bridge import event_log
+from lockstep.robot_bridge.event_log import EventLog
 
 
 def test_lines_are_appended_in_order_and_complete_after_close(tmp_path: Path) -> None:

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_client import RobotLink
-from robot_bridge.link_tls import LinkTls
-from robot_bridge.protocol.errors import LinkLost
-from robot_bridge.protocol.framing import frame
-from robot_bridge.protocol.link_secret import LinkSecret
-from robot_bridge.protocol.messages import Hello, encode_message
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.errors import LinkLost
+from lockstep.protocol.framing import frame
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.messages import Hello, encode_message
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.link.link_tls import LinkTls
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import RecordingRobot
 from tests.robot_bridge.flooding import flooding
 from tests.support.certificates import Authority
@@ -139,8 +139,8 @@ async def test_a_console_gets_its_link_every_time(tls: bool, host: str, says: by
 async def test_a_console_that_was_admitted_comes_back_while_strangers_take_all_handshakes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("robot_bridge.link_acceptor.HANDSHAKE_RATE", 0.001)
-    monkeypatch.setattr("robot_bridge.link_acceptor.HANDSHAKE_BURST", 1)
+    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_RATE", 0.001)
+    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_BURST", 1)
     authority = Authority(tmp_path)
     trust = LinkTls(authority=authority.certificate).client_context()
     settings = BridgeSettings(port=0, secret=SECRET, tls=LinkTls(certificate=authority.issue("bridge")))
@@ -151,8 +151,8 @@ async def test_a_console_that_was_admitted_comes_back_while_strangers_take_all_h
 
 
 async def test_it_comes_back_to_the_next_bridge_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robot_bridge.link_acceptor.HANDSHAKE_RATE", 0.001)
-    monkeypatch.setattr("robot_bridge.link_acceptor.HANDSHAKE_BURST", 1)
+    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_RATE", 0.001)
+    monkeypatch.setattr("lockstep.robot_bridge.link.link_acceptor.HANDSHAKE_BURST", 1)
     authority = Authority(tmp_path)
     trust = LinkTls(authority=authority.certificate).client_context()
     tls = LinkTls(certificate=authority.issue("bridge"))

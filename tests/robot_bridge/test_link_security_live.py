@@ -9,17 +9,17 @@ from pathlib import Path
 import pytest
 import uvloop
 
-from robot_bridge import link_acceptor
-from robot_bridge.bridge import Bridge
-from robot_bridge.check_link import check_link, is_loopback
-from robot_bridge.errors import InsecureLink
-from robot_bridge.link_client import RobotLink
-from robot_bridge.link_tls import LinkTls
-from robot_bridge.protocol.errors import LinkError, LinkLost, LinkRefused, SecretError
-from robot_bridge.protocol.framing import frame
-from robot_bridge.protocol.link_secret import LinkSecret
-from robot_bridge.protocol.messages import Feedback, Goodbye, Hello, Media, Ping, Stop, encode_message
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.errors import LinkError, LinkLost, LinkRefused, SecretError
+from lockstep.protocol.framing import frame
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.messages import Feedback, Goodbye, Hello, Media, Ping, Stop, encode_message
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.errors import InsecureLink
+from lockstep.robot_bridge.link import link_acceptor
+from lockstep.robot_bridge.link.check_link import check_link, is_loopback
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.link.link_tls import LinkTls
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import PATIENCE, Operator, RecordingRobot, raw_link
 from tests.support.certificates import Authority
 

@@ -3,10 +3,9 @@
 import msgspec
 import pytest
 
-from robot_bridge.link_session import BadInput, BridgeSession, ClientSession, LinkState
-from robot_bridge.protocol.framing import MAX_HELLO_FRAME, frame
-from robot_bridge.protocol.link_secret import LinkSecret, draw_nonce
-from robot_bridge.protocol.messages import (
+from lockstep.protocol.framing import MAX_HELLO_FRAME, frame
+from lockstep.protocol.link_secret import LinkSecret, draw_nonce
+from lockstep.protocol.messages import (
     Challenge,
     Command,
     Goodbye,
@@ -17,7 +16,8 @@ from robot_bridge.protocol.messages import (
     Stop,
     encode_message,
 )
-from robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.robot_bridge.link.link_session import BadInput, BridgeSession, ClientSession, LinkState
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 
 SECRET = LinkSecret.draw()
 OTHER = LinkSecret.draw()

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.protocol.messages import Reset
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.messages import Reset
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import NEUTRAL, RecordingRobot, operator, running_bridge
 
 

@@ -6,10 +6,8 @@ from contextlib import AbstractAsyncContextManager
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_server import READ_BURST, LinkPeer
-from robot_bridge.protocol.framing import frame
-from robot_bridge.protocol.messages import (
+from lockstep.protocol.framing import frame
+from lockstep.protocol.messages import (
     Command,
     Goodbye,
     Hello,
@@ -23,7 +21,9 @@ from robot_bridge.protocol.messages import (
     StopTaken,
     encode_message,
 )
-from robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_server import READ_BURST, LinkPeer
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import DRIVE, RecordingRobot, operator, raw_link
 from tests.robot_bridge.flooding import flooding
 

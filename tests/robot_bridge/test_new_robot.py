@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from client import Console
-from robot_bridge.bridge import Bridge
-from robot_bridge.cli import robot_app
-from robot_bridge.conformance import CASES, Outcome, Subject, play_all
-from robot_bridge.conformance.place import Place
-from robot_bridge.new_robot import class_name
-from robot_bridge.robots.registry import create_robot
-from robot_bridge.settings import BridgeSettings
+from lockstep.client import Console
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.cli import robot_app
+from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
+from lockstep.robot_bridge.conformance.place import Place
+from lockstep.robot_bridge.new_robot import class_name
+from lockstep.robot_bridge.robots.registry import create_robot
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.support.stack import running_stack
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -68,7 +68,13 @@ def test_what_it_writes_passes_ruff(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_what_it_writes_passes_mypy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Mypy reads all of the bridge for it, without a cache."""
     folder = written(tmp_path, monkeypatch)
-    run(folder, "mypy", "--cache-dir", str(tmp_path / "mypy"), MYPYPATH=str(ROOT))
+    run(
+        folder,
+        "mypy",
+        "--cache-dir",
+        str(tmp_path / "mypy"),
+        MYPYPATH=os.pathsep.join(str(ROOT / part) for part in ("protocol", "robot_bridge")),
+    )
 
 
 async def test_a_console_starts_it_by_its_class_and_a_client_drives_it(
@@ -101,7 +107,7 @@ async def test_it_passes_the_conformance_check(tmp_path: Path, monkeypatch: pyte
 def test_an_installed_one_is_known_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, site = written(tmp_path, monkeypatch), tmp_path / "site"
     run(folder, "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-index", "--target", str(site), ".")
-    code = "from robot_bridge.robots.registry import create_robot; print(create_robot('my_arm'))"
+    code = "from lockstep.robot_bridge.robots.registry import create_robot; print(create_robot('my_arm'))"
     said = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "PYTHONPATH": str(site)},

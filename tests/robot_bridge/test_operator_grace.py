@@ -4,11 +4,11 @@ import asyncio
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.errors import LinkLost, LinkRefused
-from robot_bridge.protocol.messages import Feedback, Hello, Stop
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.errors import LinkLost, LinkRefused
+from lockstep.protocol.messages import Feedback, Hello, Stop
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import Operator, RecordingRobot, raw_link
 
 

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.errors import RobotFailed
-from robot_bridge.link_server import LinkServer
-from robot_bridge.protocol.errors import LinkError, LinkLost
-from robot_bridge.protocol.messages import Feedback, Goodbye
-from robot_bridge.robots.base import Measurement, MediaSource
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.errors import LinkError, LinkLost
+from lockstep.protocol.messages import Feedback, Goodbye
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.errors import RobotFailed
+from lockstep.robot_bridge.link.link_server import LinkServer
+from lockstep.robot_bridge.robots.base import Measurement, MediaSource
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL, Operator, RecordingRobot, operator, running_bridge
 
 FAST = 0.2  # m/s
@@ -210,10 +210,10 @@ async def test_a_bridge_whose_closing_is_cancelled_leaves_the_robot_at_rest() ->
 
 A_PROCESS = """
 import asyncio, json, signal, sys
-from robot_bridge import cli
-from robot_bridge.bridge import Bridge
-from robot_bridge.robots.planar.robot import PlanarRobot
-from robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge import cli
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
+from lockstep.robot_bridge.settings import BridgeSettings
 
 class Robot(PlanarRobot):
     out = open(sys.argv[2], "w", buffering=1)

@@ -8,15 +8,10 @@ from typing import get_args
 import msgspec
 import pytest
 
-from robot_bridge.link_acceptor import RATE
-from robot_bridge.link_server import OPERATOR_READ_RATE, READ_BURST, READ_RATE
-from robot_bridge.link_session import FROM_CLIENT, FROM_ROBOT, HELLO_TIMEOUT, PING_INTERVAL, SILENCE, kind_of
-from robot_bridge.liveness import ALARM, EXIT_HUNG, LIMIT
-from robot_bridge.media_outbox import ORDERED_DEPTH
-from robot_bridge.protocol import description
-from robot_bridge.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader, frame
-from robot_bridge.protocol.link_secret import MIN_SECRET_BYTES
-from robot_bridge.protocol.messages import (
+from lockstep.protocol import description
+from lockstep.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader, frame
+from lockstep.protocol.link_secret import MIN_SECRET_BYTES
+from lockstep.protocol.messages import (
     Command,
     Feedback,
     Hello,
@@ -30,7 +25,19 @@ from robot_bridge.protocol.messages import (
     decode_message,
     encode_message,
 )
-from robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.link.link_acceptor import RATE
+from lockstep.robot_bridge.link.link_server import OPERATOR_READ_RATE, READ_BURST, READ_RATE
+from lockstep.robot_bridge.link.link_session import (
+    FROM_CLIENT,
+    FROM_ROBOT,
+    HELLO_TIMEOUT,
+    PING_INTERVAL,
+    SILENCE,
+    kind_of,
+)
+from lockstep.robot_bridge.link.outgoing_queues import ORDERED_DEPTH
+from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.watchdog.liveness import ALARM, EXIT_HUNG, LIMIT
 from tests.robot_bridge.bridge_helpers import running_bridge
 
 TEXT = (Path(__file__).parents[2] / "docs" / "robot-link.md").read_text()

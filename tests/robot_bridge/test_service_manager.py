@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.service_manager import ServiceManager
+from lockstep.robot_bridge.service_manager import ServiceManager
 
 
 @pytest.fixture(params=["path", "abstract"])

@@ -3,10 +3,10 @@
 import msgspec
 import pytest
 
-from robot_bridge.check_description import check_description
-from robot_bridge.errors import DescriptionError
-from robot_bridge.protocol.description import Axis, RobotDescription, StartWarning
-from robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.protocol.description import Axis, RobotDescription, StartWarning
+from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.errors import DescriptionError
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from tests.robot_bridge.bridge_helpers import DRIVE, RecordingRobot, operator, running_bridge
 
 LAMP = Axis(name="lamp", label="Lamp", unit="", minimum=0, maximum=1, slew=1000, brake=1000)

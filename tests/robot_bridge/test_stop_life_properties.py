@@ -7,8 +7,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from robot_bridge.protocol.messages import Command, Feedback, LinkMessage, Reset, Rest, Stop, StopTaken
-from robot_bridge.protocol.serial import MAX_EVENT, event_after
+from lockstep.protocol.messages import Command, Feedback, LinkMessage, Reset, Rest, Stop, StopTaken
+from lockstep.protocol.serial import MAX_EVENT, event_after
 from tests.robot_bridge.bridge_model import BridgeModel
 from tests.robot_bridge.core_helpers import NEUTRAL
 

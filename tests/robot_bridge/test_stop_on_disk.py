@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.errors import StateDirInUse
-from robot_bridge.protocol.messages import Refusal, Reset, Stop, StopTaken
-from robot_bridge.settings import BridgeSettings
-from robot_bridge.stop_store import Kept, StopStore
+from lockstep.protocol.messages import Refusal, Reset, Stop, StopTaken
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.errors import StateDirInUse
+from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.stop.stop_store import Kept, StopStore
 from tests.robot_bridge.bridge_helpers import NEUTRAL, Operator, RecordingRobot, operator
 
 PRESS = "0123456789abcdef" * 2
@@ -79,9 +79,9 @@ async def test_a_latched_stop_outlives_the_bridge_with_its_reason_number_and_pre
 RUN = """
 import asyncio, sys
 from pathlib import Path
-from robot_bridge.bridge import Bridge
-from robot_bridge.robots.planar import create
-from robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.planar import create
+from lockstep.robot_bridge.settings import BridgeSettings
 
 async def main():
     async with Bridge(create(), BridgeSettings(port=0, state_dir=Path(sys.argv[1]))) as bridge:
@@ -159,7 +159,7 @@ async def test_a_stop_that_cannot_be_written_holds_says_so_and_is_written_later(
 async def test_a_stop_whose_directory_is_removed_is_written_again_or_everybody_is_told_that_it_is_not_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("robot_bridge.stop_keeper.LOOK", 0.05)
+    monkeypatch.setattr("lockstep.robot_bridge.stop.stop_keeper.LOOK", 0.05)
     directory = tmp_path / "stops" / "robot"
     async with bridge_in(directory) as bridge, operator(bridge) as driver:
         driver.link.send(Stop(press=PRESS))

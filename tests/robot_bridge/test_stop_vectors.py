@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from robot_bridge.event_core import EventCore
-from robot_bridge.protocol.messages import Command
-from robot_bridge.protocol.serial import event_after
-from robot_bridge.stop_latch import ResetNeedless, ResetRefused
+from lockstep.protocol.messages import Command
+from lockstep.protocol.serial import event_after
+from lockstep.robot_bridge.control.event_core import EventCore
+from lockstep.robot_bridge.stop.stop_latch import ResetNeedless, ResetRefused
 from tests.robot_bridge.core_helpers import AXES, MAX_AGE, MEASURED, NEUTRAL, reason
 
 CASES = json.loads((Path(__file__).parents[1] / "vectors" / "stop.json").read_text())["cases"]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.thread_name import name_thread
+from lockstep.robot_bridge.thread_name import name_thread
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="there is no /proc")

@@ -15,16 +15,17 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robot_bridge import clock, watchdog_process
-from robot_bridge.bridge import Bridge
-from robot_bridge.errors import RobotFailed, RobotUnavailable
-from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.errors import LinkError
-from robot_bridge.robots.base import Measurement
-from robot_bridge.settings import BridgeSettings
-from robot_bridge.watchdog_process import LAST_ACTS, LEAVING, MOVING, RESTING, WatchdogProcess, watch
-from robot_bridge.watchdog_thread import WatchdogThread
-from robot_bridge.watchdogs import Watchdogs
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.errors import LinkError
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.errors import RobotFailed, RobotUnavailable
+from lockstep.robot_bridge.robots.base import Measurement
+from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.watchdog import watchdog_process
+from lockstep.robot_bridge.watchdog.watchdog_process import LAST_ACTS, LEAVING, MOVING, RESTING, WatchdogProcess, watch
+from lockstep.robot_bridge.watchdog.watchdog_thread import WatchdogThread
+from lockstep.robot_bridge.watchdog.watchdogs import Watchdogs
 from tests.robot_bridge.bridge_helpers import NEUTRAL, Operator, RecordingRobot, log_lines, operator, running_bridge
 
 LIMIT = 0.1  # s
@@ -312,9 +313,9 @@ def test_a_function_that_cannot_be_had_is_said_at_the_start() -> None:
 A_BRIDGE = """
 import asyncio, ctypes, json, os, sys
 import msgspec
-from robot_bridge.bridge import Bridge
-from robot_bridge.robots.planar.robot import PlanarRobot
-from robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
+from lockstep.robot_bridge.settings import BridgeSettings
 
 class Robot(PlanarRobot):
     rests_from_thread = sys.argv[1] != "process"

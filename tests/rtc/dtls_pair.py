@@ -4,9 +4,9 @@ import time
 from collections.abc import Callable, Sequence
 from operator import itemgetter
 
-from rtc.certificate import Certificate
-from rtc.dtls import DtlsConnected, DtlsConnection, DtlsEvent, DtlsSettings, DtlsState, dtls_context
-from rtc.fingerprint import Fingerprint
+from lockstep.rtc.certificate import Certificate
+from lockstep.rtc.dtls import DtlsConnected, DtlsConnection, DtlsEvent, DtlsSettings, DtlsState, dtls_context
+from lockstep.rtc.fingerprint import Fingerprint
 
 __all__ = ["DtlsPair"]
 

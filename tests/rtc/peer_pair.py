@@ -5,14 +5,14 @@ from collections.abc import Callable
 from itertools import count
 from random import Random
 
-from rtc.addresses import Datagram, Path
-from rtc.certificate import Certificate
-from rtc.dtls import dtls_context
-from rtc.ice.gathering import gather
-from rtc.peer import Peer, PeerSettings
-from rtc.peer_events import PeerEvent
-from rtc.rtp.stage import earliest
-from rtc.sdp import SessionDescription, parse_description, write_description
+from lockstep.rtc.addresses import Datagram, Path
+from lockstep.rtc.certificate import Certificate
+from lockstep.rtc.dtls import dtls_context
+from lockstep.rtc.ice.gathering import gather
+from lockstep.rtc.peer import Peer, PeerSettings
+from lockstep.rtc.peer_events import PeerEvent
+from lockstep.rtc.rtp.stage import earliest
+from lockstep.rtc.sdp import SessionDescription, parse_description, write_description
 
 __all__ = ["DELAY", "PeerPair", "through_text"]
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.channels import (
+from lockstep.rtc.channels import (
     ChannelClosed,
     ChannelEvent,
     ChannelMessage,
@@ -14,11 +14,11 @@ from rtc.channels import (
     DataChannels,
     TooManyChannels,
 )
-from rtc.dcep import MOST_TEXT, DcepError, Open, Reliability, decode_open
-from rtc.sctp import AssociationClosed, Closed, Established, SctpSettings, SendQueueFull, State
-from rtc.sctp.chunks import BEGIN, END, UNORDERED, CookieEcho, Data, Init, InitAck
-from rtc.sctp.packet import decode_packet
-from rtc.sctp.parameters import STATE_COOKIE
+from lockstep.rtc.dcep import MOST_TEXT, DcepError, Open, Reliability, decode_open
+from lockstep.rtc.sctp import AssociationClosed, Closed, Established, SctpSettings, SendQueueFull, State
+from lockstep.rtc.sctp.chunks import BEGIN, END, UNORDERED, CookieEcho, Data, Init, InitAck
+from lockstep.rtc.sctp.packet import decode_packet
+from lockstep.rtc.sctp.parameters import STATE_COOKIE
 from tests.rtc.sctp.hostile import Victim
 from tests.rtc.sctp.network import Link, World, seeded
 

@@ -1,6 +1,6 @@
 import pytest
 
-from rtc.demux import DatagramKind, datagram_kind
+from lockstep.rtc.demux import DatagramKind, datagram_kind
 
 
 @pytest.mark.parametrize(

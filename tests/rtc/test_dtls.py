@@ -6,8 +6,8 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtc.certificate import Certificate
-from rtc.dtls import (
+from lockstep.rtc.certificate import Certificate
+from lockstep.rtc.dtls import (
     DtlsClosed,
     DtlsConnected,
     DtlsConnection,
@@ -20,7 +20,7 @@ from rtc.dtls import (
     dtls_context,
     records,
 )
-from rtc.fingerprint import Fingerprint
+from lockstep.rtc.fingerprint import Fingerprint
 from tests.rtc.dtls_pair import DtlsPair
 
 NOW = 0.0

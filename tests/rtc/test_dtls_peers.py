@@ -18,11 +18,11 @@ from aiortc.rtcdtlstransport import RTCDtlsFingerprint
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 
-from bench.free_port import free_port
-from rtc.certificate import Certificate
-from rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsEvent, DtlsRole, dtls_context
-from rtc.fingerprint import Fingerprint
-from rtc.srtp import SrtpReceiver, SrtpSender
+from lockstep.bench.free_port import free_port
+from lockstep.rtc.certificate import Certificate
+from lockstep.rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsEvent, DtlsRole, dtls_context
+from lockstep.rtc.fingerprint import Fingerprint
+from lockstep.rtc.srtp import SrtpReceiver, SrtpSender
 
 OPENSSL = shutil.which("openssl")
 

@@ -10,12 +10,12 @@ from aiortc import RTCDataChannel, RTCPeerConnection, RTCSessionDescription, Vid
 from av import VideoFrame
 from av.frame import Frame
 
-from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
-from rtc.endpoint import Connection, Endpoint, EndpointSettings, TooManyPeers
-from rtc.peer import OfferedMedia
-from rtc.peer_events import Answered, Connected, PacketReceived, PeerEnded, PeerEvent, PlainRtp
-from rtc.rtp.packet import RtpPacket
-from rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
+from lockstep.rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
+from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings, TooManyPeers
+from lockstep.rtc.peer import OfferedMedia
+from lockstep.rtc.peer_events import Answered, Connected, PacketReceived, PeerEnded, PeerEvent, PlainRtp
+from lockstep.rtc.rtp.packet import RtpPacket
+from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
 from tests.rtc.vp8 import packetise
 
 VP8 = Codec(96, "VP8", 90_000, feedback=("nack", "nack pli", "goog-remb"))

@@ -6,15 +6,15 @@ from collections.abc import AsyncIterator, Callable
 import pytest
 from playwright.async_api import Page
 
-from bench.browsers.chromium import running_chromium
-from rtc.channels import ChannelMessage, ChannelOpened
-from rtc.endpoint import Connection, Endpoint
-from rtc.interfaces import own_addresses
-from rtc.peer import OfferedMedia
-from rtc.peer_events import Connected, MediaEvent, PacketReceived, PeerEnded, PeerEvent
-from rtc.rtp.extensions import ABS_SEND_TIME_URI
-from rtc.rtp.stage import KeyframeRequested, Reception
-from rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
+from lockstep.bench.browsers.chromium import running_chromium
+from lockstep.rtc.channels import ChannelMessage, ChannelOpened
+from lockstep.rtc.endpoint import Connection, Endpoint
+from lockstep.rtc.interfaces import own_addresses
+from lockstep.rtc.peer import OfferedMedia
+from lockstep.rtc.peer_events import Connected, MediaEvent, PacketReceived, PeerEnded, PeerEvent
+from lockstep.rtc.rtp.extensions import ABS_SEND_TIME_URI
+from lockstep.rtc.rtp.stage import KeyframeRequested, Reception
+from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
 from tests.rtc.vp8 import packetise
 
 pytestmark = pytest.mark.browser

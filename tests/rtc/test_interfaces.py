@@ -2,7 +2,7 @@ import ipaddress
 
 import pytest
 
-from rtc.interfaces import own_addresses
+from lockstep.rtc.interfaces import own_addresses
 
 
 class Ip:

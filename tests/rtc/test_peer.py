@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
 
-from rtc.addresses import Path
-from rtc.certificate import Certificate
-from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
-from rtc.ice.gathering import gather
-from rtc.peer import OfferedMedia, PeerNotReady, PeerSettings
-from rtc.peer_events import (
+from lockstep.rtc.addresses import Path
+from lockstep.rtc.certificate import Certificate
+from lockstep.rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
+from lockstep.rtc.ice.gathering import gather
+from lockstep.rtc.peer import OfferedMedia, PeerNotReady, PeerSettings
+from lockstep.rtc.peer_events import (
     Connected,
     MediaEvent,
     PacketReceived,
@@ -21,11 +21,11 @@ from rtc.peer_events import (
     Restarted,
     RestartFailed,
 )
-from rtc.rtp.packet import RtpPacket
-from rtc.rtp.rtcp import ReceiverReport, ReportBlock, pack_rtcp
-from rtc.rtp.stage import KeyframeRequested, Reception
-from rtc.sctp import Closed
-from rtc.sdp import MID_URI, Codec, Fragment, LocalMedia, SdpError, parse_fragment, write_fragment
+from lockstep.rtc.rtp.packet import RtpPacket
+from lockstep.rtc.rtp.rtcp import ReceiverReport, ReportBlock, pack_rtcp
+from lockstep.rtc.rtp.stage import KeyframeRequested, Reception
+from lockstep.rtc.sctp import Closed
+from lockstep.rtc.sdp import MID_URI, Codec, Fragment, LocalMedia, SdpError, parse_fragment, write_fragment
 from tests.rtc.peer_pair import PeerPair, through_text
 
 STAMP = "urn:stamp"

@@ -11,13 +11,13 @@ from typing import cast
 
 import pytest
 
-from rtc.channels import ChannelMessage
-from rtc.endpoint import Connection, Endpoint, EndpointSettings
-from rtc.peer_events import Connected, PeerEvent, Restarted
-from rtc.sdp import parse_description, write_description
-from rtc.server_links import RelayRefused
-from rtc.stun import Kind, Message, parse, serialize
-from rtc.turn.servers import IceServer
+from lockstep.rtc.channels import ChannelMessage
+from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings
+from lockstep.rtc.peer_events import Connected, PeerEvent, Restarted
+from lockstep.rtc.sdp import parse_description, write_description
+from lockstep.rtc.server_links import RelayRefused
+from lockstep.rtc.stun import Kind, Message, parse, serialize
+from lockstep.rtc.turn.servers import IceServer
 from tests.support.turn_server import TURN_SECRET, TurnServer, running_turn_server
 
 HOST = "127.0.0.1"

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.srtp import (
+from lockstep.rtc.srtp import (
     PROFILES,
     SrtpKeys,
     SrtpPacketTooLong,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.stun import (
+from lockstep.rtc.stun import (
     MAX_MESSAGE,
     Kind,
     Message,

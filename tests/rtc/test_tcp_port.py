@@ -6,14 +6,14 @@ import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
-from bench.free_port import free_port
-from rtc.addresses import Datagram, Path
-from rtc.channels import ChannelMessage, ChannelOpened
-from rtc.endpoint import Connection, Endpoint, EndpointSettings
-from rtc.ice.tcp import TcpFraming, frame
-from rtc.peer_events import Connected, PeerEnded, PeerEvent
-from rtc.sdp import SessionDescription, parse_description, write_description
-from rtc.tcp_port import TcpPort, TcpPortSettings
+from lockstep.bench.free_port import free_port
+from lockstep.rtc.addresses import Datagram, Path
+from lockstep.rtc.channels import ChannelMessage, ChannelOpened
+from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings
+from lockstep.rtc.ice.tcp import TcpFraming, frame
+from lockstep.rtc.peer_events import Connected, PeerEnded, PeerEvent
+from lockstep.rtc.sdp import SessionDescription, parse_description, write_description
+from lockstep.rtc.tcp_port import TcpPort, TcpPortSettings
 
 HOST = "127.0.0.1"
 PATIENCE = 20.0  # s

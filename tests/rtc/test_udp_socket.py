@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from rtc.addresses import Address, Datagram, Path
-from rtc.udp_socket import MAX_BACKLOG, MAX_DATAGRAM, UdpSocket
+from lockstep.rtc.addresses import Address, Datagram, Path
+from lockstep.rtc.udp_socket import MAX_BACKLOG, MAX_DATAGRAM, UdpSocket
 
 Bind = Callable[..., UdpSocket]
 

@@ -17,9 +17,9 @@ from pathlib import Path
 from random import Random
 from typing import Any, TypeVar
 
-from client.console import Console
-from client.errors import ConnectFailed, ConsoleLost
-from server.console_name import console_name
+from lockstep.client.console import Console
+from lockstep.client.errors import ConnectFailed, ConsoleLost
+from lockstep.server.robot.console_name import console_name
 from tests.robot_bridge.bridge_model import MotionWitness
 from tests.server.rig import PATIENCE
 
@@ -152,7 +152,7 @@ class Robot:
         ours, theirs = os.pipe()
         options = ("--port", "0", "--json", "--state-dir", str(self._state), "--lockout-file", str(self._switch))
         self._process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "robot_bridge", "planar", *options, "--event-log", f"/dev/fd/{theirs}"),
+            *(sys.executable, "-m", "lockstep.robot_bridge", "planar", *options, "--event-log", f"/dev/fd/{theirs}"),
             stdout=PIPE,
             stderr=DEVNULL,
             pass_fds=(theirs,),

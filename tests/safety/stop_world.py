@@ -14,26 +14,26 @@ from types import SimpleNamespace
 from typing import Any, Literal, cast
 from unittest.mock import patch
 
-from robot_bridge.protocol.console import Role, ServerMessage
-from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.protocol.messages import Command, Feedback, LinkMessage, Refusal, Reset, Rest, Stop, StopTaken
-from robot_bridge.protocol.serial import event_after, is_newer
-from server import stop_service
-from server.access import Identity
-from server.audit import Actor
-from server.audit_tail import AuditTail
-from server.audit_trail import AuditTrail
-from server.command_desk import CommandDesk, Forward, ForwardRest
-from server.errors import ConsoleError, Silenced
-from server.event_clock import EventClock
-from server.kept_stops import KeptStops
-from server.metrics import Metrics
-from server.peers import Peers
-from server.seat import ControlSeat, SeatOutcome, SeatTimes
-from server.session_tap import SessionTap
-from server.stop_keeper import StopKeeper
-from server.stop_presses import Press
-from server.stop_service import StopService
+from lockstep.protocol.console import Role, ServerMessage
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Command, Feedback, LinkMessage, Refusal, Reset, Rest, Stop, StopTaken
+from lockstep.protocol.serial import event_after, is_newer
+from lockstep.server.audit.audit_tail import AuditTail
+from lockstep.server.audit.audit_trail import AuditTrail
+from lockstep.server.audit.records import Actor
+from lockstep.server.auth.tokens import Identity
+from lockstep.server.control import stop_service
+from lockstep.server.control.command_arbiter import CommandArbiter, Forward, ForwardRest
+from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
+from lockstep.server.control.session_listener import SessionListener
+from lockstep.server.control.stop_service import StopService
+from lockstep.server.errors import ConsoleError, Silenced
+from lockstep.server.event_clock import EventClock
+from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.stop.kept_stops import KeptStops
+from lockstep.server.stop.stop_keeper import StopKeeper
+from lockstep.server.stop.stop_presses import Press
+from lockstep.server.telemetry.metrics import Metrics
 from tests.robot_bridge.bridge_model import BridgeModel
 from tests.robot_bridge.core_helpers import AXES, NEUTRAL
 
@@ -162,7 +162,7 @@ class Promises:
 
 
 class ConsoleModel:
-    """One run of a console, as `server.console.Console` puts its parts together."""
+    """One run of a console, as `lockstep.server.control.console.Console` puts its parts together."""
 
     def __init__(self, world: "World", disk: Disk) -> None:
         self.up = False
@@ -174,16 +174,16 @@ class ConsoleModel:
         self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
         self.keeper = MemoryKeeper(disk)
         world.loop.run_until_complete(self.keeper.load())
-        self.desk = CommandDesk(self.clock, self.seat, self.keeper.presses)
+        self.desk = CommandArbiter(self.clock, self.seat, self.keeper.presses)
         self.service = StopService(
             self,
             self.keeper,
-            cast(Peers, self.people),
+            cast(PeerRegistry, self.people),
             self.clock,
             lambda: self.seat.holder,
             AuditTrail(self.clock, AuditTail()),
             METRICS,
-            SessionTap(),
+            SessionListener(),
         )
         self._parts = [world.loop.create_task(part()) for part in (self.keeper.run, self.service.run)]
         self._requests: list[asyncio.Task[None]] = []

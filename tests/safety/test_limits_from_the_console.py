@@ -2,11 +2,11 @@
 
 import asyncio
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.protocol.console import Report, Seat, SeatRequest, SpeedCapState, Welcome
-from robot_bridge.protocol.messages import Feedback
-from robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.console import Report, Seat, SeatRequest, SpeedCapState, Welcome
+from lockstep.protocol.messages import Feedback
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.server.rig import PATIENCE, TestPeer, running_console, running_rig
 
 FULL = 0.8  # m/s, of the planar robot's forward axis

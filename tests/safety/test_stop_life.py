@@ -11,8 +11,8 @@ from hypothesis import event, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from robot_bridge.protocol.messages import Command, Reset
-from robot_bridge.protocol.serial import MAX_EVENT, event_after
+from lockstep.protocol.messages import Command, Reset
+from lockstep.protocol.serial import MAX_EVENT, event_after
 from tests.robot_bridge.core_helpers import NEUTRAL
 from tests.safety.stop_world import LINKS, MOVE, PEOPLE, Link, World
 

@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import httpx
 import pytest
 
-from client.console import Console
-from client.errors import CommandRefused, SeatRefused, StopUnconfirmed
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.errors import LinkRefused
-from robot_bridge.protocol.messages import Command, Feedback, LinkMessage, Refusal
-from robot_bridge.protocol.serial import event_after
-from robot_bridge.stop_latch import LEAST_STOP
+from lockstep.client.console import Console
+from lockstep.client.errors import CommandRefused, SeatRefused, StopUnconfirmed
+from lockstep.protocol.errors import LinkRefused
+from lockstep.protocol.messages import Command, Feedback, LinkMessage, Refusal
+from lockstep.protocol.serial import event_after
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.stop.stop_latch import LEAST_STOP
 from tests.safety.live_world import ConsoleProcess, Judge, LinkPath, Player, Robot
 from tests.server.rig import PATIENCE
 

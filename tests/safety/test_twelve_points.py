@@ -12,15 +12,12 @@ import httpx
 import msgspec
 import pytest
 
-import robot_bridge
-from client.command_gate import CommandGate
-from client.pilot import Pilot
-from robot_bridge.axis_shaper import AxisShaper
-from robot_bridge.event_core import Executed, Refused
-from robot_bridge.link_session import SILENCE, BridgeSession
-from robot_bridge.protocol.console import Rename, Role, SeatRequest, StopStateNotice
-from robot_bridge.protocol.framing import frame
-from robot_bridge.protocol.messages import (
+import lockstep.robot_bridge
+from lockstep.client.control.command_gate import CommandGate
+from lockstep.client.control.command_sender import CommandSender
+from lockstep.protocol.console import Rename, Role, SeatRequest, StopStateNotice
+from lockstep.protocol.framing import frame
+from lockstep.protocol.messages import (
     Command,
     Feedback,
     Goodbye,
@@ -32,8 +29,11 @@ from robot_bridge.protocol.messages import (
     Stop,
     encode_message,
 )
-from robot_bridge.protocol.serial import event_after
-from robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.protocol.serial import event_after
+from lockstep.robot_bridge.control.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.event_core import Executed, Refused
+from lockstep.robot_bridge.link.link_session import SILENCE, BridgeSession
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from tests.robot_bridge.bridge_helpers import (
     DRIVE,
     NEUTRAL,
@@ -50,9 +50,9 @@ ROLES: list[Role] = ["operator", "observer", "supervisor"]
 DT = 0.004
 
 
-def pilot_after_driving() -> tuple[Pilot, float]:
+def pilot_after_driving() -> tuple[CommandSender, float]:
     """A client's pilot that has driven event 2 and got its feedback, and now."""
-    pilot = Pilot(CommandGate("feedback", 4, 0.0), NEUTRAL)
+    pilot = CommandSender(CommandGate("feedback", 4, 0.0), NEUTRAL)
     pilot.feedback(Feedback(event=1, issue=1, time=0.0, axes=NEUTRAL), 0.0)
     pilot.ready = True
     pilot.intend(DRIVE, 0.0)
@@ -89,7 +89,7 @@ def test_point_02_one_zero_at_release_then_silence() -> None:
 def test_point_03_the_timeout_is_the_robots_and_on_a_monotonic_clock() -> None:
     """No file of the bridge reads a clock that can be set, but the one that begins to number stops by it."""
     settable = {("time", "time"), ("time", "time_ns"), ("datetime", "now"), ("datetime", "utcnow"), ("date", "today")}
-    for path in Path(robot_bridge.__file__).parent.rglob("*.py"):
+    for path in Path(lockstep.robot_bridge.__file__).parent.rglob("*.py"):
         if path.name == "stop_store.py":
             continue
         for node in ast.walk(ast.parse(path.read_text())):
@@ -212,7 +212,7 @@ BRIDGE_REASONS: list[RefusalReason] = [
 
 
 async def test_point_10_every_refusal_is_told_counted_and_recorded(tmp_path: Path) -> None:
-    """Of the bridge; the console's are in tests/server/test_channels_live.py and its audit trail."""
+    """Of the bridge; the console's are in tests/server/peers/test_channels_live.py and its audit trail."""
     async with running_bridge(event_log=tmp_path / "log") as bridge, operator(bridge, armed=False) as driver:
         told = [(await driver.refused(driver.command())).reason]
         await driver.arm()

@@ -5,8 +5,8 @@ import json
 import jsonschema
 import pytest
 
-from robot_bridge.protocol.console import SeatRequest, Welcome, encode_console_message
-from robot_bridge.protocol.messages import Command, Feedback
+from lockstep.protocol.console import SeatRequest, Welcome, encode_console_message
+from lockstep.protocol.messages import Command, Feedback
 from scripts import generate_wire
 
 

@@ -12,22 +12,22 @@ import httpx
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
 from fastapi import FastAPI
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.protocol.console import ClientMessage, Role, ServerMessage, decode_server_message
-from robot_bridge.protocol.console import encode_console_message as encode
-from robot_bridge.protocol.messages import Command, Feedback, Refusal, StopState
-from robot_bridge.protocol.serial import event_after
-from robot_bridge.robots.registry import create_robot
-from robot_bridge.settings import BridgeSettings
-from server.access import Access
-from server.app import create_app
-from server.guarded_http import guarded_by
-from server.serve import bind, running
-from server.services import Services
-from server.settings import Settings
-from server.state import open_state
-from server.tls import Certificate
-from server.webrtc_peer import WebRtcPeer
+from lockstep.protocol.console import ClientMessage, Role, ServerMessage, decode_server_message
+from lockstep.protocol.console import encode_console_message as encode
+from lockstep.protocol.messages import Command, Feedback, Refusal, StopState
+from lockstep.protocol.serial import event_after
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.registry import create_robot
+from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.server.auth.tokens import Access
+from lockstep.server.composition.robot_app import create_app
+from lockstep.server.http.transport.serve import bind, running
+from lockstep.server.http.transport.tls import Certificate
+from lockstep.server.http.transport.uvicorn_http_limits import guarded_by
+from lockstep.server.peers.webrtc_peer import WebRtcPeer
+from lockstep.server.settings import Settings
+from lockstep.server.state.dependencies import Dependencies
+from lockstep.server.state.persistent_state import open_state
 
 __all__ = [
     "PATIENCE",
@@ -59,9 +59,9 @@ class Rig:
     http: httpx.AsyncClient
 
     @property
-    def services(self) -> Services:
+    def services(self) -> Dependencies:
         found = self.app.state.services
-        assert isinstance(found, Services)
+        assert isinstance(found, Dependencies)
         return found
 
     @property

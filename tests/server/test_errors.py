@@ -1,4 +1,4 @@
-from server import errors
+from lockstep.server import errors
 
 
 def _leaves(kind: type[errors.ConsoleError]) -> list[type[errors.ConsoleError]]:

@@ -1,9 +1,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_bridge.protocol.messages import Feedback, StopState
-from robot_bridge.protocol.serial import FIRST_EVENT, MAX_EVENT, event_gap
-from server.event_clock import HISTORY, EventClock
+from lockstep.protocol.messages import Feedback, StopState
+from lockstep.protocol.serial import FIRST_EVENT, MAX_EVENT, event_gap
+from lockstep.server.event_clock import HISTORY, EventClock
 
 
 def _feedback(event: int, issue: int = 1, *, stopped: bool = False) -> Feedback:

@@ -1,7 +1,7 @@
 import pytest
 from pydantic import ValidationError
 
-from server.settings import Settings
+from lockstep.server.settings import Settings
 
 
 def test_the_environment_sets_and_flags_override(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,8 +7,8 @@ from contextlib import asynccontextmanager
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from robot_bridge.protocol.console import ClientMessage, ServerMessage, decode_server_message
-from robot_bridge.protocol.console import encode_console_message as encode
+from lockstep.protocol.console import ClientMessage, ServerMessage, decode_server_message
+from lockstep.protocol.console import encode_console_message as encode
 from tests.server.rig import PATIENCE, Rig
 
 __all__ = ["NOWHERE", "TestLine", "address", "joined", "open_line", "ticket"]

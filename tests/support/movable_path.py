@@ -8,12 +8,12 @@ from contextlib import asynccontextmanager
 
 from playwright.async_api import Page, Route
 
-from bench.emulator.client_paths import ClientPaths
-from bench.emulator.deliveries import Deliveries
-from bench.emulator.outages import Outages
-from bench.emulator.profile import load_profile
-from bench.emulator.udp_relay import LOOPBACK, UdpRelay
-from rtc.interfaces import own_addresses
+from lockstep.bench.emulator.impairment.deliveries import Deliveries
+from lockstep.bench.emulator.impairment.outages import Outages
+from lockstep.bench.emulator.impairment.profile import load_profile
+from lockstep.bench.emulator.transport.client_paths import ClientPaths
+from lockstep.bench.emulator.transport.udp_relay import LOOPBACK, UdpRelay
+from lockstep.rtc.interfaces import own_addresses
 
 __all__ = ["MovablePath", "movable_path"]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from server.fleet.simulated import own_event_log
+from lockstep.server.fleet.simulated import own_event_log
 from tests.support.event_logs import PATIENCE, written
 
 __all__ = ["Stack", "running_console", "running_fleet", "running_stack"]
@@ -111,11 +111,13 @@ async def running_stack(
     port: int = 0,
     extra: tuple[str, ...] = (),
     settings: Mapping[str, str] | None = None,
+    lockstep: Path | None = None,
 ) -> AsyncIterator[Stack]:
-    """Start `lockstep up`, wait until it says that it is ready, and end it on leaving."""
+    """Start `lockstep up`, wait until it says that it is ready, and end it on leaving. `lockstep`: another one's."""
     event_log = directory / "events.jsonl"
-    command = ("up", "--json", "--robot", robot, "--port", str(port), "--robot-port", "0")
-    async with _running(directory, (*command, "--event-log", str(event_log), *extra), event_log, settings) as stack:
+    command: tuple[str, ...] = ("up", "--json", "--robot", robot, "--port", str(port), "--robot-port", "0")
+    command = (*command, "--event-log", str(event_log), *extra)
+    async with _running(directory, command, event_log, settings, lockstep) as stack:
         yield stack
 
 
@@ -140,13 +142,17 @@ async def running_console(directory: Path, robot: str, event_log: Path) -> Async
 
 @asynccontextmanager
 async def _running(
-    directory: Path, arguments: tuple[str, ...], event_log: Path, settings: Mapping[str, str] | None = None
+    directory: Path,
+    arguments: tuple[str, ...],
+    event_log: Path,
+    settings: Mapping[str, str] | None = None,
+    lockstep: Path | None = None,
 ) -> AsyncIterator[Stack]:
     # One state directory for all runs of a test: the key in it lets a page's token outlive a restart of the console.
     environment = os.environ | {"PYTHONWARNINGS": "default", "LOCKSTEP_STATE_DIR": str(directory / "state")}
     process = await asyncio.create_subprocess_exec(
         *(*FIRST, *WITH_US),
-        *(str(Path(sys.executable).with_name("lockstep")), *arguments),
+        *(str(lockstep or Path(sys.executable).with_name("lockstep")), *arguments),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
         env=environment | dict(settings or {}),

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from bench.browsers.sound_card import SAMPLE_RATE, tone_level
+from lockstep.bench.browsers.sound_card import SAMPLE_RATE, tone_level
 
 
 def _tone(frequency: float, amplitude: float) -> npt.NDArray[np.int16]:

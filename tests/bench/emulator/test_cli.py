@@ -12,9 +12,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from bench.emulator.cli import network_command
-from bench.emulator.errors import NamespacesUnavailable
-from bench.emulator.tun import open_tun
+from lockstep.bench.emulator.cli import network_command
+from lockstep.bench.emulator.errors import NamespacesUnavailable
+from lockstep.bench.emulator.namespace.tun import open_tun
 
 COMMAND = [str(Path(sys.executable).with_name("lockstep")), "network"]
 PIPE = asyncio.subprocess.PIPE

@@ -7,9 +7,9 @@ from urllib.parse import urlsplit
 import pytest
 import pytest_asyncio
 
-from bench.driving import drive_on
-from bench.emulator import Constant, Impairment, Network, even_profile, profile_names
-from client import Console
+from lockstep.bench.driving import drive_on
+from lockstep.bench.emulator import Constant, Impairment, Network, even_profile, profile_names
+from lockstep.client import Console
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")

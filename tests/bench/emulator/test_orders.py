@@ -2,8 +2,8 @@ import json
 
 import pytest
 
-from bench.emulator.network_statistics import NetworkStatistics
-from bench.emulator.orders import carry_out
+from lockstep.bench.emulator.network_statistics import NetworkStatistics
+from lockstep.bench.emulator.orders import carry_out
 
 
 class Told:

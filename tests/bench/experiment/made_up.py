@@ -3,9 +3,9 @@
 from dataclasses import replace
 from typing import Any
 
-from bench.experiment.choices import Choices
-from bench.experiment.record import Arrival, ClientRecord, Rendered, RobotRecord, Run
-from client.media_gate import GateMode
+from lockstep.bench.experiment.choices import Choices
+from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Rendered, RobotRecord, Run
+from lockstep.client.media.media_gate import GateMode
 
 __all__ = ["choices", "client", "run"]
 

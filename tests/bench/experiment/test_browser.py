@@ -1,5 +1,5 @@
-from bench.experiment.browser import pad_axes
-from robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.bench.experiment.browser import pad_axes
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 
 
 def test_the_sticks_stand_where_the_axes_values_come_from() -> None:

@@ -1,9 +1,9 @@
 import json
 from pathlib import Path
 
-from bench.experiment.observation import Look, Observation
-from bench.experiment.record import Arrival, ClientRecord, Rendered
-from bench.experiment.robot_log import read_robot_log
+from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Rendered
+from lockstep.bench.experiment.judge.robot_log import read_robot_log
+from lockstep.bench.experiment.observation import Look, Observation
 
 
 def picture(at: float) -> Rendered:

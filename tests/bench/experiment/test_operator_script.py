@@ -1,5 +1,5 @@
-from bench.experiment.operator_script import INTERVALS, OperatorScript
-from robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.bench.experiment.operator_script import INTERVALS, OperatorScript
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 
 TIMES = [number * 0.1 for number in range(600)]
 

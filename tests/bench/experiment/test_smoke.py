@@ -6,16 +6,16 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from bench.emulator.network import Network
-from bench.emulator.profile import load_profile
-from bench.experiment.choices import PROFILES
-from bench.experiment.growth import MEDIA
-from bench.experiment.headless import headless_client
-from bench.experiment.measures import beyond
-from bench.experiment.operator_script import OperatorScript
-from bench.experiment.outage import OUTAGE_PROFILE, run_outages
-from bench.experiment.stage import running_stage
-from server.cli import app
+from lockstep.bench.emulator.impairment.profile import load_profile
+from lockstep.bench.emulator.network import Network
+from lockstep.bench.experiment.choices import PROFILES
+from lockstep.bench.experiment.endurance.growth import MEDIA
+from lockstep.bench.experiment.headless import headless_client
+from lockstep.bench.experiment.judge.measures import beyond
+from lockstep.bench.experiment.judge.outage import OUTAGE_PROFILE, run_outages
+from lockstep.bench.experiment.operator_script import OperatorScript
+from lockstep.bench.experiment.stage import running_stage
+from lockstep.server.cli.main import app
 from tests.bench.experiment.made_up import choices
 
 SECONDS = 3.0

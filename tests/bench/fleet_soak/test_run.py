@@ -1,7 +1,7 @@
 """Eight simulated robots, each bridge a process of its own, on one console."""
 
-from bench.fleet_soak.run import FleetPlan, fleet_soak
-from bench.fleet_soak.verdict import MUST_BE_ZERO
+from lockstep.bench.fleet_soak.run import FleetPlan, fleet_soak
+from lockstep.bench.fleet_soak.verdict import MUST_BE_ZERO
 
 BY_THE_BRIDGES = ("executed_twice", "executed_late", "events_skipped")
 

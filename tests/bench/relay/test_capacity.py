@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from bench.relay.capacity import Figures, plan, render
+from lockstep.bench.relay.capacity import Figures, plan, render
 
 FIGURES = Figures(
     bits_per_second=1e6,

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from bench.session_report.cli import write_report
-from bench.session_report.session import read_session
+from lockstep.bench.session_report.cli import write_report
+from lockstep.bench.session_report.session import read_session
 from tests.server.recording.makers import Story
 
 

@@ -1,6 +1,6 @@
 from typing import Any
 
-from bench.soak.judge import Judge, Verdict
+from lockstep.bench.soak.judge import Judge, Verdict
 
 
 def _judged(*records: dict[str, Any]) -> Verdict:

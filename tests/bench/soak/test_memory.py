@@ -1,6 +1,6 @@
 import pytest
 
-from bench.soak.memory import Sample, growth, growth_alike
+from lockstep.bench.soak.memory import Sample, growth, growth_alike
 
 FEW, MANY = (("H264", 2), ("VP8", 2)), (("H264", 4), ("VP8", 4))
 

@@ -3,7 +3,7 @@ from collections import Counter
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bench.soak.schedule import LAST_LIFE, LONGEST_CUT, counts_for, schedule
+from lockstep.bench.soak.schedule import LAST_LIFE, LONGEST_CUT, counts_for, schedule
 
 
 def test_half_an_hour_takes_five_kills_three_restarts_and_twenty_cuts() -> None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.robots.planar import create
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.planar import create
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import Operator
 from tests.support.c_robot import running_c_robot
 

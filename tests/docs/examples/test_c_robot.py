@@ -8,21 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_bridge.protocol.errors import LinkLost
-from robot_bridge.protocol.messages import (
-    Command,
-    Feedback,
-    Goodbye,
-    Media,
-    Ping,
-    Refusal,
-    Reset,
-    Rest,
-    Stop,
-    StopTaken,
-)
-from robot_bridge.protocol.serial import MAX_EVENT, event_after
-from robot_bridge.robots.event_strip import read_event_strip
+from lockstep.protocol.errors import LinkLost
+from lockstep.protocol.messages import Command, Feedback, Goodbye, Media, Ping, Refusal, Reset, Rest, Stop, StopTaken
+from lockstep.protocol.serial import MAX_EVENT, event_after
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from tests.docs.examples.robots import Robot, description_of, moving
 from tests.robot_bridge.bridge_helpers import operator, raw_link
 from tests.support.c_robot import running_c_robot

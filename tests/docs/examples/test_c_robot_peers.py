@@ -5,19 +5,10 @@ from random import Random
 
 import pytest
 
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.errors import LinkRefused
-from robot_bridge.protocol.framing import frame
-from robot_bridge.protocol.messages import (
-    Command,
-    Feedback,
-    Goodbye,
-    Hello,
-    LinkMessage,
-    Ping,
-    Rest,
-    encode_message,
-)
+from lockstep.protocol.errors import LinkRefused
+from lockstep.protocol.framing import frame
+from lockstep.protocol.messages import Command, Feedback, Goodbye, Hello, LinkMessage, Ping, Rest, encode_message
+from lockstep.robot_bridge.link.link_client import RobotLink
 from tests.docs.examples.robots import Robot, moving
 from tests.robot_bridge.bridge_helpers import operator, raw_link
 

@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-from robot_bridge.protocol.errors import LinkError
+from lockstep.protocol.errors import LinkError
 from tests.docs.examples.robots import moving
 from tests.robot_bridge.bridge_helpers import operator
 from tests.support.c_robot import built_c_robot

@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from robot_bridge.conformance import CASES, Outcome, Subject, play_all
-from robot_bridge.conformance.place import Place
+from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
+from lockstep.robot_bridge.conformance.place import Place
 from tests.docs.examples.robots import Robot
 
 PAGE = Path(__file__).parents[3] / "docs" / "robot-link.md"

@@ -6,7 +6,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from client import Console
+from lockstep.client import Console
 from tests.docs.examples.test_gstreamer import missing, running
 from tests.support.stack import running_stack
 

@@ -13,9 +13,9 @@ from enum import Enum, auto
 
 import msgspec
 
-from robot_bridge.protocol.description import Axis, Camera, RobotDescription
-from robot_bridge.protocol.errors import MessageError
-from robot_bridge.protocol.messages import (
+from lockstep.protocol.description import Axis, Camera, RobotDescription
+from lockstep.protocol.errors import MessageError
+from lockstep.protocol.messages import (
     Command,
     EventNotice,
     Feedback,
@@ -36,7 +36,7 @@ from robot_bridge.protocol.messages import (
     decode_message,
     encode_message,
 )
-from robot_bridge.protocol.serial import event_after, event_gap
+from lockstep.protocol.serial import event_after, event_gap
 
 __all__ = ["Fault", "PlainBridge", "running_plain_bridge"]
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_client import RobotLink
-from robot_bridge.link_tls import LinkTls
-from robot_bridge.protocol.link_secret import LinkSecret
-from robot_bridge.protocol.messages import Stop
-from robot_bridge.robots.planar import create
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.messages import Stop
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.link.link_tls import LinkTls
+from lockstep.robot_bridge.robots.planar import create
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import PATIENCE, operator, raw_link
 from tests.robot_bridge.conformance.plain_bridge import Fault, running_plain_bridge
 from tests.support.certificates import Authority

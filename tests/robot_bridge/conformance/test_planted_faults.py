@@ -2,9 +2,9 @@
 
 import asyncio
 
-from robot_bridge.conformance import CASES, Outcome, Result, Subject, play, play_all
-from robot_bridge.conformance.place import Place
-from robot_bridge.protocol.messages import Media
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.conformance import CASES, Outcome, Result, Subject, play, play_all
+from lockstep.robot_bridge.conformance.place import Place
 from tests.robot_bridge.bridge_helpers import raw_link
 from tests.robot_bridge.conformance.plain_bridge import Fault, PlainBridge, running_plain_bridge
 

@@ -2,12 +2,12 @@
 
 import msgspec
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.conformance import CASES, Outcome, Subject, play_all
-from robot_bridge.conformance.place import Place
-from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.robots.planar import PlanarRobot
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
+from lockstep.robot_bridge.conformance.place import Place
+from lockstep.robot_bridge.robots.planar import PlanarRobot
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.test_start_warning import LampRobot
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from robot_bridge.robots.base import Stamp
+from lockstep.robot_bridge.robots.base import Stamp
 
 __all__ = ["Stamping"]
 

@@ -6,10 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_bridge.protocol.messages import Media
-from robot_bridge.protocol.serial import MAX_EVENT
-from robot_bridge.robots.event_strip import CELLS, draw_event_strip, read_event_strip, strip_height, with_event_strip
-from tests.robot_bridge.protocol.strategies import events
+from lockstep.protocol.messages import Media
+from lockstep.protocol.serial import MAX_EVENT
+from lockstep.robot_bridge.robots.event_strip import (
+    CELLS,
+    draw_event_strip,
+    read_event_strip,
+    strip_height,
+    with_event_strip,
+)
+from tests.protocol.strategies import events
 
 sizes = st.sampled_from([(480, 640), (240, 320), (720, 1280), (120, 160), (360, 642)])
 

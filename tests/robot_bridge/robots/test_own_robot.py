@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from robot_bridge.cli import robot_app
-from robot_bridge.robots.own_robot import installed_robots
-from robot_bridge.robots.planar import PlanarRobot
-from robot_bridge.robots.registry import create_robot, is_robot, robot_names
-from server.cli import app
+from lockstep.robot_bridge.cli import robot_app
+from lockstep.robot_bridge.robots.own_robot import installed_robots
+from lockstep.robot_bridge.robots.planar import PlanarRobot
+from lockstep.robot_bridge.robots.registry import create_robot, is_robot, robot_names
+from lockstep.server.cli.main import app
 
 MODULE = """
 import math
@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import msgspec
 
-from robot_bridge.errors import RobotUnavailable
-from robot_bridge.robots.planar import PlanarRobot
+from lockstep.robot_bridge.errors import RobotUnavailable
+from lockstep.robot_bridge.robots.planar import PlanarRobot
 
 class Good(PlanarRobot):
     pass

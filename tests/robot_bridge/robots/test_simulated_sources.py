@@ -3,11 +3,11 @@
 import asyncio
 import itertools
 
-from robot_bridge.protocol.description import Camera, Microphone
-from robot_bridge.protocol.messages import Media
-from robot_bridge.robots.base import MediaSource, Stamp
-from robot_bridge.robots.camera_source import CameraSource
-from robot_bridge.robots.microphone_source import MicrophoneSource
+from lockstep.protocol.description import Camera, Microphone
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.robots.base import MediaSource, Stamp
+from lockstep.robot_bridge.robots.camera_source import CameraSource
+from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
 from tests.robot_bridge.robots.stamping import Stamping
 
 CAMERA = Camera(name="camera", label="Camera", width=64, height=48, frame_rate=200.0)

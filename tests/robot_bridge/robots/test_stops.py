@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.errors import RobotUnavailable
-from robot_bridge.robots.base import Robot
-from robot_bridge.robots.registry import create_robot
+from lockstep.robot_bridge.errors import RobotUnavailable
+from lockstep.robot_bridge.robots.base import Robot
+from lockstep.robot_bridge.robots.registry import create_robot
 
 MODEL = Path(__file__).parents[3] / "docs" / "examples" / "mjcf" / "desk_arm.xml"
 
 
 def mjcf() -> Robot:
-    from robot_bridge.robots.mjcf import create
+    from lockstep.robot_bridge.robots.mjcf import create
 
     return create(MODEL)
 

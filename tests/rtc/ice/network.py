@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from random import Random
 
-from rtc.addresses import Address, Datagram, Path
-from rtc.ice.agent import Agent
-from rtc.ice.candidates import Candidate
-from rtc.ice.events import Event
-from rtc.ice.gathering import gather
-from rtc.ice.settings import IceSettings
+from lockstep.rtc.addresses import Address, Datagram, Path
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.candidates import Candidate
+from lockstep.rtc.ice.events import Event
+from lockstep.rtc.ice.gathering import gather
+from lockstep.rtc.ice.settings import IceSettings
 
 __all__ = ["Conditions", "Network", "agent_at", "connect"]
 

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from rtc.ice.agent import Agent
-from rtc.ice.events import Event
-from rtc.udp_socket import UdpSocket
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.events import Event
+from lockstep.rtc.udp_socket import UdpSocket
 
 __all__ = ["AgentOnSocket"]
 

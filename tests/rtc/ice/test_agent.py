@@ -6,14 +6,14 @@ from random import Random
 
 import pytest
 
-from rtc.addresses import Address, Path
-from rtc.ice.agent import Agent
-from rtc.ice.candidates import Candidate, parse_candidate
-from rtc.ice.credentials import new_credentials
-from rtc.ice.events import Ended, PathChanged, RestartFailed
-from rtc.ice.gathering import Advertised, gather
-from rtc.ice.settings import IceSettings
-from rtc.stun import Kind, Message, StunErrorCode, parse, serialize
+from lockstep.rtc.addresses import Address, Path
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.candidates import Candidate, parse_candidate
+from lockstep.rtc.ice.credentials import new_credentials
+from lockstep.rtc.ice.events import Ended, PathChanged, RestartFailed
+from lockstep.rtc.ice.gathering import Advertised, gather
+from lockstep.rtc.ice.settings import IceSettings
+from lockstep.rtc.stun import Kind, Message, StunErrorCode, parse, serialize
 from tests.rtc.ice.network import Conditions, Network, agent_at, candidates_of, connect
 
 HERE, THERE = ("192.0.2.1", 5000), ("198.51.100.7", 5000)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rtc.ice.agent import Agent
-from rtc.ice.events import Ended, PathChanged, RestartFailed
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.events import Ended, PathChanged, RestartFailed
 from tests.rtc.ice.network import Conditions, Network, agent_at, candidates_of, connect
 
 BAD = {

@@ -2,9 +2,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.ice.candidates import Candidate, CandidateError, candidate_priority, pair_priority, parse_candidate
-from rtc.ice.check_list import may_pair
-from rtc.ice.gathering import Advertised, AdvertisedError, gather, parse_advertised
+from lockstep.rtc.ice.candidates import Candidate, CandidateError, candidate_priority, pair_priority, parse_candidate
+from lockstep.rtc.ice.check_list import may_pair
+from lockstep.rtc.ice.gathering import Advertised, AdvertisedError, gather, parse_advertised
 
 HOST = "candidate:1 1 udp 2130706431 192.0.2.1 5000 typ host"
 

@@ -1,6 +1,6 @@
 import pytest
 
-from rtc.ice.credentials import Credentials, CredentialsError, new_credentials
+from lockstep.rtc.ice.credentials import Credentials, CredentialsError, new_credentials
 
 
 def test_new_credentials_are_valid_and_never_the_same() -> None:

@@ -6,9 +6,9 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from rtc.addresses import Path
-from rtc.ice.events import Ended
-from rtc.stun import Kind, Message, serialize
+from lockstep.rtc.addresses import Path
+from lockstep.rtc.ice.events import Ended
+from lockstep.rtc.stun import Kind, Message, serialize
 from tests.rtc.ice.network import Network, agent_at, candidates_of, connect
 
 HERE, THERE, INTRUDER = ("192.0.2.1", 5000), ("198.51.100.7", 5000), ("203.0.113.66", 6666)

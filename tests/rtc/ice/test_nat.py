@@ -15,13 +15,13 @@ from contextlib import AsyncExitStack, asynccontextmanager
 
 import pytest
 
-from bench.emulator.errors import NamespacesUnavailable
-from bench.emulator.tun import Tun, open_tun
-from rtc.addresses import Address, Datagram, Path
-from rtc.ice.agent import Agent
-from rtc.ice.events import Ended, PathChanged
-from rtc.ice.gathering import Advertised, gather
-from rtc.udp_socket import UdpSocket
+from lockstep.bench.emulator.errors import NamespacesUnavailable
+from lockstep.bench.emulator.namespace.tun import Tun, open_tun
+from lockstep.rtc.addresses import Address, Datagram, Path
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.events import Ended, PathChanged
+from lockstep.rtc.ice.gathering import Advertised, gather
+from lockstep.rtc.udp_socket import UdpSocket
 from tests.rtc.ice.sockets import AgentOnSocket
 
 INNER, OUTER = "10.77.0.5", "203.0.113.7"  # of the console: every port of the outer address is forwarded

@@ -7,12 +7,12 @@ from random import Random
 
 import pytest
 
-from rtc.addresses import Path
-from rtc.ice.agent import Agent
-from rtc.ice.credentials import new_credentials
-from rtc.ice.gathering import gather
-from rtc.ice.port import Port, source_of
-from rtc.stun import Kind, Message, serialize
+from lockstep.rtc.addresses import Path
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.credentials import new_credentials
+from lockstep.rtc.ice.gathering import gather
+from lockstep.rtc.ice.port import Port, source_of
+from lockstep.rtc.stun import Kind, Message, serialize
 from tests.rtc.ice.network import Network, agent_at, candidates_of
 
 CONSOLE = ("198.51.100.7", 5000)

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.ice.tcp import MAX_DATAGRAM, FramingError, TcpFraming, frame
+from lockstep.rtc.ice.tcp import MAX_DATAGRAM, FramingError, TcpFraming, frame
 
 
 @given(st.lists(st.binary(min_size=1, max_size=50)), st.lists(st.integers(1, 30), min_size=1))

@@ -7,13 +7,13 @@ from contextlib import asynccontextmanager
 import aioice
 import pytest
 
-from rtc.addresses import Datagram
-from rtc.ice.agent import Agent
-from rtc.ice.candidates import parse_candidate
-from rtc.ice.credentials import Credentials
-from rtc.ice.events import PathChanged
-from rtc.ice.gathering import gather
-from rtc.udp_socket import UdpSocket
+from lockstep.rtc.addresses import Datagram
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.candidates import parse_candidate
+from lockstep.rtc.ice.credentials import Credentials
+from lockstep.rtc.ice.events import PathChanged
+from lockstep.rtc.ice.gathering import gather
+from lockstep.rtc.udp_socket import UdpSocket
 from tests.rtc.ice.sockets import AgentOnSocket
 
 HOST = "127.0.0.1"

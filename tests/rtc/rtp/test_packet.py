@@ -7,8 +7,8 @@ from aiortc.rtp import RtpPacket as AiortcPacket
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.rtp.errors import RtpError
-from rtc.rtp.packet import RtpPacket, pack_extensions, parse_extensions
+from lockstep.rtc.rtp.errors import RtpError
+from lockstep.rtc.rtp.packet import RtpPacket, pack_extensions, parse_extensions
 
 values = st.dictionaries(st.integers(1, 255), st.binary(max_size=255), max_size=5)
 packets = st.builds(

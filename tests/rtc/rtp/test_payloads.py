@@ -1,4 +1,4 @@
-"""What is in RTP payloads; `tests/client/test_payloads.py` compares with aiortc's reader."""
+"""What is in RTP payloads; `tests/client/media/test_payloads.py` compares with aiortc's reader."""
 
 from contextlib import suppress
 
@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.rtp.payloads import H264Part, PayloadError, Vp8Part, h264_parts, vp8_part
+from lockstep.rtc.rtp.payloads import H264Part, PayloadError, Vp8Part, h264_parts, vp8_part
 
 
 @pytest.mark.parametrize(

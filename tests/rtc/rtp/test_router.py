@@ -1,4 +1,4 @@
-from rtc.rtp.router import Route, Router
+from lockstep.rtc.rtp.router import Route, Router
 from tests.rtc.rtp.packets import packet
 
 ROUTES = (

@@ -5,9 +5,9 @@ from aiortc import rtp as aiortc_rtp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.rtp.errors import RtpError
-from rtc.rtp.feedback import FullIntraRequest, Nack, PictureLoss, Remb, TransportFeedback
-from rtc.rtp.rtcp import (
+from lockstep.rtc.rtp.errors import RtpError
+from lockstep.rtc.rtp.feedback import FullIntraRequest, Nack, PictureLoss, Remb, TransportFeedback
+from lockstep.rtc.rtp.rtcp import (
     Goodbye,
     ReceiverReport,
     ReportBlock,

@@ -1,6 +1,6 @@
 """Each stage by itself, on a sink, with the time in the test's hand."""
 
-from rtc.rtp.extensions import (
+from lockstep.rtc.rtp.extensions import (
     ABS_SEND_TIME_URI,
     TRANSPORT_NUMBER_URI,
     ExtensionReader,
@@ -8,17 +8,17 @@ from rtc.rtp.extensions import (
     TransportNumbers,
     pack_send_time,
 )
-from rtc.rtp.feedback import FullIntraRequest, Nack, PictureLoss, Remb, TransportFeedback
-from rtc.rtp.history import History, HistorySettings, RepairStream
-from rtc.rtp.losses import Losses, LossSettings
-from rtc.rtp.numbers import Unwrapper, is_after
-from rtc.rtp.pacer import Pacer, PacerSettings, TokenBucket
-from rtc.rtp.receiver_reports import ReceiverReports
-from rtc.rtp.repairs import Repairs
-from rtc.rtp.requests import Requests
-from rtc.rtp.rtcp import Goodbye, ReceiverReport, SenderReport, SourceDescription
-from rtc.rtp.sender_reports import SenderReports
-from rtc.rtp.stage import (
+from lockstep.rtc.rtp.feedback import FullIntraRequest, Nack, PictureLoss, Remb, TransportFeedback
+from lockstep.rtc.rtp.history import History, HistorySettings, RepairStream
+from lockstep.rtc.rtp.losses import Losses, LossSettings
+from lockstep.rtc.rtp.numbers import Unwrapper, is_after
+from lockstep.rtc.rtp.pacer import Pacer, PacerSettings, TokenBucket
+from lockstep.rtc.rtp.receiver_reports import ReceiverReports
+from lockstep.rtc.rtp.repairs import Repairs
+from lockstep.rtc.rtp.requests import Requests
+from lockstep.rtc.rtp.rtcp import Goodbye, ReceiverReport, SenderReport, SourceDescription
+from lockstep.rtc.rtp.sender_reports import SenderReports
+from lockstep.rtc.rtp.stage import (
     Arrivals,
     BandwidthEstimate,
     KeyframeRequested,

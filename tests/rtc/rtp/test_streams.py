@@ -3,16 +3,16 @@
 from collections.abc import Callable
 from random import Random
 
-from rtc.rtp.extensions import ABS_SEND_TIME_URI
-from rtc.rtp.feedback import PictureLoss
-from rtc.rtp.history import RepairStream
-from rtc.rtp.incoming import IncomingParameters, IncomingStream
-from rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
-from rtc.rtp.packet import RtpPacket
-from rtc.rtp.rtcp import ReceiverReport, SenderReport, SourceDescription, pack_rtcp, parse_rtcp
-from rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsGone, RoundTrip
-from rtc.rtp.streams import Identity, NegotiatedMedia, Streams
-from rtc.sdp import Codec, MediaSection
+from lockstep.rtc.rtp.extensions import ABS_SEND_TIME_URI
+from lockstep.rtc.rtp.feedback import PictureLoss
+from lockstep.rtc.rtp.history import RepairStream
+from lockstep.rtc.rtp.incoming import IncomingParameters, IncomingStream
+from lockstep.rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
+from lockstep.rtc.rtp.packet import RtpPacket
+from lockstep.rtc.rtp.rtcp import ReceiverReport, SenderReport, SourceDescription, pack_rtcp, parse_rtcp
+from lockstep.rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsGone, RoundTrip
+from lockstep.rtc.rtp.streams import Identity, NegotiatedMedia, Streams
+from lockstep.rtc.sdp import Codec, MediaSection
 
 STAMP = "urn:stamp"
 IDS = {STAMP: 1, ABS_SEND_TIME_URI: 2}

@@ -12,7 +12,7 @@ from typing import Any
 
 from aiortc import RTCSctpCapabilities, RTCSctpTransport
 
-from rtc.channels import ChannelEvent, DataChannels
+from lockstep.rtc.channels import ChannelEvent, DataChannels
 
 __all__ = ["AiortcPair", "aiortc_pair"]
 

@@ -12,9 +12,9 @@ from typing import Any
 
 from aiortc import RTCDataChannel, RTCDataChannelParameters, RTCSctpCapabilities, RTCSctpTransport
 
-from rtc.channels import DataChannels
-from rtc.dcep import Reliability
-from rtc.sctp import SctpSettings
+from lockstep.rtc.channels import DataChannels
+from lockstep.rtc.dcep import Reliability
+from lockstep.rtc.sctp import SctpSettings
 from tests.rtc.sctp.network import World, seeded
 from tests.rtc.sctp.test_recovery_time import ROUND_TRIPS, repeated_after
 

@@ -1,9 +1,9 @@
 """An established end whose peer says whatever it likes, and what must hold all the time."""
 
-from rtc.channels import ChannelEvent, DataChannels
-from rtc.sctp import Closed, SctpSettings, State
-from rtc.sctp.chunks import Chunk, Init
-from rtc.sctp.packet import decode_packet, encode_packet
+from lockstep.rtc.channels import ChannelEvent, DataChannels
+from lockstep.rtc.sctp import Closed, SctpSettings, State
+from lockstep.rtc.sctp.chunks import Chunk, Init
+from lockstep.rtc.sctp.packet import decode_packet, encode_packet
 from tests.rtc.sctp.network import World, seeded
 
 __all__ = ["NAMED_ENDS", "Victim"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Generic, Protocol, TypeVar
 
-from rtc.sctp import Association, Event, SctpSettings
+from lockstep.rtc.sctp import Association, Event, SctpSettings
 
 __all__ = ["Core", "Link", "World", "associated", "drain", "seeded"]
 

@@ -6,9 +6,9 @@ import os
 import pytest
 from aiortc import RTCDataChannel, RTCDataChannelParameters
 
-from rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened, DataChannels
-from rtc.dcep import Reliability
-from rtc.sctp import Closed, Established, SctpSettings, State
+from lockstep.rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened, DataChannels
+from lockstep.rtc.dcep import Reliability
+from lockstep.rtc.sctp import Closed, Established, SctpSettings, State
 from tests.rtc.sctp.aiortc_peer import AiortcPair, aiortc_pair
 
 SETTINGS = SctpSettings(max_send_message=256 * 1024, max_receive_message=256 * 1024, receive_window=512 * 1024)

@@ -8,7 +8,7 @@ from google_crc32c import value as crc32c
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.sctp.chunks import (
+from lockstep.rtc.sctp.chunks import (
     BEGIN,
     Abort,
     Chunk,
@@ -31,8 +31,8 @@ from rtc.sctp.chunks import (
     Skip,
     Unknown,
 )
-from rtc.sctp.errors import SctpParseError
-from rtc.sctp.packet import decode_packet, encode_packet
+from lockstep.rtc.sctp.errors import SctpParseError
+from lockstep.rtc.sctp.packet import decode_packet, encode_packet
 
 U16, U32 = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 BODY = st.binary(max_size=60)

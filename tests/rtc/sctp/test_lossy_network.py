@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from rtc.sctp import Association, Closed, MessageReceived, SctpSettings, State
+from lockstep.rtc.sctp import Association, Closed, MessageReceived, SctpSettings, State
 from tests.rtc.sctp.network import Link, World, associated, seeded
 
 ORDERED, UNORDERED, NEWEST, TIMED, BULK = range(5)

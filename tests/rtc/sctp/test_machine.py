@@ -8,7 +8,7 @@ import hypothesis.strategies as st
 from hypothesis import HealthCheck, settings
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from rtc.sctp import (
+from lockstep.rtc.sctp import (
     Association,
     AssociationClosed,
     Closed,
@@ -18,7 +18,7 @@ from rtc.sctp import (
     SendQueueFull,
     State,
 )
-from rtc.sctp.chunks import (
+from lockstep.rtc.sctp.chunks import (
     Abort,
     Chunk,
     CookieAck,

@@ -2,9 +2,9 @@
 
 import pytest
 
-from rtc.sctp import MessageReceived, SctpSettings
-from rtc.sctp.chunks import Data, InterleavedData
-from rtc.sctp.packet import decode_packet
+from lockstep.rtc.sctp import MessageReceived, SctpSettings
+from lockstep.rtc.sctp.chunks import Data, InterleavedData
+from lockstep.rtc.sctp.packet import decode_packet
 from tests.rtc.sctp.network import Link, associated
 
 BULK, STATE = 1, 2

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rtc.sctp import Association, MessageReceived, SctpSettings
+from lockstep.rtc.sctp import Association, MessageReceived, SctpSettings
 from tests.rtc.sctp.network import Link, World, associated
 
 ROUND_TRIPS = (0.005, 0.1, 0.3, 0.6)

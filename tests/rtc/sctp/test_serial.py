@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.sctp.serial import MASK_16, MASK_32, unwrap
+from lockstep.rtc.sctp.serial import MASK_16, MASK_32, unwrap
 
 
 def test_a_number_beyond_the_wrap_is_the_next_one() -> None:

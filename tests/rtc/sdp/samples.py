@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from rtc.fingerprint import Fingerprint
-from rtc.sdp import Codec, LocalMedia, SessionDescription, Transport, parse_description
+from lockstep.rtc.fingerprint import Fingerprint
+from lockstep.rtc.sdp import Codec, LocalMedia, SessionDescription, Transport, parse_description
 
 __all__ = ["NAMES", "OPUS", "RTX", "TRANSPORT", "VP8", "everything", "parsed", "text_of"]
 

@@ -2,7 +2,7 @@
 
 from aiortc import RTCPeerConnection, RTCSessionDescription
 
-from rtc.sdp import (
+from lockstep.rtc.sdp import (
     LocalMedia,
     answer_to,
     check_answer,

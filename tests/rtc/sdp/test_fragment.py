@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.sdp import Fragment, FragmentCandidate, SdpError, parse_fragment, write_fragment
+from lockstep.rtc.sdp import Fragment, FragmentCandidate, SdpError, parse_fragment, write_fragment
 
 PASSWORD = "0123456789abcdef0123456789"
 LINE = "candidate:1 1 udp 2130706431 192.0.2.7 5000 typ host"

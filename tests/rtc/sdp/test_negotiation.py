@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from rtc.sdp import (
+from lockstep.rtc.sdp import (
     MID_URI,
     Codec,
     Direction,

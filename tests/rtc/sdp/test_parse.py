@@ -2,8 +2,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.fingerprint import Fingerprint
-from rtc.sdp import SdpError, SdpLimits, Source, SourceGroup, parse_description, write_description
+from lockstep.rtc.fingerprint import Fingerprint
+from lockstep.rtc.sdp import SdpError, SdpLimits, Source, SourceGroup, parse_description, write_description
 from tests.rtc.sdp.samples import NAMES, parsed, text_of
 
 GOOD = text_of("janus")

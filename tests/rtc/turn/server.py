@@ -1,8 +1,8 @@
 """A TURN server for tests, on a virtual clock: it answers by RFC 8656, as far as a client can tell."""
 
-from rtc.addresses import Address
-from rtc.stun import Kind, is_authentic, pack, pack_address, parse_address, read_attributes, transaction_of
-from rtc.turn.messages import Attribute, Method, long_term_key, pack_channel_data, parse_channel_data
+from lockstep.rtc.addresses import Address
+from lockstep.rtc.stun import Kind, is_authentic, pack, pack_address, parse_address, read_attributes, transaction_of
+from lockstep.rtc.turn.messages import Attribute, Method, long_term_key, pack_channel_data, parse_channel_data
 
 __all__ = ["REALM", "RELAYED", "TurnServer"]
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.stun import StunErrorCode
-from rtc.turn.allocation import Allocated, Allocation, AllocationEnded
-from rtc.turn.messages import Method, TurnStream, pack_channel_data
-from rtc.turn.settings import TurnSettings
+from lockstep.rtc.stun import StunErrorCode
+from lockstep.rtc.turn.allocation import Allocated, Allocation, AllocationEnded
+from lockstep.rtc.turn.messages import Method, TurnStream, pack_channel_data
+from lockstep.rtc.turn.settings import TurnSettings
 from tests.rtc.turn.server import MAPPED, RELAYED, TurnServer
 
 PEER, OTHER = ("192.0.2.5", 4000), ("192.0.2.6", 4000)

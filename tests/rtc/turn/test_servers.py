@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.stun import Kind, Message, serialize, transaction_of
-from rtc.turn.servers import (
+from lockstep.rtc.stun import Kind, Message, serialize, transaction_of
+from lockstep.rtc.turn.servers import (
     MAX_SERVERS,
     IceServer,
     MappedAddress,

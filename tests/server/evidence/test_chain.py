@@ -6,7 +6,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.evidence.chain import GENESIS, ChainedLine, ChainReport, Place, check_chain, line_hash
+from lockstep.server.evidence.chain import GENESIS, ChainedLine, ChainReport, Place, check_chain, line_hash
 
 RECORDS = 12
 

@@ -4,8 +4,8 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric.x25519 import X25519PrivateKey
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
-from server.evidence.signer import KEY_FILE, evidence_signer, is_public_key, is_signed
-from server.state_dir import StateDamaged, StateDir
+from lockstep.server.evidence.signer import KEY_FILE, evidence_signer, is_public_key, is_signed
+from lockstep.server.util.state_dir import StateDamaged, StateDir
 
 
 def test_the_key_is_made_once_kept_and_for_its_owner_alone(tmp_path: Path) -> None:

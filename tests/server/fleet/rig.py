@@ -10,15 +10,15 @@ from typing import Any
 import httpx
 from aiortc import RTCPeerConnection
 
-from robot_bridge.protocol.console import Role, Seat, SeatRequest
-from server.fleet.fleet import Fleet
-from server.fleet.fleet_app import create_fleet_app
-from server.fleet.robots import robot_settings
-from server.guarded_http import guarded_by
-from server.serve import bind, running
-from server.services import Services
-from server.settings import Settings
-from server.state import ConsoleState, open_state
+from lockstep.protocol.console import Role, Seat, SeatRequest
+from lockstep.server.fleet.fleet import Fleet
+from lockstep.server.fleet.fleet_app import create_fleet_app
+from lockstep.server.fleet.robots import robot_settings
+from lockstep.server.http.transport.serve import bind, running
+from lockstep.server.http.transport.uvicorn_http_limits import guarded_by
+from lockstep.server.settings import Settings
+from lockstep.server.state.dependencies import Dependencies
+from lockstep.server.state.persistent_state import ConsoleState, open_state
 from tests.server.rig import PATIENCE, Rig, TestPeer, running_bridge
 
 __all__ = ["FleetRig", "drive_once", "running_fleet", "running_fleet_rig"]
@@ -36,7 +36,7 @@ class FleetRig:
     def token(self, role: Role, *robots: str) -> dict[str, str]:
         return {"Authorization": f"Bearer {self.state.access.issue(role, role, robots)}"}
 
-    def session(self, name: str) -> Services:
+    def session(self, name: str) -> Dependencies:
         found = self.fleet.sessions[name].services
         assert found is not None
         return found

@@ -6,8 +6,8 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from robot_bridge.protocol.messages import Command
-from robot_bridge.protocol.serial import event_after
+from lockstep.protocol.messages import Command
+from lockstep.protocol.serial import event_after
 from tests.server.fleet.rig import drive_once, running_fleet
 from tests.server.rig import PATIENCE, running_bridge
 

@@ -8,10 +8,10 @@ from itertools import cycle
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from robot_bridge.protocol.console import Participants, SeatRequest, Welcome
-from robot_bridge.protocol.messages import Stop
-from server.access import Identity
-from server.errors import TooManyPeers
+from lockstep.protocol.console import Participants, SeatRequest, Welcome
+from lockstep.protocol.messages import Stop
+from lockstep.server.auth.tokens import Identity
+from lockstep.server.errors import TooManyPeers
 from tests.server.fleet.rig import drive_once, running_fleet_rig
 from tests.server.rig import eventually
 

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.protocol.console import Notice, SilenceStops
-from robot_bridge.protocol.messages import Refusal, Stop
-from robot_bridge.robots.registry import create_robot
-from robot_bridge.settings import BridgeSettings
-from server.app import attach_session
-from server.fleet.tiles import UNREADABLE
+from lockstep.protocol.console import Notice, SilenceStops
+from lockstep.protocol.messages import Refusal, Stop
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.registry import create_robot
+from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.server.composition.robot_app import attach_session
+from lockstep.server.fleet.summaries import UNREADABLE
 from tests.server.fleet.rig import running_fleet, running_fleet_rig
 from tests.server.rig import TestPeer, eventually, running_bridge, stop_words
 

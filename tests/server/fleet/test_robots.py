@@ -3,9 +3,9 @@ from typing import Any
 
 import pytest
 
-from server.fleet.robot_names import BadFleet
-from server.fleet.robots import robot_settings
-from server.settings import Settings
+from lockstep.server.fleet.robots import robot_settings
+from lockstep.server.settings import Settings
+from lockstep.server.util.robot_names import BadFleet
 
 TWO = ("left=tcp://h:1", "right=tcp://h:2")
 

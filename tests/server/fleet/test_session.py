@@ -12,16 +12,16 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 from websockets.typing import Subprotocol
 
-from robot_bridge.protocol.console import Notice, SilenceStops
-from robot_bridge.protocol.serial import event_after
-from server.audit import Actor
-from server.console import Console
-from server.fleet import session
-from server.fleet.tiles import FAILED
-from server.media.plane import MediaPlane
-from server.robot_session import running_session
-from server.services import Services
-from server.stop_presses import MAX_PENDING, new_press
+from lockstep.protocol.console import Notice, SilenceStops
+from lockstep.protocol.serial import event_after
+from lockstep.server.audit.records import Actor
+from lockstep.server.composition.robot_session import running_session
+from lockstep.server.control.console import Console
+from lockstep.server.fleet import session
+from lockstep.server.fleet.summaries import FAILED
+from lockstep.server.media.hub import MediaHub
+from lockstep.server.state.dependencies import Dependencies
+from lockstep.server.stop.stop_presses import MAX_PENDING, new_press
 from tests.server.fleet.rig import FleetRig, drive_once, running_fleet, running_fleet_rig
 from tests.server.rig import PATIENCE, eventually, reset_by_http, running_bridge, stop_words
 
@@ -64,7 +64,7 @@ def faults(monkeypatch: pytest.MonkeyPatch) -> Faults:
             await made.until_told(console)
 
     @asynccontextmanager
-    async def running(*arguments: Any) -> AsyncIterator[Services]:
+    async def running(*arguments: Any) -> AsyncIterator[Dependencies]:
         await made.may_begin.wait()
         async with running_session(*arguments) as services:
             yield services
@@ -218,13 +218,13 @@ async def test_a_robot_whose_directory_cannot_be_made_is_without_a_session_and_t
 async def test_a_fault_while_a_session_ends_does_not_keep_the_console_from_ending(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    close = MediaPlane.close
+    close = MediaHub.close
 
-    async def fault(plane: MediaPlane) -> None:
+    async def fault(plane: MediaHub) -> None:
         await close(plane)
         raise RuntimeError("a fault of ours")
 
-    monkeypatch.setattr(MediaPlane, "close", fault)
+    monkeypatch.setattr(MediaHub, "close", fault)
     async with asyncio.timeout(3 * PATIENCE):
         async with running_fleet_rig("left", "right") as rig:
             pass

@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from server.fleet.robot_names import BadFleet
-from server.fleet.simulated import own_event_log, simulated_robots
+from lockstep.server.fleet.simulated import own_event_log, simulated_robots
+from lockstep.server.util.robot_names import BadFleet
 
 
 def test_one_robot_without_a_name_is_the_only_one() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import av
 import numpy as np
 
-from robot_bridge.protocol.messages import Media
+from lockstep.protocol.messages import Media
 from tests.server.media.viewer import HEIGHT, WIDTH, picture
 
 __all__ = ["access_units", "camera_pictures"]

@@ -4,25 +4,21 @@ import asyncio
 from collections.abc import Callable
 from typing import Any, cast
 
-from robot_bridge.protocol.carriers import (
+from lockstep.protocol.carriers import (
     CAPTURE_TIME_URI,
     EVENT_REFERENCE_URI,
     Carrier,
     unpack_capture_time,
     unpack_event_reference,
 )
-from robot_bridge.protocol.messages import Media
-from server.media.plane import MediaPlane
-from tests.server.media.viewer import (
-    TIMEOUT,
-    Received,
-    Viewer,
-)
+from lockstep.protocol.messages import Media
+from lockstep.server.media.hub import MediaHub
+from tests.server.media.viewer import TIMEOUT, Received, Viewer
 
 Make = Callable[[int, float], Media]
 
 
-async def stream(plane: MediaPlane, viewer: Viewer, kind: str, make: Make, count: int, first: int = 1) -> None:
+async def stream(plane: MediaHub, viewer: Viewer, kind: str, make: Make, count: int, first: int = 1) -> None:
     """Feed media one by one, each when the one before was received; event i is captured at i / 50 s."""
     for i in range(first, first + count):
         before = timestamps(viewer, kind)
@@ -35,13 +31,13 @@ def timestamps(viewer: Viewer, kind: str) -> int:
     return len({received.packet.timestamp for received in viewer.of(kind) if received.packet.marker or kind == "audio"})
 
 
-def value(plane: MediaPlane, name: str, **labels: str) -> float:
+def value(plane: MediaHub, name: str, **labels: str) -> float:
     """A metric of the plane; 0 before it first counted."""
     registry = cast(Any, plane).registry
     return registry.get_sample_value(f"lockstep_media_{name}", labels) or 0.0
 
 
-async def refused(plane: MediaPlane, media: Media) -> None:
+async def refused(plane: MediaHub, media: Media) -> None:
     """Feed a medium and wait until the stream's worker is through with it."""
     stream = cast(Any, plane)._streams[media.stream]
     finish, finished = stream._finish, asyncio.Event()

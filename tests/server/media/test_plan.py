@@ -2,9 +2,9 @@
 
 import pytest
 
-from rtc.endpoint import Endpoint
-from rtc.sdp import SdpError, SessionDescription
-from server.offer import parse_offer
+from lockstep.rtc.endpoint import Endpoint
+from lockstep.rtc.sdp import SdpError, SessionDescription
+from lockstep.server.webrtc.sdp_offer import parse_offer
 from tests.server.media.viewer import description, running_plane
 from tests.server.offers import offer, section
 

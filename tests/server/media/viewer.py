@@ -13,13 +13,13 @@ from aiortc.rtcrtpparameters import RTCRtpCodecParameters
 from aiortc.rtp import RtpPacket, unpack_header_extensions
 from prometheus_client import CollectorRegistry
 
-from robot_bridge.protocol.description import Axis, Camera, Microphone, RobotDescription
-from robot_bridge.protocol.messages import Media
-from rtc.endpoint import Connection, Endpoint
-from rtc.peer_events import Connected, MediaEvent, PeerEvent
-from rtc.sdp import parse_description, write_description
-from server.media.plane import MediaPlane, MediaSettings, PeerMedia
-from server.media.rtp_sender import RtpSender
+from lockstep.protocol.description import Axis, Camera, Microphone, RobotDescription
+from lockstep.protocol.messages import Media
+from lockstep.rtc.endpoint import Connection, Endpoint
+from lockstep.rtc.peer_events import Connected, MediaEvent, PeerEvent
+from lockstep.rtc.sdp import parse_description, write_description
+from lockstep.server.media.hub import MediaHub, MediaSettings, Subscriptions
+from lockstep.server.media.pipeline.rtp_sender import RtpSender
 
 WIDTH, HEIGHT = 160, 120
 TIMEOUT = 10.0
@@ -91,7 +91,7 @@ class Received:
 class Viewer:
     """Receives; keeps every packet."""
 
-    def __init__(self, pc: RTCPeerConnection, connection: Connection, media: PeerMedia, answer: str) -> None:
+    def __init__(self, pc: RTCPeerConnection, connection: Connection, media: Subscriptions, answer: str) -> None:
         self.pc = pc
         self.connection = connection  # the plane's end
         self.connected = asyncio.Event()  # it is
@@ -158,9 +158,9 @@ class Viewer:
 
 
 @asynccontextmanager
-async def running_plane(robot: RobotDescription | None = None, **settings: Any) -> AsyncIterator[MediaPlane]:
+async def running_plane(robot: RobotDescription | None = None, **settings: Any) -> AsyncIterator[MediaHub]:
     registry = CollectorRegistry()
-    plane = MediaPlane(MediaSettings(**settings), registry)
+    plane = MediaHub(MediaSettings(**settings), registry)
     cast(Any, plane).registry = registry  # for tests that read metrics
     plane.configure(robot or description())
     try:
@@ -204,7 +204,7 @@ def prefer(pc: RTCPeerConnection, codecs: Sequence[str]) -> None:
 
 @asynccontextmanager
 async def viewing(
-    plane: MediaPlane,
+    plane: MediaHub,
     kinds: Sequence[str] = ("video", "audio"),
     *,
     codecs: Sequence[str] = ("H264", "opus"),

@@ -8,8 +8,8 @@ import av
 import msgspec
 import numpy as np
 
-from robot_bridge.protocol.console import Report, StreamReport
-from robot_bridge.protocol.description import (
+from lockstep.protocol.console import Report, StreamReport
+from lockstep.protocol.description import (
     Axis,
     Camera,
     Joint,
@@ -19,13 +19,13 @@ from robot_bridge.protocol.description import (
     RobotDescription,
     WrenchSensor,
 )
-from robot_bridge.protocol.messages import StopState
-from robot_bridge.protocol.serial import event_after
-from server.media.picture_encoder import create_picture_encoder
-from server.media.sound_encoder import Segment, create_sound_encoder
-from server.recording.foxglove import camera_message, feedback_messages, sound_message
-from server.recording.info import RecordingInfo
-from server.recording.records import (
+from lockstep.protocol.messages import StopState
+from lockstep.protocol.serial import event_after
+from lockstep.server.media.codecs.picture_encoder import create_picture_encoder
+from lockstep.server.media.codecs.sound_encoder import Segment, create_sound_encoder
+from lockstep.server.recording.format.foxglove import camera_message, feedback_messages, sound_message
+from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.format.records import (
     CommandRecord,
     FeedbackRecord,
     OwnRecord,
@@ -33,9 +33,9 @@ from server.recording.records import (
     RobotRecord,
     SeatRecord,
 )
-from server.recording.signature import RecordingSigning
-from server.recording.topics import CAMERA, MICROPHONE, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS
-from server.recording.writer import Entry, RecordingWriter
+from lockstep.server.recording.format.signature import RecordingSigning
+from lockstep.server.recording.format.topics import CAMERA, MICROPHONE, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS
+from lockstep.server.recording.writing.writer import Entry, RecordingWriter
 
 __all__ = ["CODECS", "DESCRIPTION", "EPOCH", "INFO", "SECOND", "START", "Story", "own_entry", "rewritten"]
 

@@ -12,13 +12,13 @@ import pyarrow.parquet as pq
 import pytest
 from foxglove_schemas_protobuf.RawAudio_pb2 import RawAudio
 
-from server.recording import export_csv, export_lerobot, export_mp4, export_parquet
-from server.recording.errors import RecordingDamaged
-from server.recording.foxglove import sound_message
-from server.recording.payload import sound_of
-from server.recording.reader import RecordingReader
-from server.recording.topics import CAMERA, MICROPHONE
-from server.recording.writer import RecordingWriter
+from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export import export_csv, export_lerobot, export_mp4, export_parquet
+from lockstep.server.recording.format.foxglove import sound_message
+from lockstep.server.recording.format.payload import sound_of
+from lockstep.server.recording.format.topics import CAMERA, MICROPHONE
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.writing.writer import RecordingWriter
 from tests.server.recording.makers import CODECS, DESCRIPTION, INFO, Story, rewritten
 
 EVENTS = 60

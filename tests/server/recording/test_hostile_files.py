@@ -11,21 +11,21 @@ import zstandard
 from mcap.records import Chunk
 from typer.testing import CliRunner
 
-from robot_bridge.protocol.console import Report, StreamReport
-from robot_bridge.protocol.description import Body, BodyJoint, Geofence, RangeRing
-from server.cli import app
-from server.recording import export_csv, export_mp4
-from server.recording.errors import RecordingDamaged
-from server.recording.event_index import MAX_MARKS, EventIndex, TopicEntry, decode_index
-from server.recording.info import RecordingInfo
-from server.recording.marks import Mark
-from server.recording.raw_records import HEAD, MAGIC, MAX_UNPACKED, chunk_records
-from server.recording.reader import FOOTER, RecordingReader
-from server.recording.records import ReportRecord, RobotRecord
-from server.recording.scan import scan_file
-from server.recording.topics import CAMERA
-from server.recording.verify_file import verify_file
-from server.recording.writer import Entry, RecordingWriter
+from lockstep.protocol.console import Report, StreamReport
+from lockstep.protocol.description import Body, BodyJoint, Geofence, RangeRing
+from lockstep.server.cli.main import app
+from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export import export_csv, export_mp4
+from lockstep.server.recording.format.event_index import MAX_MARKS, EventIndex, TopicEntry, decode_index
+from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.format.records import ReportRecord, RobotRecord
+from lockstep.server.recording.format.topics import CAMERA
+from lockstep.server.recording.reading.bookmarks import Mark
+from lockstep.server.recording.reading.raw_records import HEAD, MAGIC, MAX_UNPACKED, chunk_records
+from lockstep.server.recording.reading.reader import FOOTER, RecordingReader
+from lockstep.server.recording.reading.scan import scan_file
+from lockstep.server.recording.verify.verify_file import verify_file
+from lockstep.server.recording.writing.writer import Entry, RecordingWriter
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story, own_entry, rewritten
 
 RING = RangeRing(name="r", body="base", count=3, angle_min=0.0, angle_increment=0.1, range_min=0.1, range_max=4.0)

@@ -12,8 +12,8 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo as Mes
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.reader import make_reader
 
-from server.evidence.signer import Signer
-from server.recording.signature import RecordingSigning
+from lockstep.server.evidence.signer import Signer
+from lockstep.server.recording.format.signature import RecordingSigning
 from tests.server.recording.makers import Story
 
 EVENTS = 60

@@ -5,11 +5,11 @@ from itertools import product
 
 import pytest
 
-from robot_bridge.protocol.console import Role
-from server.errors import NotAllowed
-from server.recording.event_index import ChunkEntry, EventEntry, EventIndex
-from server.recording.marks import Mark
-from server.recording.rights import RecordingReaderRight, check_end
+from lockstep.protocol.console import Role
+from lockstep.server.errors import NotAllowed
+from lockstep.server.recording.format.event_index import ChunkEntry, EventEntry, EventIndex
+from lockstep.server.recording.reading.bookmarks import Mark
+from lockstep.server.recording.rights import RecordingReaderRight, check_end
 
 SECOND = 1_000_000  # µs
 

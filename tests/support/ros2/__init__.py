@@ -1,6 +1,7 @@
 """A ROS 2 robot for tests: a real node in a process of its own, over DDS on loopback."""
 
 import asyncio
+import os
 import platform
 import random
 import socket
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.processes import Running, running_process
+from lockstep.bench.processes import Running, running_process
 from tests.support.event_logs import whole_lines, written
 
 __all__ = [
@@ -59,7 +60,7 @@ def _ros_environment() -> dict[str, str]:
         "ROS_DOMAIN_ID": str(_free_domain()),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
-        "PYTHONPATH": str(ROOT),
+        "PYTHONPATH": os.pathsep.join(str(ROOT / part) for part in (".", "protocol", "robot_bridge")),
     }
 
 
@@ -142,7 +143,7 @@ class RosBridge:
 async def running_ros_bridge(directory: Path, robot: RosRobot, settings: Path) -> AsyncIterator[RosBridge]:
     """In the environment of the robot's ROS installation, which has nothing of the console's."""
     event_log = directory / "bridge.jsonl"
-    command = (ros_python(), "-m", "robot_bridge", "--ros2", str(settings), "--port", "0", "--json")
+    command = (ros_python(), "-m", "lockstep.robot_bridge", "--ros2", str(settings), "--port", "0", "--json")
     state = ("--state-dir", str(directory / "bridge-state"))
     async with running_process(*command, *state, "--event-log", str(event_log), environment=robot.environment) as (
         process,

@@ -27,7 +27,7 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image, JointState, LaserScan
 from trajectory_msgs.msg import JointTrajectory
 
-from robot_bridge.robots.event_strip import draw_event_strip
+from lockstep.robot_bridge.robots.event_strip import draw_event_strip
 
 JOINTS = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
 WIDTH, HEIGHT = 320, 240

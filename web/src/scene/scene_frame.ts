@@ -12,7 +12,7 @@ export interface SceneFrameEvents {
 /**
  * Lets the scene's changes through when their event is due. The scene is viser's own client, which knows nothing of
  * events; its frame has an origin that is nobody's, so neither side reaches into the other. A script in the frame
- * (server/scene_frame.js) keeps each change until it is told, and says when it was shown.
+ * (server/lockstep/server/scene/scene_frame.js) keeps each change until it is told, and says when it was shown.
  *
  * Returns what takes the listener away.
  */

@@ -182,7 +182,7 @@ export class SceneView {
   private embed(path: string): void {
     if (this.frameState !== "loading") return;
     resetSceneGate(this.gate);
-    // Whatever runs in there has an origin that is nobody's; the console says the same of it (server/security.py).
+    // Whatever runs in there has an origin that is nobody's; the console says the same of it (server/lockstep/server/http/security_headers.py).
     const attributes = { src: path, title: "3D scene of the robot", sandbox: "allow-scripts" };
     this.frame = h("iframe", "scene-frame", attributes);
     this.element.append(this.frame);

@@ -9,18 +9,18 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.messages import Media
-from robot_bridge.robots.event_strip import read_event_strip
-from robot_bridge.robots.micromanipulator.description import MICROPHONE, MICROSCOPE, SIDE
-from robot_bridge.robots.micromanipulator.microscope import Microscope
-from robot_bridge.robots.micromanipulator.needle import Contact
-from robot_bridge.robots.micromanipulator.robot import Micromanipulator, MicromanipulatorState
-from robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES
-from robot_bridge.robots.micromanipulator.side_view import SideView
-from robot_bridge.robots.micromanipulator.sound import SEGMENT_SAMPLES, Sound
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
+from lockstep.robot_bridge.robots.micromanipulator.description import MICROPHONE, MICROSCOPE, SIDE
+from lockstep.robot_bridge.robots.micromanipulator.microscope import Microscope
+from lockstep.robot_bridge.robots.micromanipulator.needle import Contact
+from lockstep.robot_bridge.robots.micromanipulator.robot import Micromanipulator, MicromanipulatorState
+from lockstep.robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES
+from lockstep.robot_bridge.robots.micromanipulator.side_view import SideView
+from lockstep.robot_bridge.robots.micromanipulator.sound import SEGMENT_SAMPLES, Sound
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import log_lines, operator
 
 Luma = npt.NDArray[np.int16]

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from robot_bridge.robots.micromanipulator.needle import FRICTION, STIFFNESS, TIP_RADIUS, Needle
-from robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES, Sample
+from lockstep.robot_bridge.robots.micromanipulator.needle import FRICTION, STIFFNESS, TIP_RADIUS, Needle
+from lockstep.robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES, Sample
 
 SOFT, _, FIRM = SAMPLES[:3]
 ABOVE = 50 * MICRO

@@ -2,11 +2,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from robot_bridge.check_description import check_description
-from robot_bridge.robots.micromanipulator import Micromanipulator, create
-from robot_bridge.robots.micromanipulator.description import DESCRIPTION, START, WINDOWS
-from robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES
-from robot_bridge.robots.micromanipulator.stepper import STEP
+from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.robots.micromanipulator import Micromanipulator, create
+from lockstep.robot_bridge.robots.micromanipulator.description import DESCRIPTION, START, WINDOWS
+from lockstep.robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES
+from lockstep.robot_bridge.robots.micromanipulator.stepper import STEP
 
 REST = [0.0] * 5
 

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_bridge.robots.micromanipulator.stepper import STEP, Stepper
+from lockstep.robot_bridge.robots.micromanipulator.stepper import STEP, Stepper
 
 TICK = 0.004
 

@@ -6,11 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.robots.mjcf.bodies import bodies_of
-from robot_bridge.robots.mjcf.joints import joints_of
-from robot_bridge.robots.mjcf.model_file import load_model
-from server.kinematics import scene_paths, world_positions
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.mjcf.bodies import bodies_of
+from lockstep.robot_bridge.robots.mjcf.joints import joints_of
+from lockstep.robot_bridge.robots.mjcf.model_file import load_model
+from lockstep.server.scene.kinematics import scene_paths, world_positions
 from tests.robot_bridge.robots.mjcf.models import EXAMPLE, model_file
 
 ODD = """<mujoco><compiler angle="radian" autolimits="true"/><worldbody><geom type="plane" size="0 0 1"/>

@@ -6,9 +6,9 @@ from typing import Any
 import mujoco
 import pytest
 
-from robot_bridge.robots.mjcf.actuators import Kind, actuators_of
-from robot_bridge.robots.mjcf.drives import Drive, drives_of
-from robot_bridge.robots.mjcf.model_file import load_model
+from lockstep.robot_bridge.robots.mjcf.actuators import Kind, actuators_of
+from lockstep.robot_bridge.robots.mjcf.drives import Drive, drives_of
+from lockstep.robot_bridge.robots.mjcf.model_file import load_model
 from tests.robot_bridge.robots.mjcf.models import model_file, one_joint
 
 SECONDS = 0.004

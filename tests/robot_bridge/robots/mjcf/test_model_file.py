@@ -3,9 +3,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from robot_bridge import cli
-from robot_bridge.errors import ModelError
-from robot_bridge.robots.mjcf.model_file import load_model
+from lockstep.robot_bridge import cli
+from lockstep.robot_bridge.errors import ModelError
+from lockstep.robot_bridge.robots.mjcf.model_file import load_model
 from tests.robot_bridge.robots.mjcf.models import ARM, EXAMPLE, model_file, one_joint
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.check_description import check_description
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.messages import Media
-from robot_bridge.robots.mjcf import create
-from robot_bridge.robots.mjcf.robot import MjcfRobot
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.robots.mjcf import create
+from lockstep.robot_bridge.robots.mjcf.robot import MjcfRobot
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import log_lines, operator
 from tests.robot_bridge.robots.mjcf.models import ARM, EXAMPLE, model_file
 

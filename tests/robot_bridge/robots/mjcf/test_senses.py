@@ -5,8 +5,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from robot_bridge.robots.mjcf.model_file import load_model
-from robot_bridge.robots.mjcf.senses import WrenchSense, range_sense, wrench_sense
+from lockstep.robot_bridge.robots.mjcf.model_file import load_model
+from lockstep.robot_bridge.robots.mjcf.senses import WrenchSense, range_sense, wrench_sense
 from tests.robot_bridge.robots.mjcf.models import EXAMPLE, model_file, one_joint
 
 SERVO = '<position joint="j" kp="2000" kv="100"/>'

@@ -2,8 +2,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from robot_bridge.robots.mobile_manipulator import create
-from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
+from lockstep.robot_bridge.robots.mobile_manipulator import create
+from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
 
 

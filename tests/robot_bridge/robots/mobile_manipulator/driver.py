@@ -3,8 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from robot_bridge.robots.base import Measurement
-from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
+from lockstep.robot_bridge.robots.base import Measurement
+from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
 
 __all__ = ["Driver"]
 

@@ -5,8 +5,8 @@ import math
 import mujoco
 import pytest
 
-from robot_bridge.robots.mobile_manipulator.arm_drive import STEADY, ArmDrive
-from robot_bridge.robots.mobile_manipulator.simulation import ARM, Simulation
+from lockstep.robot_bridge.robots.mobile_manipulator.arm_drive import STEADY, ArmDrive
+from lockstep.robot_bridge.robots.mobile_manipulator.simulation import ARM, Simulation
 
 UP = (0.0, 0.0, 0.1, 0.0, 0.0, 0.0)
 DOWN = tuple(-speed for speed in UP)

@@ -2,8 +2,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from robot_bridge.robots.mobile_manipulator.contact_sense import ContactSense
-from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
+from lockstep.robot_bridge.robots.mobile_manipulator.contact_sense import ContactSense
+from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
 
 

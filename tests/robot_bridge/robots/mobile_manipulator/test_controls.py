@@ -1,7 +1,7 @@
 import pytest
 
-from robot_bridge.protocol.description import Binding, ControlLayer
-from robot_bridge.robots.mobile_manipulator.controls import AXES, LAYERS
+from lockstep.protocol.description import Binding, ControlLayer
+from lockstep.robot_bridge.robots.mobile_manipulator.controls import AXES, LAYERS
 
 RESERVED = {"Space", "Escape", "Backspace", "Tab", "Enter"}  # deadman, stop, layer, arm
 

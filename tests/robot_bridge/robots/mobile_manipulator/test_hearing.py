@@ -1,7 +1,7 @@
 import numpy as np
 
-from robot_bridge.robots.mobile_manipulator.contact_sense import ContactReading
-from robot_bridge.robots.mobile_manipulator.hearing import Heard, Hearing
+from lockstep.robot_bridge.robots.mobile_manipulator.contact_sense import ContactReading
+from lockstep.robot_bridge.robots.mobile_manipulator.hearing import Heard, Hearing
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from robot_bridge.check_description import check_description
-from robot_bridge.protocol.description import Body, RobotDescription
-from robot_bridge.protocol.framing import MAX_CONTROL_FRAME
-from robot_bridge.protocol.messages import Hello, encode_message
-from robot_bridge.robots.mobile_manipulator.description import describe
-from robot_bridge.robots.mobile_manipulator.simulation import Simulation
+from lockstep.protocol.description import Body, RobotDescription
+from lockstep.protocol.framing import MAX_CONTROL_FRAME
+from lockstep.protocol.messages import Hello, encode_message
+from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.robots.mobile_manipulator.description import describe
+from lockstep.robot_bridge.robots.mobile_manipulator.simulation import Simulation
 
 Matrix = npt.NDArray[np.float64]
 

@@ -5,11 +5,11 @@ import math
 import msgspec
 import pytest
 
-from robot_bridge.axis_shaper import AxisShaper
-from robot_bridge.check_description import check_description
-from robot_bridge.motion_limits import MotionLimits
-from robot_bridge.protocol.description import RobotDescription
-from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.control.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.motion_limits import MotionLimits
+from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
 
 
 class Limited:

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from robot_bridge.protocol.messages import Media
-from robot_bridge.robots.base import MediaSource, Stamp
-from robot_bridge.robots.microphone_source import SEGMENT_SECONDS
-from robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE
-from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
-from robot_bridge.robots.mujoco_view.renderer import Renderer
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.robots.base import MediaSource, Stamp
+from lockstep.robot_bridge.robots.microphone_source import SEGMENT_SECONDS
+from lockstep.robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE
+from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
+from lockstep.robot_bridge.robots.mujoco_view.renderer import Renderer
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
 from tests.robot_bridge.robots.stamping import Stamping
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.bridge import Bridge
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.messages import Media
-from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
-from robot_bridge.settings import BridgeSettings
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import log_lines, operator
 
 EVENTS = 40

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from robot_bridge.robots.mobile_manipulator.range_ring import RING
+from lockstep.robot_bridge.robots.mobile_manipulator.range_ring import RING
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from robot_bridge.robots.mobile_manipulator.resolved_rates import ResolvedRates
+from lockstep.robot_bridge.robots.mobile_manipulator.resolved_rates import ResolvedRates
 
 Array = npt.NDArray[np.float64]
 JOINTS = 6

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
+from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
 from tests.robot_bridge.robots.mobile_manipulator.driver import Driver
 
 INNER_WALLS = ((-2.5, 3.5), (-2.7, 2.7))  # m, in x and y

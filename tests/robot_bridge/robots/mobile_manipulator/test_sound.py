@@ -2,8 +2,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from robot_bridge.robots.mobile_manipulator.hearing import Heard
-from robot_bridge.robots.mobile_manipulator.sound import Sound
+from lockstep.robot_bridge.robots.mobile_manipulator.hearing import Heard
+from lockstep.robot_bridge.robots.mobile_manipulator.sound import Sound
 
 RATE, SAMPLES = 48_000, 960
 QUIET = Heard()

@@ -3,14 +3,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from robot_bridge.robots.mujoco_view.graphics import choose_graphics
+from lockstep.robot_bridge.robots.mujoco_view.graphics import choose_graphics
 
 choose_graphics()
 
 import mujoco  # noqa: E402
 from OpenGL import GL  # noqa: E402
 
-from robot_bridge.robots.mujoco_view.canvas import Canvas  # noqa: E402
+from lockstep.robot_bridge.robots.mujoco_view.canvas import Canvas  # noqa: E402
 
 MODEL = """
 <mujoco>

@@ -5,8 +5,8 @@ import sys
 import pytest
 
 PROGRAM = """
-from robot_bridge.errors import RobotUnavailable
-from robot_bridge.robots.registry import create_robot
+from lockstep.robot_bridge.errors import RobotUnavailable
+from lockstep.robot_bridge.robots.registry import create_robot
 try:
     create_robot("mobile-manipulator")
 except RobotUnavailable as error:
@@ -52,6 +52,6 @@ def test_without_opengl_it_says_what_to_install_and_what_runs_anyway(program: st
 
 
 def test_egl_is_chosen_unless_the_environment_chooses() -> None:
-    program = "import os, robot_bridge.robots.mobile_manipulator; print(os.environ['MUJOCO_GL'])"
+    program = "import os, lockstep.robot_bridge.robots.mobile_manipulator; print(os.environ['MUJOCO_GL'])"
     assert run(f"import os; os.environ.pop('MUJOCO_GL', None); {program}").strip() == "egl"
     assert run(program, MUJOCO_GL="osmesa").strip() == "osmesa"

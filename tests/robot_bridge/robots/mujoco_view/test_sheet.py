@@ -2,7 +2,7 @@ import av
 import numpy as np
 import pytest
 
-from robot_bridge.robots.mujoco_view.sheet import Sheet
+from lockstep.robot_bridge.robots.mujoco_view.sheet import Sheet
 
 
 @pytest.mark.parametrize(("width", "height"), [(640, 480), (320, 240), (100, 62), (66, 50)])

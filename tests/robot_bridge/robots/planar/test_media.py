@@ -5,13 +5,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from robot_bridge.protocol.messages import Media
-from robot_bridge.robots.base import MediaSource, Stamp
-from robot_bridge.robots.event_strip import read_event_strip
-from robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW
-from robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
-from robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
-from robot_bridge.robots.planar.sound import SEGMENT_SAMPLES, TONE_HZ, Synthesiser
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.robots.base import MediaSource, Stamp
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW
+from lockstep.robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
+from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
+from lockstep.robot_bridge.robots.planar.sound import SEGMENT_SAMPLES, TONE_HZ, Synthesiser
 from tests.robot_bridge.robots.stamping import Stamping
 
 EVENT = 123_456_789

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_bridge.robots.planar.description import DESCRIPTION, RADIUS, RANGES
-from robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
-from robot_bridge.robots.planar.room import HALF_LENGTH, HALF_WIDTH, PILLARS
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION, RADIUS, RANGES
+from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
+from lockstep.robot_bridge.robots.planar.room import HALF_LENGTH, HALF_WIDTH, PILLARS
 
 
 def drive(robot: PlanarRobot, values: list[float], seconds: float) -> None:

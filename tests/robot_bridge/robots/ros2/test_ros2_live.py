@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.processes import running_process
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.messages import Command, Feedback, Media, Rest, Stop
-from robot_bridge.protocol.serial import event_after
-from robot_bridge.robots.event_strip import read_event_strip
+from lockstep.bench.processes import running_process
+from lockstep.protocol.messages import Command, Feedback, Media, Rest, Stop
+from lockstep.protocol.serial import event_after
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from tests.robot_bridge.bridge_helpers import Operator
 from tests.support.ros2 import (
     EXAMPLES,

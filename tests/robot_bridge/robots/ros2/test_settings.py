@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.errors import SettingsError
-from robot_bridge.robots.ros2 import read_settings
+from lockstep.robot_bridge.errors import SettingsError
+from lockstep.robot_bridge.robots.ros2 import read_settings
 
 EXAMPLES = Path(__file__).parents[4] / "docs" / "examples" / "ros2"
 

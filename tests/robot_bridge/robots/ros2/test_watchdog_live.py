@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from bench.processes import Running, running_process
-from robot_bridge.link_client import RobotLink
-from robot_bridge.protocol.errors import LinkError
-from robot_bridge.protocol.messages import Feedback
+from lockstep.bench.processes import Running, running_process
+from lockstep.protocol.errors import LinkError
+from lockstep.protocol.messages import Feedback
+from lockstep.robot_bridge.link.link_client import RobotLink
 from tests.robot_bridge.bridge_helpers import Operator
 from tests.support.ros2 import EXAMPLES, PATIENCE, STAY, RosRobot, have_ros, ros_python, running_ros_robot
 
@@ -26,7 +26,7 @@ GO = [0.4, 0.3]
 A_BRIDGE = """
 import ctypes, os, sys, time
 hang, how, settings, state = sys.argv[1:5]
-from robot_bridge.robots.ros2 import base_drive, robot
+from lockstep.robot_bridge.robots.ros2 import base_drive, robot
 
 class Robot(robot.Ros2Robot):
     def __init__(self, *arguments):
@@ -49,7 +49,7 @@ class Drive(base_drive.BaseDrive):
 
 robot.Ros2Robot, robot.BaseDrive = Robot, Drive
 sys.argv[1:] = ["--ros2", settings, "--port", "0", "--json", "--state-dir", state]
-from robot_bridge.cli import main
+from lockstep.robot_bridge.cli import main
 main()
 """
 

@@ -11,9 +11,9 @@ import numpy as np
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription, VideoStreamTrack
 from aiortc.rtcrtpsender import RTCRtpSender
 
-from robot_bridge.robots.event_strip import draw_event_strip
-from server.media.published.camera_spec import parse_published
-from server.media.sources.source_url import SourceSpec
+from lockstep.robot_bridge.robots.event_strip import draw_event_strip
+from lockstep.server.media.published.camera_spec import parse_published
+from lockstep.server.media.sources.source_url import SourceSpec
 
 __all__ = ["NumberedPictures", "TestPublisher", "camera"]
 

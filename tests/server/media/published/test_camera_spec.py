@@ -1,8 +1,8 @@
 import pytest
 
-from server.media.published.camera_spec import parse_published
-from server.media.sources.source_url import BadSource
-from server.settings import Settings
+from lockstep.server.media.published.camera_spec import parse_published
+from lockstep.server.media.sources.source_url import BadSource
+from lockstep.server.settings import Settings
 
 
 def test_a_name_is_enough_and_options_are_those_of_other_cameras() -> None:

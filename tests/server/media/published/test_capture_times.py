@@ -4,10 +4,10 @@ import random
 
 import pytest
 
-from server.media.published.incoming_pictures import MAX_BURST, MOST_LAG, IncomingPictures
-from server.media.published.path_bound import PathBound
-from server.media.published.picture_assembly import MediaPacket
-from server.media.sources.capture_timeline import DRIFT
+from lockstep.server.media.published.incoming_pictures import MAX_BURST, MOST_LAG, IncomingPictures
+from lockstep.server.media.published.path_bound import PathBound
+from lockstep.server.media.published.picture_assembly import MediaPacket
+from lockstep.server.media.sources.capture_timeline import DRIFT
 
 KEYFRAME = b"\x10\x00"  # VP8, in one packet; the picture's number follows
 AT_PUBLISHER = 0.12  # s from capture until the quickest leaves

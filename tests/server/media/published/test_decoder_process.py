@@ -7,12 +7,12 @@ import av
 import numpy as np
 import pytest
 
-from server.media.picture_encoder import create_picture_encoder
-from server.media.published.decoder_process import MAX_RATE, PublishedPictures
-from server.media.published.depacketise import PictureCodec
-from server.media.published.encoded_wire import Encoded, encode_picture, read_picture
-from server.media.sources.source_url import SourceSpec
-from server.media.sources.source_wire import Captured, Said, Trouble, Working
+from lockstep.server.media.codecs.picture_encoder import create_picture_encoder
+from lockstep.server.media.published.decoder_process import MAX_RATE, PublishedPictures
+from lockstep.server.media.published.depacketise import PictureCodec
+from lockstep.server.media.published.encoded_wire import Encoded, encode_picture, read_picture
+from lockstep.server.media.sources.source_url import SourceSpec
+from lockstep.server.media.sources.source_wire import Captured, Said, Trouble, Working
 from tests.server.media.published.publishing import camera
 
 CODECS: tuple[PictureCodec, ...] = ("H264", "VP8")

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtc.rtp.payloads import PayloadError
-from server.media.packetise import packetise_h264, packetise_vp8
-from server.media.published.depacketise import PictureCodec, begins_picture, is_keyframe, join_payloads
+from lockstep.rtc.rtp.payloads import PayloadError
+from lockstep.server.media.codecs.packetise import packetise_h264, packetise_vp8
+from lockstep.server.media.published.depacketise import PictureCodec, begins_picture, is_keyframe, join_payloads
 
 CODE = b"\x00\x00\x00\x01"
 SPS, PPS, IDR, SLICE, DELIMITER = b"\x67abc", b"\x68d", b"\x65" + bytes(range(1, 200)) * 20, b"\x41efg", b"\x09\xf0"

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from server.media.packetise import packetise_h264, packetise_vp8
-from server.media.published.depacketise import PictureCodec
-from server.media.published.picture_assembly import (
+from lockstep.server.media.codecs.packetise import packetise_h264, packetise_vp8
+from lockstep.server.media.published.depacketise import PictureCodec
+from lockstep.server.media.published.picture_assembly import (
     CAPACITY,
     MOST_PATIENCE,
     AssembledPicture,

@@ -1,5 +1,5 @@
-from server.media.published.published_camera import PublishedCamera
-from server.media.sources.source_wire import Captured
+from lockstep.server.media.published.published_camera import PublishedCamera
+from lockstep.server.media.sources.source_wire import Captured
 from tests.server.media.published.publishing import camera
 
 PICTURE = Captured("yuv420p", 1.0, b"x", 16, 16)

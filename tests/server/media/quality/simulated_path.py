@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from server.media.quality.path import PathController, RateLimits
+from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits
 
 STEP = 0.01  # s
 DECIDE = 0.1
@@ -38,7 +38,7 @@ class SimulatedPath:
 
     def run(self, seconds: float) -> "Course":
         draw = random.Random(self.seed)
-        path = PathController(self.limits, 0.0)
+        path = BandwidthEstimator(self.limits, 0.0)
         course = Course(path)
         queue = octets = 0.0  # bits, bytes
         lost = expected = 0.0
@@ -93,7 +93,7 @@ class SimulatedPath:
 class Course:
     """How it went, ten times a second."""
 
-    path: PathController
+    path: BandwidthEstimator
     times: list[float] = field(default_factory=list)
     rates: list[float] = field(default_factory=list)
     queues: list[float] = field(default_factory=list)  # s

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.media.quality.budget import FLOOR_BPS, CameraNeed, share_out
+from lockstep.server.media.quality.budget import FLOOR_BPS, CameraNeed, share_out
 
 MAIN, WRIST = CameraNeed(640 * 480 * 30, 800_000), CameraNeed(320 * 240 * 15, 800_000)
 

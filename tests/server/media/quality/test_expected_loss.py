@@ -1,7 +1,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.media.quality.expected_loss import PATIENCE, STEPS, ExpectedLoss
+from lockstep.server.media.quality.expected_loss import PATIENCE, STEPS, ExpectedLoss
 
 
 def test_more_loss_is_expected_at_once() -> None:

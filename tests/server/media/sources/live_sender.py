@@ -10,7 +10,7 @@ from typing import Any
 import av
 import numpy as np
 
-from robot_bridge.robots.event_strip import draw_event_strip
+from lockstep.robot_bridge.robots.event_strip import draw_event_strip
 
 __all__ = ["LiveSender"]
 

@@ -7,8 +7,8 @@ import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from server.media.h264 import START_CODE, inspect
-from server.media.packetise import packetise_h264, split_nal_units
+from lockstep.server.media.codecs.h264 import START_CODE, inspect
+from lockstep.server.media.codecs.packetise import packetise_h264, split_nal_units
 from tests.server.media.camera_h264 import access_units
 
 __all__ = ["RtspCamera", "running_camera", "slices_of"]

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from server.media.sources import attached_source
-from server.media.sources.attached_source import COMMAND, AttachedSource
-from server.media.sources.source_url import parse_source
-from server.media.sources.source_wire import Captured
+from lockstep.server.media.sources import attached_source
+from lockstep.server.media.sources.attached_source import COMMAND, AttachedSource
+from lockstep.server.media.sources.source_url import parse_source
+from lockstep.server.media.sources.source_wire import Captured
 from tests.server.media.sources.media_files import film
 
 PATIENCE = 20.0

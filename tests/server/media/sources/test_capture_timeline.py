@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.media.sources.capture_timeline import DRIFT, CaptureTimeline
+from lockstep.server.media.sources.capture_timeline import DRIFT, CaptureTimeline
 
 
 def test_without_a_time_of_its_own_a_medium_is_placed_by_its_arrival() -> None:

@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from prometheus_client import CollectorRegistry
 
-from bench.browsers.sound_card import running_sound_card
-from robot_bridge.bridge import Bridge
-from robot_bridge.protocol.messages import Media
-from robot_bridge.robots.planar import create
-from robot_bridge.settings import BridgeSettings
-from server.event_clock import EventClock
-from server.media.sources.desk import SourceDesk
-from server.media.sources.source_url import parse_source
+from lockstep.bench.browsers.sound_card import running_sound_card
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.robots.planar import create
+from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.server.event_clock import EventClock
+from lockstep.server.media.sources.source_manager import SourceManager
+from lockstep.server.media.sources.source_url import parse_source
 from tests.robot_bridge.bridge_helpers import log_lines, operator
 from tests.server.media.sources.media_files import film, tone
 from tests.server.media.sources.rtsp_server import running_camera, slices_of
@@ -87,7 +87,7 @@ async def test_no_medium_of_an_attached_source_is_stamped_newer_than_the_truth(
         attached = await stack.enter_async_context(attach(tmp_path, monkeypatch))
         plane = Plane(attached.captured)
         specs = [parse_source("video" if attached.kind == "video" else "audio", text) for text in attached.texts]
-        desk = SourceDesk(specs, clock, plane, CollectorRegistry(), lambda _: None)
+        desk = SourceManager(specs, clock, plane, CollectorRegistry(), lambda _: None)
         async with Bridge(create(), BridgeSettings(port=0, event_log=log)) as bridge, operator(bridge) as driver:
             clock.begin(bridge.epoch)
             clock.observe(driver.feedback, time.monotonic())

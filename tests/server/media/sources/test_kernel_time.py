@@ -13,11 +13,11 @@ from typing import Any
 import av
 import pytest
 
-from server.media.sources import picture_source
-from server.media.sources.opening import kernel_time
-from server.media.sources.picture_source import read_pictures
-from server.media.sources.source_url import SourceSpec, parse_source
-from server.media.sources.source_wire import Captured
+from lockstep.server.media.sources import picture_source
+from lockstep.server.media.sources.opening import kernel_time
+from lockstep.server.media.sources.picture_source import read_pictures
+from lockstep.server.media.sources.source_url import SourceSpec, parse_source
+from lockstep.server.media.sources.source_wire import Captured
 from tests.server.media.sources.media_files import film
 
 MICROSECONDS = Fraction(1, 1_000_000)  # of V4L2's stream

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.browsers.sound_card import running_sound_card, tone_level
-from server.media.pulse import PulseStream
-from server.media.sources.attached_source import AttachedSource
-from server.media.sources.source_url import parse_source
-from server.media.sources.source_wire import Captured
+from lockstep.bench.browsers.sound_card import running_sound_card, tone_level
+from lockstep.server.media.pulse_audio import PulseStream
+from lockstep.server.media.sources.attached_source import AttachedSource
+from lockstep.server.media.sources.source_url import parse_source
+from lockstep.server.media.sources.source_wire import Captured
 from tests.server.media.sources.media_files import tone
 
 

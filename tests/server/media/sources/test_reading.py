@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from server.media.h264 import inspect
-from server.media.sources.errors import reason_of
-from server.media.sources.reader import read_source
-from server.media.sources.source_url import parse_source
-from server.media.sources.source_wire import Captured, Said, Trouble, Working
+from lockstep.server.media.codecs.h264 import inspect
+from lockstep.server.media.sources.errors import reason_of
+from lockstep.server.media.sources.reader import read_source
+from lockstep.server.media.sources.source_url import parse_source
+from lockstep.server.media.sources.source_wire import Captured, Said, Trouble, Working
 from tests.server.media.sources.media_files import film, tone
 
 

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from server.media.h264 import inspect
+from lockstep.server.media.codecs.h264 import inspect
 from tests.server.media.sources.rtsp_server import running_camera
 from tests.server.media.sources.test_attached_source import watching
 

@@ -1,6 +1,6 @@
 import pytest
 
-from server.media.sources.source_url import BadSource, SourceSpec, parse_source, parse_sources
+from lockstep.server.media.sources.source_url import BadSource, SourceSpec, parse_source, parse_sources
 
 
 def test_a_source_without_options_gets_a_name_and_the_latency_of_its_kind() -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_bridge.protocol.console import Sources, Welcome
+from lockstep.protocol.console import Sources, Welcome
 from tests.server.media.sources.media_files import film, tone
 from tests.server.rig import eventually, running_rig
 
@@ -42,7 +42,7 @@ async def test_attached_media_come_after_the_robots_and_their_state_is_told(tmp_
 def test_bad_sources_are_refused_at_the_start_without_a_word_of_their_password() -> None:
     from pydantic import ValidationError
 
-    from server.settings import Settings
+    from lockstep.server.settings import Settings
 
     for given in ({"cameras": ("rtsp:geheim",)}, {"microphones": "x=v4l2:/dev/video0"}):
         with pytest.raises(ValidationError) as caught:

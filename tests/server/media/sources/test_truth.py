@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from bench.free_port import free_port
-from client import Console
+from lockstep.bench.free_port import free_port
+from lockstep.client import Console
 from tests.server.media.numbered_pictures import OF_USE, events_behind, shown_while_driving
 from tests.server.media.sources.live_sender import LiveSender
 from tests.support.stack import running_stack

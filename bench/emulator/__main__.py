@@ -1,3 +1,0 @@
-from bench.emulator.cli import main
-
-main()

@@ -1,0 +1,3 @@
+from lockstep.bench.cli import main
+
+main()

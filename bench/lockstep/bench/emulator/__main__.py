@@ -1,0 +1,3 @@
+from lockstep.bench.emulator.cli import main
+
+main()

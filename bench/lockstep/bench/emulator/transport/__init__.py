@@ -1,0 +1,1 @@
+"""Relays through which UDP, TCP, HTTP and WebSockets pass a path."""

@@ -1,0 +1,86 @@
+"""All paths between one client and the console. No I/O."""
+
+from collections import OrderedDict
+from collections.abc import Hashable
+
+from lockstep.bench.emulator.impairment.bottleneck import Bottleneck
+from lockstep.bench.emulator.impairment.outages import Outages
+from lockstep.bench.emulator.impairment.packets import Kind
+from lockstep.bench.emulator.impairment.path import ImpairedPath, PathStatistics
+from lockstep.bench.emulator.impairment.profile import DIRECTIONS, Direction, Profile, TwoWay
+from lockstep.bench.emulator.transport.stream_path import StreamPath
+
+__all__ = ["ClientPaths", "SignallingPaths"]
+
+IP_UDP_BYTES = 28  # headers that a bottleneck sends too
+KEPT = 1000  # connections
+
+
+class ClientPaths:
+    """For each direction and kind of packet a path of its own, behind one bottleneck each way.
+
+    A STUN check meets what control meets, but with random numbers of its own: how many checks ICE makes depends on its
+    timers and must not shift the fate of commands.
+    """
+
+    def __init__(self, profile: Profile, seed: str, outages: Outages) -> None:
+        self.bottlenecks: dict[Direction, Bottleneck] = {}
+        self.paths: dict[tuple[Kind, Direction], ImpairedPath] = {}
+        self._outages = outages
+        kinds: dict[Kind, TwoWay] = {"stun": profile.control, "control": profile.control, "media": profile.media}
+        for direction in DIRECTIONS:
+            settings = profile.bottleneck(direction)
+            if settings is not None:
+                self.bottlenecks[direction] = Bottleneck(settings.rate, settings.queue)
+            for kind, path in kinds.items():
+                self.paths[kind, direction] = ImpairedPath(
+                    path.towards(direction), f"{seed} {kind} {direction}", self.bottlenecks.get(direction), outages
+                )
+
+    def admit(self, kind: Kind, direction: Direction, now: float, size: int) -> float | None:
+        """When a datagram arrives; None when it never does. The first one starts the schedule of outages."""
+        if not self._outages.started:
+            self._outages.start(now)
+        return self.paths[kind, direction].admit(now, size + IP_UDP_BYTES)
+
+
+class SignallingPaths:
+    """HTTP: each connection keeps its own order, and all share a bottleneck each way.
+
+    It is not the bottleneck of media and control: what TCP and they do to each other is not emulated.
+    """
+
+    def __init__(self, profile: Profile, seed: str, outages: Outages) -> None:
+        self.statistics: dict[Direction, PathStatistics] = {each: PathStatistics() for each in DIRECTIONS}
+        self._profile = profile
+        self._seed = seed
+        self._outages = outages
+        self._count = 0
+        self._connections: OrderedDict[Hashable, dict[Direction, StreamPath]] = OrderedDict()
+        self._bottlenecks = {
+            direction: Bottleneck(settings.rate)
+            for direction in DIRECTIONS
+            if (settings := profile.bottleneck(direction)) is not None
+        }
+
+    def of(self, connection: Hashable) -> dict[Direction, StreamPath]:
+        """Its two directions; `connection` is what tells it from others."""
+        found = self._connections.get(connection)
+        if found is None:
+            self._count += 1
+            found = self._connections[connection] = {direction: self._path(direction) for direction in DIRECTIONS}
+            if len(self._connections) > KEPT:
+                self._connections.popitem(last=False)
+        return found
+
+    def _path(self, direction: Direction) -> StreamPath:
+        back: Direction = "to_robot" if direction == "to_operator" else "to_operator"
+        path = StreamPath(
+            self._profile.signalling.towards(direction),
+            f"{self._seed} signalling {self._count} {direction}",
+            back=self._profile.signalling.towards(back).delay.mean,
+            bottleneck=self._bottlenecks.get(direction),
+            outages=self._outages,
+        )
+        path.statistics = self.statistics[direction]
+        return path

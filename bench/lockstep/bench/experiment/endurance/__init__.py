@@ -1,0 +1,1 @@
+"""Sessions of hours: whether the console gives one up by itself."""

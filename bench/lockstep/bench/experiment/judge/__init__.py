@@ -1,0 +1,1 @@
+"""What runs come to: measures, tables, figures."""

@@ -1,0 +1,78 @@
+"""What a run saw: at the robot, and at each client. Times are in s on this machine's monotonic clock. No I/O."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from lockstep.client.control.command_gate import Pacing
+from lockstep.client.media.media_gate import GateMode
+
+__all__ = ["Arrival", "ClientRecord", "Rendered", "RobotRecord", "Run", "fresh"]
+
+
+class Arrival(NamedTuple):
+    """A feedback at a client, or an event executed at the robot."""
+
+    at: float
+    event: int
+
+
+class Rendered(NamedTuple):
+    """A picture or a segment of sound that passed the gate."""
+
+    at: float
+    stamp: int | None
+    gap: int | None
+    feedback: int | None
+    age: float | None  # s since its capture
+
+
+@dataclass
+class RobotRecord:
+    """From the bridge's own log."""
+
+    executed: list[Arrival] = field(default_factory=list)
+    answered: list[Arrival] = field(default_factory=list)  # the first feedback of each event
+    captured: dict[str, list[Arrival]] = field(default_factory=dict)  # by stream
+
+
+@dataclass
+class ClientRecord:
+    """One client: its kind, its renderings, its statistics."""
+
+    name: str
+    kind: str  # "headless" or "chromium"
+    gate: GateMode
+    pacing: Pacing
+    drives: bool
+    tolerance: int
+    feedbacks: list[Arrival] = field(default_factory=list)
+    rendered: dict[str, list[Rendered]] = field(default_factory=dict)  # by stream
+    statistics_before: dict[str, Any] = field(default_factory=dict)  # as the client gives them, when the run begins
+    statistics: dict[str, Any] = field(default_factory=dict)  # when it ends
+    drawn_right: int = 0  # pictures whose pixels show the event that their stamp says
+    drawn_wrong: int = 0
+    drawn_unreadable: int = 0
+    lost: str = ""  # why the connection ended before the run did
+
+
+@dataclass
+class Run:
+    """Everything of one run."""
+
+    began: float
+    ended: float
+    robot: RobotRecord
+    clients: list[ClientRecord]
+    cameras: list[str]  # names, the main one first
+    microphones: list[str]
+    network: dict[str, Any] = field(default_factory=dict)  # the emulator's counts
+
+    @property
+    def operator(self) -> ClientRecord:
+        return next(client for client in self.clients if client.drives)
+
+
+def fresh(newest: float, entries: Sequence[Any]) -> list[Any]:
+    """Those of a log's entries that came after `newest`: it keeps the last thousand and is read repeatedly."""
+    return [entry for entry in entries if entry.at > newest]

@@ -1,0 +1,53 @@
+"""Reads a client's logs while a run goes on: they keep only the newest entries."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any, NamedTuple
+
+from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Rendered, fresh
+
+__all__ = ["Look", "Observation"]
+
+INTERVAL = 1.0  # s between two looks; logs keep a thousand entries, the fastest stream has 50 a second
+
+
+class Look(NamedTuple):
+    """What a client says at one moment, times on this machine's monotonic clock."""
+
+    feedbacks: Sequence[Arrival]
+    rendered: dict[str, Sequence[Rendered]]
+    statistics: dict[str, Any]
+
+
+class Observation:
+    """`begin`, then `run` until cancelled, then `end`."""
+
+    def __init__(self, record: ClientRecord, look: Callable[[], Awaitable[Look]]) -> None:
+        self._record = record
+        self._look = look
+
+    async def begin(self) -> None:
+        """What happened before does not count."""
+        look = await self._look()
+        self._record.statistics_before = look.statistics
+        self._take(look)
+        self._record.feedbacks[:-1] = []  # the newest event is where the run begins
+        for entries in self._record.rendered.values():
+            entries[:-1] = []  # the picture on screen as well
+
+    async def run(self) -> None:
+        while True:
+            await asyncio.sleep(INTERVAL)
+            self._take(await self._look())
+
+    async def end(self) -> None:
+        look = await self._look()
+        self._take(look)
+        self._record.statistics = look.statistics
+
+    def _take(self, look: Look) -> None:
+        record = self._record
+        record.feedbacks += fresh(record.feedbacks[-1].at if record.feedbacks else float("-inf"), look.feedbacks)
+        for stream, entries in look.rendered.items():
+            known = record.rendered.setdefault(stream, [])
+            known += fresh(known[-1].at if known else float("-inf"), entries)

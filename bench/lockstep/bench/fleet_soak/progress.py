@@ -1,0 +1,40 @@
+"""Whether a robot's events went on: no number left out, and how long the longest pause was. No I/O."""
+
+from collections.abc import Iterable
+
+from lockstep.bench.fleet_soak.records import Record
+
+__all__ = ["Progress"]
+
+
+class Progress:
+    """Reads a bridge's records in order, over any number of its lives.
+
+    Within a life the driver drives all the time, so every pause is a disturbance; between two lives there is no robot.
+
+    Attributes:
+        skipped: events whose number did not follow the one before
+        longest_pause: s between two events of one life
+        pause_ended: when that pause was over, on the clock of the record
+    """
+
+    def __init__(self) -> None:
+        self.skipped = 0
+        self.longest_pause = 0.0
+        self.pause_ended = 0.0
+        self._last: tuple[int, float] | None = None  # event and time; None: this life has none yet
+
+    def read(self, records: Iterable[Record]) -> None:
+        for record in records:
+            if record["kind"] == "start":
+                self._last = None
+            elif record["kind"] == "executed":
+                self._executed(record["event"], record["time"])
+
+    def _executed(self, event: int, time: float) -> None:
+        if self._last is not None:
+            number, before = self._last
+            self.skipped += event != number + 1  # no run is long enough for the counter to wrap
+            if time - before > self.longest_pause:
+                self.longest_pause, self.pause_ended = time - before, time
+        self._last = (event, time)

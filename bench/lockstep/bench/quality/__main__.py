@@ -1,0 +1,3 @@
+from lockstep.bench.quality.cli import app
+
+app()

@@ -1,0 +1,69 @@
+"""What a recording costs the operator: command to feedback with the recorder off and on, taken in turns in one run."""
+
+import httpx
+
+from lockstep.bench.context import Context
+from lockstep.bench.driving import Trip, console_trips
+from lockstep.bench.event_log import robot_times
+from lockstep.bench.results import Result
+from lockstep.bench.samples import median, quantile
+from lockstep.bench.stack import running_stack
+from lockstep.client import Console
+
+__all__ = ["run"]
+
+SECTION = "recording"
+EVENTS, QUICK_EVENTS = 150, 40  # of a turn
+TURNS = 4  # of each kind; in turns, so that the machine's other work falls on both
+ALLOWED_MS = 0.5  # more than without
+
+
+async def run(context: Context) -> list[Result]:
+    count = context.scale(EVENTS, QUICK_EVENTS)
+    results: list[Result] = []
+    for robot in context.robots:
+        off, on = await _turns(robot, count)
+        results += _compare(robot, off, on)
+    return results
+
+
+async def _turns(robot: str, count: int) -> tuple[list[float], list[float]]:
+    """ms of each trip that are not the robot's, without and with a recording."""
+    async with running_stack(robot) as stack, httpx.AsyncClient(base_url=stack.url, trust_env=False) as http:
+        http.headers["Authorization"] = f"Bearer {stack.operator.partition('token=')[2].partition('&')[0]}"
+        async with Console(stack.operator, name="bench", codec="H264") as console:
+            await console.take_seat()
+            await console_trips(console, 10)
+            trips: dict[bool, list[Trip]] = {False: [], True: []}
+            for _ in range(TURNS):
+                for recording in (False, True):
+                    path = "/api/recordings" if recording else "/api/recordings/stop"
+                    (await http.post(path)).raise_for_status()
+                    trips[recording] += await console_trips(console, count)
+            (await http.post("/api/recordings/stop")).raise_for_status()
+        robot_share = robot_times(stack.bridge.event_log)
+        off, on = (
+            [(trip.seconds - robot_share[trip.event]) * 1000 for trip in trips[kind] if trip.event in robot_share]
+            for kind in (False, True)
+        )
+        return off, on
+
+
+def _compare(robot: str, off: list[float], on: list[float]) -> list[Result]:
+    def row(name: str, value: float, baseline: float, target: float | None) -> Result:
+        return Result(
+            section=SECTION,
+            name=f"{robot}: console's own share while recording, {name}",
+            value=value,
+            unit="ms",
+            target=target,
+            baseline=baseline,
+            baseline_name="the same, not recording",
+            samples=len(on),
+            conditions="H.264 pictures of all cameras and sound to one operator, recorded in turns",
+        )
+
+    return [
+        row("median", median(on), median(off), median(off) + ALLOWED_MS),
+        row("p99", quantile(on, 0.99), quantile(off, 0.99), None),
+    ]

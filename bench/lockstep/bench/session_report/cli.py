@@ -1,0 +1,84 @@
+"""`lockstep report FILE`: the thesis' figures from a recorded session, in one HTML file."""
+
+import html
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lockstep.bench.session_report.figures import Figure, session_figures
+from lockstep.bench.session_report.session import Session, read_session
+from lockstep.server.cli.options import RobotOption, StateDirOption
+from lockstep.server.cli.recordings import DirectoryOption, File, recording_file
+from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.verify.verifier import Verdict
+from lockstep.server.recording.verify.verify_file import verify_file
+from lockstep.server.settings import Settings
+
+__all__ = ["report_command", "write_report"]
+
+STYLE = files("lockstep.bench.experiment") / "report.css"
+
+
+def report_command(
+    file: File,
+    out: Annotated[Path | None, typer.Option(help="HTML file to write; unset: beside the recording.")] = None,
+    directory: DirectoryOption = None,
+    robot: RobotOption = "",
+    state_dir: StateDirOption = None,
+) -> None:
+    """Draw the thesis' figures from a recorded session."""
+    settings = Settings() if state_dir is None else Settings(state_dir=state_dir)
+    path = recording_file(file, settings, robot, directory)
+    try:
+        print(write_report(path, out or path.with_suffix(".html")))
+    except (RecordingError, OSError) as error:
+        typer.echo(f"lockstep: {error}", err=True)
+        raise typer.Exit(2) from error
+
+
+def write_report(recording: Path, target: Path) -> Path:
+    """Raises RecordingError, OSError."""
+    session = read_session(recording)
+    page = _page(recording, session, verify_file(recording), session_figures(session))
+    target.write_text(page, encoding="utf-8")
+    return target
+
+
+def _page(recording: Path, session: Session, verdict: Verdict, figures: list[Figure]) -> str:
+    began = datetime.fromtimestamp(session.began / 1e6, UTC)
+    title = session.info.name or recording.stem
+    parts = [
+        "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
+        "<meta name='viewport' content='width=device-width, initial-scale=1'>",
+        f"<title>Lockstep: {_text(title)}</title><style>{STYLE.read_text()}</style></head><body>",
+        f"<header><h1>{_text(title)}</h1>",
+        f"<p class='lead'>{_text(session.info.robot)}, {began:%Y-%m-%d %H:%M:%S} UTC, {session.seconds:.1f} s, ",
+        f"{verdict.events} events, {verdict.commands} commands, {verdict.pictures_and_sounds} pictures and sounds.</p>",
+        f"</header><main>{_promises(verdict)}",
+        *(
+            f"<section id='{_text(each.name)}'><h2>{_text(each.title)}</h2><p class='quiet'>{_text(each.words)}</p>"
+            f"{each.svg}</section>"
+            for each in figures
+        ),
+        "</main></body></html>",
+    ]
+    return "".join(parts)
+
+
+def _promises(verdict: Verdict) -> str:
+    rows = "".join(
+        f"<tr><th>{name.replace('_', ' ')}</th><td>{check.looked or ''}</td>"
+        f"<td><span class='{'good' if check.ok else 'bad'}'>{'kept' if check.ok else f'{check.count} times not'}</span>"
+        f"</td></tr>"
+        for name, check in verdict.checks.items()
+    )
+    return (
+        f"<section><h2>Promises</h2><table><tr><th>promise</th><th>looked at</th><th></th></tr>{rows}</table></section>"
+    )
+
+
+def _text(value: object) -> str:
+    return html.escape(str(value), quote=True)

@@ -1,0 +1,120 @@
+"""A recorded session as series over time. Times in s since its beginning, on the recording's clock."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.format.payload import own_record_of
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, ReportRecord
+from lockstep.server.recording.format.topics import stream_of
+from lockstep.server.recording.reading.bookmarks import Mark
+from lockstep.server.recording.reading.event_rows import EventRow, event_rows
+from lockstep.server.recording.reading.reader import RecordingReader
+
+__all__ = ["Series", "Session", "Shown", "read_session"]
+
+SECOND = 1_000_000_000
+
+
+@dataclass
+class Series:
+    """Values over time."""
+
+    times: list[float] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+
+    def add(self, time: float, value: float) -> None:
+        self.times.append(time)
+        self.values.append(value)
+
+
+@dataclass
+class Shown:
+    """One stream: as it was captured, and as the operator's page said that it rendered it."""
+
+    captured: Series = field(default_factory=Series)  # stamp, at the time of capture
+    stamp: Series = field(default_factory=Series)  # newest one at the operator
+    rendered: Series = field(default_factory=Series)  # how many
+    gap: Series = field(default_factory=Series)
+    tolerance: Series = field(default_factory=Series)
+
+
+@dataclass
+class Session:
+    info: RecordingInfo
+    description: RobotDescription
+    seconds: float
+    marks: list[Mark]
+    began: int  # µs since 1970
+    streams: dict[str, Shown] = field(default_factory=dict)
+    robot: Series = field(default_factory=Series)  # event, when the robot measured it
+    operator: Series = field(default_factory=Series)  # event, as the operator's page reported it
+    answered: Series = field(default_factory=Series)  # ms from a command at the console to its feedback there
+    picture_delay: Series = field(default_factory=Series)  # ms, by the operator's own clock
+    round_trip: Series = field(default_factory=Series)  # ms
+    force: Series = field(default_factory=Series)  # N
+    commanded: dict[str, Series] = field(default_factory=dict)  # by axis
+    measured: dict[str, Series] = field(default_factory=dict)
+
+
+def read_session(path: Path) -> Session:
+    """Raises RecordingError, OSError."""
+    with RecordingReader(path) as reader:
+        index = reader.index
+        origin = index.started * 1000
+        session = Session(
+            info=reader.info,
+            description=reader.description(),
+            seconds=(index.ended - index.started) / 1e6,
+            marks=index.marks,
+            began=index.started,
+        )
+        for row in event_rows(reader):
+            _take_row(session, row, (row.captured - origin) / SECOND)
+        sent: dict[int, int] = {}
+        for record in reader.records():
+            stream = stream_of(record.topic)
+            if stream:
+                shown = session.streams.setdefault(stream, Shown())
+                shown.captured.add((record.captured - origin) / SECOND, record.event)
+                continue
+            at = (record.arrived - origin) / SECOND
+            match own_record_of(record.schema, record.data):
+                case CommandRecord(outcome="forwarded", event=event):
+                    sent = {event: record.arrived}  # never more than one is on its way
+                case FeedbackRecord(event=event) if event in sent:
+                    session.answered.add(at, (record.arrived - sent.pop(event)) / 1e6)
+                case ReportRecord() as report:
+                    _take_report(session, report, at)
+        return session
+
+
+def _take_row(session: Session, row: EventRow, at: float) -> None:
+    feedback, command = row.feedback, row.command
+    session.robot.add(at, feedback.event)
+    if len(feedback.wrench) >= 3:
+        session.force.add(at, math.hypot(*feedback.wrench[:3]))
+    for axis, value in zip(session.description.axes, feedback.axes, strict=False):
+        session.measured.setdefault(axis.name, Series()).add(at, value)
+    for axis, value in zip(session.description.axes, [] if command is None else command.values, strict=False):
+        session.commanded.setdefault(axis.name, Series()).add(at, value)
+
+
+def _take_report(session: Session, record: ReportRecord, at: float) -> None:
+    report = record.report
+    if report.event:
+        session.operator.add(at, report.event)
+    if report.picture_delay_ms is not None:
+        session.picture_delay.add(at, report.picture_delay_ms)
+    if report.round_trip_ms is not None:
+        session.round_trip.add(at, report.round_trip_ms)
+    for stream in report.streams:
+        shown = session.streams.setdefault(stream.stream, Shown())
+        if stream.stamp:
+            shown.stamp.add(at, stream.stamp)
+        shown.rendered.add(at, stream.rendered)
+        if stream.rendered:
+            shown.gap.add(at, stream.gap)
+            shown.tolerance.add(at, stream.tolerance)

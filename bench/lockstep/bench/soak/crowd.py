@@ -1,0 +1,96 @@
+"""Observers that come and go, and intruders that command without the seat. Headless, in this process."""
+
+import asyncio
+import random
+from contextlib import suppress
+from functools import partial
+
+from lockstep.client import Console
+from lockstep.client.errors import CommandRefused, ConsoleError
+
+__all__ = ["Crowd", "Intruder"]
+
+AGAIN_SECONDS = 1.0  # until an observer that was thrown out tries again
+BETWEEN_TRIES = 0.2  # s between two commands of an intruder
+BACKWARDS = -0.5  # of the first axis; only intruders drive so
+
+
+class Crowd:
+    """Keeps `size` observers connected, some leaving and others coming, until closed."""
+
+    def __init__(self, link: str, size: int, seed: int) -> None:
+        self.joined = self.lost = 0
+        self._link = link
+        self._size = size
+        self._chance = random.Random(seed)
+        self._guests: list[asyncio.Task[None]] = []
+
+    def __len__(self) -> int:
+        return len(self._guests)
+
+    def fill(self) -> None:
+        while len(self._guests) < self._size:
+            self._join()
+
+    def come(self) -> None:
+        """A few join, up to the size."""
+        for _ in range(min(self._size - len(self._guests), self._chance.randint(1, 5))):
+            self._join()
+
+    async def go(self) -> None:
+        """A few leave, like a person who closes the tab."""
+        for _ in range(min(len(self._guests), self._chance.randint(1, 5))):
+            guest = self._guests.pop(self._chance.randrange(len(self._guests)))
+            await _ended(guest)
+
+    async def close(self) -> None:
+        while self._guests:
+            await _ended(self._guests.pop())
+
+    def _join(self) -> None:
+        self._guests.append(asyncio.get_running_loop().create_task(self._attend()))
+
+    async def _attend(self) -> None:
+        while True:
+            try:
+                async with Console(self._link, decode=False, name="guest") as console:
+                    self.joined += 1
+                    async for _ in console.feedbacks():
+                        pass
+            except ConsoleError:
+                self.lost += 1
+            await asyncio.sleep(AGAIN_SECONDS)
+
+
+class Intruder:
+    """Commands without ever asking for the seat."""
+
+    def __init__(self, link: str, name: str) -> None:
+        self.tries = 0
+        self._link = link
+        self._name = name
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            with suppress(ConsoleError):
+                async with Console(self._link, decode=False, name=self._name) as console:
+                    await self._intrude(console)
+            await asyncio.sleep(AGAIN_SECONDS)
+
+    async def _intrude(self, console: Console) -> None:
+        values = [BACKWARDS, *(axis.rest for axis in console.description.axes[1:])]
+        while True:
+            self.tries += 1
+            # A command that moves is not even sent while the robot asks for a neutral one first.
+            for attempt in (console.arm, partial(console.drive, values)):
+                with suppress(CommandRefused, TimeoutError):
+                    async with asyncio.timeout(1.0):
+                        await attempt()
+            await asyncio.sleep(BETWEEN_TRIES)
+
+
+async def _ended(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task

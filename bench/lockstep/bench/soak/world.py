@@ -1,0 +1,201 @@
+"""The bridge and the console of a soak: processes that die and are started again at the same address."""
+
+import asyncio
+import json
+import re
+import secrets
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import AsyncExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import httpx
+
+from lockstep.bench.processes import Running, running_process
+
+__all__ = ["World"]
+
+DOWN_SECONDS = 1.0  # between a death and the next life
+HTTP_SECONDS = 10.0
+OPEN_ENCODERS = re.compile(r'^lockstep_media_encoders\{codec="(\w+)",stream="[^"]*"\} ([\d.e+]+)$', re.MULTILINE)
+
+
+class World:
+    """Enter it, and the bridge runs; then `open_console` with the address at which the console finds it."""
+
+    def __init__(self, folder: Path, robot: str = "planar") -> None:
+        self.event_log = folder / "events.jsonl"
+        self.console_url = ""
+        self.operator = self.observer = ""
+        self.bridge_kills = self.server_restarts = 0
+        self._robot = robot
+        self._environment = {
+            "LOCKSTEP_STATE_DIR": str(folder / "state"),
+            "LOCKSTEP_SECRET": secrets.token_urlsafe(32),  # so that links outlive a restart
+        }
+        self._bridge_life, self._server_life = AsyncExitStack(), AsyncExitStack()
+        self._bridge: Running | None = None
+        self._server: Running | None = None
+        self._bridge_port = self._server_port = 0
+        self._bridges = 0  # started
+        self._robot_address = ""
+        self._troubles = 0
+        self._calm_since = time.monotonic()
+
+    async def __aenter__(self) -> Self:
+        await self._start_bridge()
+        return self
+
+    async def open_console(self, robot_address: str) -> None:
+        self._robot_address = robot_address
+        await self._start_server()
+
+    @property
+    def robot(self) -> tuple[str, int]:
+        """Where the bridge itself listens."""
+        return "127.0.0.1", self._bridge_port
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        await self._server_life.aclose()
+        await self._bridge_life.aclose()
+
+    # What goes wrong
+
+    def trouble_begins(self) -> None:
+        self._troubles += 1
+
+    def trouble_ends(self) -> None:
+        self._troubles -= 1
+        self._calm_since = time.monotonic()
+
+    def calm_seconds(self) -> float:
+        """How long everything has been in order; 0 while something is not."""
+        return 0.0 if self._troubles else time.monotonic() - self._calm_since
+
+    async def kill_bridge(self) -> None:
+        self.trouble_begins()
+        try:
+            if self._bridge is not None:
+                await self._bridge.kill()
+            await self._bridge_life.aclose()
+            await asyncio.sleep(DOWN_SECONDS)
+            await self._start_bridge()
+            self.bridge_kills += 1
+        finally:
+            self.trouble_ends()
+
+    async def restart_server(self, *, gently: bool) -> None:
+        self.trouble_begins()
+        try:
+            if self._server is not None and not gently:
+                await self._server.kill()
+            await self._server_life.aclose()
+            await asyncio.sleep(DOWN_SECONDS)
+            await self._start_server()
+            self.server_restarts += 1
+        finally:
+            self.trouble_ends()
+
+    async def stop_for(self, seconds: float) -> bool:
+        """STOP by an observer over HTTP, and the operator's reset after a while. False when the console was away."""
+        async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
+            try:
+                stopped = await http.post("/api/stop", headers=_bearer(self.observer), json={"reason": "soak"})
+                await asyncio.sleep(seconds)
+                await self._reset(http)
+            except httpx.TransportError:
+                return False
+            return stopped.is_success
+
+    async def until_reset(self) -> None:
+        """Ask for the reset until the robot is not stopped: one may have been lost in a restart."""
+        async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
+            while True:
+                try:
+                    if await self._reset(http):
+                        return
+                except httpx.TransportError:
+                    pass
+                await asyncio.sleep(1.0)
+
+    async def _reset(self, http: httpx.AsyncClient) -> bool:
+        """Ask for the reset of the newest stop, by the seat holder's link; whether no stop holds."""
+        session = await http.get("/api/session", headers=_bearer(self.operator))
+        if not session.is_success or not session.json()["stopped"]:
+            return session.is_success
+        number = session.json()["stop"]["number"]
+        await http.post("/api/reset", headers=_bearer(self.operator), json={"number": number})
+        return False
+
+    # What is measured
+
+    def server_memory(self) -> int | None:
+        """Bytes; None while it is down."""
+        try:
+            return None if self._server is None else self._server.resident_bytes()
+        except (OSError, ValueError, IndexError):
+            return None
+
+    async def open_encoders(self) -> tuple[tuple[str, int], ...] | None:
+        """Of each codec how many picture encoders are open, by its name; None while the console does not answer."""
+        async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
+            try:
+                text = (await http.get("/metrics")).text
+            except httpx.TransportError:
+                return None
+        counts: Counter[str] = Counter()
+        for codec, count in OPEN_ENCODERS.findall(text):
+            counts[codec] += int(float(count))
+        return tuple(sorted(counts.items()))
+
+    def records(self) -> Iterator[Mapping[str, Any]]:
+        """The bridge's record of all epochs. A killed bridge may leave half a line: it is passed over."""
+        with self.event_log.open() as lines:
+            for line in lines:
+                try:
+                    yield json.loads(line)
+                except ValueError:
+                    continue
+
+    async def _start_bridge(self) -> None:
+        command = (
+            sys.executable,
+            "-m",
+            "lockstep.robot_bridge",
+            self._robot,
+            "--port",
+            str(self._bridge_port),
+            "--json",
+        )
+        self._bridges += (
+            1  # a new state directory for each: one that was killed begins stopped, which is not at issue here
+        )
+        state = self.event_log.with_name(f"bridge-state-{self._bridges}")
+        files = ("--event-log", str(self.event_log), "--state-dir", str(state))
+        life = AsyncExitStack()
+        self._bridge, ready = await life.enter_async_context(
+            running_process(*command, *files, environment=self._environment)
+        )
+        self._bridge_life = life
+        self._bridge_port = int(ready["robot"].rsplit(":", 1)[1])
+
+    async def _start_server(self) -> None:
+        command = (str(Path(sys.executable).with_name("lockstep")), "serve", "--json", "--quiet")
+        where = ("--robot", self._robot_address, "--port", str(self._server_port))
+        life = AsyncExitStack()
+        self._server, ready = await life.enter_async_context(
+            running_process(*command, *where, environment=self._environment)
+        )
+        self._server_life = life
+        self.console_url, self.operator, self.observer = ready["console"], ready["operator"], ready["observer"]
+        self._server_port = int(self.console_url.rsplit(":", 1)[1])
+
+
+def _bearer(link: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {link.partition('#token=')[2]}"}

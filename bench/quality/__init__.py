@@ -1,1 +1,0 @@
-"""What the quality controller and the repair of losses do behind a bad network: `python -m bench.quality --help`."""

@@ -1,3 +1,0 @@
-from bench.quality.cli import app
-
-app()

@@ -1,0 +1,40 @@
+"""A console without a browser, for scripts, tests and policies."""
+
+from lockstep.client.console import Console
+from lockstep.client.errors import (
+    CommandError,
+    CommandRefused,
+    ConnectFailed,
+    ConsoleError,
+    ConsoleLost,
+    LinkFormatError,
+    NoSuchStream,
+    NotArmed,
+    Refused,
+    SeatRefused,
+    SignallingRefused,
+    StopUnconfirmed,
+)
+from lockstep.client.media.stream import Picture, Sound
+from lockstep.client.statistics import ConsoleStatistics, Percentiles, StreamStatistics
+
+__all__ = [
+    "CommandError",
+    "CommandRefused",
+    "ConnectFailed",
+    "Console",
+    "ConsoleError",
+    "ConsoleLost",
+    "ConsoleStatistics",
+    "LinkFormatError",
+    "NoSuchStream",
+    "NotArmed",
+    "Percentiles",
+    "Picture",
+    "Refused",
+    "SeatRefused",
+    "SignallingRefused",
+    "Sound",
+    "StopUnconfirmed",
+    "StreamStatistics",
+]

@@ -1,0 +1,394 @@
+"""The console without a browser: connect, watch, drive."""
+
+import asyncio
+import math
+from collections.abc import AsyncGenerator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from lockstep.client.connection import Connection, ConnectionOptions
+from lockstep.client.console_url import parse_link
+from lockstep.client.control.command_gate import GateState, Pacing
+from lockstep.client.errors import CommandError, CommandRefused, ConsoleError, ConsoleLost, NotArmed
+from lockstep.client.media.media_gate import GateMode
+from lockstep.client.media.newest_queue import NewestQueue, QueueClosed
+from lockstep.client.media.render_log import FeedbackArrival, Rendering
+from lockstep.client.media.stream import Picture, Sound, Stream
+from lockstep.client.statistics import ConsoleStatistics
+from lockstep.client.transport.webrtc_peer import Route
+from lockstep.protocol.carriers import Carrier
+from lockstep.protocol.console import Participant, Role, Seat, SharedNote
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Feedback, StopState
+
+__all__ = ["Console"]
+
+LEAVE_SECONDS = 1.5  # for the robot to come to rest before the connection is closed
+
+
+class Console:
+    """One connection to a Lockstep console; an async context manager. Do not use a lost one again: make another.
+
+    Args:
+        link: as `lockstep up` prints it: "http://host:port/#token=…"
+        pacing: "feedback": the next command waits for the feedback of the last; "media": also for its picture
+        tolerance: largest gap of a rendered picture, in events
+        audio_tolerance: the same for sound
+        gate: "event": the rule. "off": renders everything. "age": renders media that are at most 0.5 s old by
+        synchronised clocks, as other consoles do; needs the carrier "capture-time" or "trailer". The last two are for
+        comparison carrier: how the event reference travels with media; no other carrier is offered video: how many
+        cameras at most; True: four, False: none audio: whether to receive sound
+        decode: False only counts RTP packets and frames: no pictures, no sound, next to no cost
+        codec: "VP8" or "H264"; None: the console's first choice
+        sound_codec: "opus" or "PCMU"; None: the same
+        event_rate: most events per second; None: the rate of the robot's description. Never more than that
+        name: what other participants see
+        connect_seconds: allowed for connecting, waiting for the robot included
+        silence_seconds: without any message from the console after which it counts as lost
+        tls_ca: file with a certificate to trust instead of the system's, as a console's own (tls-cert.pem)
+        relay_only: through the console's TURN server or not at all
+        through_relay: an observer watches through a relay (docs/relay.md) if the console has one for it
+        route: passes the connection through a relay; for measurements
+    """
+
+    def __init__(
+        self,
+        link: str,
+        *,
+        pacing: Pacing = "feedback",
+        tolerance: int = 4,
+        audio_tolerance: int = 6,
+        gate: GateMode = "event",
+        carrier: Carrier = "native",
+        video: bool | int = True,
+        audio: bool = True,
+        decode: bool = True,
+        codec: str | None = None,
+        sound_codec: str | None = None,
+        event_rate: float | None = None,
+        name: str = "script",
+        connect_seconds: float = 30.0,
+        silence_seconds: float = 5.0,
+        route: Route | None = None,
+        tls_ca: str | Path | None = None,
+        relay_only: bool = False,
+        through_relay: bool = False,
+    ) -> None:
+        if pacing == "media" and not (decode and video):
+            raise ValueError("pacing by media needs decoded pictures")
+        if gate == "age" and carrier not in ("capture-time", "trailer"):
+            raise ValueError("ages need a carrier that says when a medium was captured: capture-time or trailer")
+        self._options = ConnectionOptions(
+            link=parse_link(link),
+            pacing=pacing,
+            tolerance={"video": tolerance, "audio": audio_tolerance},
+            gate=gate,
+            carrier=carrier,
+            video=4 if video is True else int(video),
+            audio=audio,
+            decode=decode,
+            codec=codec,
+            sound_codec=sound_codec,
+            event_rate=event_rate,
+            name=name,
+            connect_seconds=connect_seconds,
+            silence_seconds=silence_seconds,
+            route=route,
+            tls_ca=None if tls_ca is None else Path(tls_ca),
+            relay_only=relay_only,
+            through_relay=through_relay,
+        )
+        self._connection: Connection | None = None
+
+    async def __aenter__(self) -> Self:
+        """Connect.
+
+        Raises:
+            SignallingRefused: the console refused, as with an old link.
+            ConnectFailed: no console, no robot or no way there within `connect_seconds`.
+        """
+        connection = Connection(self._options)
+        try:
+            await connection.open()
+        except BaseException:
+            await connection.close()
+            raise
+        self._connection = connection
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Let go of the robot and the seat, then close."""
+        connection = self._live()
+        try:
+            if connection.session.holds_seat and connection.lost is None:
+                async with asyncio.timeout(LEAVE_SECONDS):
+                    await connection.driver.rest()
+        except (ConsoleError, TimeoutError):
+            pass  # the bridge brings the robot to rest when its operator is gone
+        finally:
+            if connection.session.holds_seat:
+                connection.session.release_seat()
+            await connection.close()
+
+    # Known state
+
+    @property
+    def description(self) -> RobotDescription:
+        """The robot: its axes, sensors, cameras."""
+        return self._live().robot.description
+
+    @property
+    def epoch(self) -> str:
+        """The run of the robot bridge; event references of two epochs are not comparable."""
+        return self._live().robot.epoch
+
+    @property
+    def feedback(self) -> Feedback | None:
+        """The newest one; None before the first."""
+        return self._live().driver.pilot.newest
+
+    @property
+    def gate_state(self) -> GateState:
+        """Whether a command could leave now, and if not, why."""
+        return self._live().driver.pilot.gate.state(asyncio.get_running_loop().time())
+
+    @property
+    def seat(self) -> Seat:
+        """Who may drive."""
+        return self._live().session.seat
+
+    @property
+    def peer(self) -> str:
+        """This connection's id, as in `seat.holder`."""
+        return self._live().welcome.peer
+
+    @property
+    def relay(self) -> str:
+        """The relay that media come through, as the console counts them: "0"; "": they come from the console."""
+        return self._live().relay
+
+    @property
+    def role(self) -> Role:
+        """The role of this link."""
+        return self._live().welcome.role
+
+    @property
+    def participants(self) -> list[Participant]:
+        """Everyone who is connected, this connection included."""
+        return list(self._live().session.participants.participants)
+
+    @property
+    def notes(self) -> list[SharedNote]:
+        """The notes to everyone, oldest first; the last hundred."""
+        return list(self._live().session.notes)
+
+    def stats(self) -> ConsoleStatistics:
+        """Figures since the connection began."""
+        return self._live().statistics()
+
+    def rendered(self, stream: str) -> list[Rendering]:
+        """The last thousand renderings of a camera or microphone, oldest first."""
+        return self._live().media.log(stream)
+
+    def feedback_log(self) -> list[FeedbackArrival]:
+        """The last thousand feedbacks and when they came, oldest first."""
+        return list(self._live().feedback_log)
+
+    async def restart_ice(self) -> None:
+        """Look for a new path to the console, as after a change of networks; the connection lives on meanwhile. Only
+        packets on their way are lost, and the seat is kept. A path that was gone for longer than the console waits for
+        a sign of life (20 s) takes a new `Console`.
+
+        Raises:
+            SignallingRefused: the console has given up this connection.
+            ConnectFailed: no new path was found in time; the old one is as it was. An observer's line beside a relay
+                is TCP and has no other path.
+        """
+        await self._live().restart_ice()
+
+    # Driving
+
+    async def take_seat(self) -> None:
+        """Take the control seat: an operator when it is free, a supervisor from any holder; and `arm`.
+
+        While the robot is stopped or away the seat is taken, and `arm` is left to you.
+
+        Raises:
+            SeatRefused: another peer holds it, or this link is an observer's.
+        """
+        connection = self._live()
+        await connection.session.take_seat()
+        await self._arm_if_possible(connection)
+
+    async def request_seat(self, seconds: float = 65.0) -> None:
+        """Ask the holder of the control seat for it; returns when it is granted, or at once when it is free.
+
+        `seconds` covers the 60 s after which the console counts no answer as no. Cancelled, the request is withdrawn.
+
+        Raises:
+            SeatRefused: the holder declined or did not answer, or this link is an observer's.
+        """
+        connection = self._live()
+        await connection.session.request_seat(seconds)
+        await self._arm_if_possible(connection)
+
+    async def _arm_if_possible(self, connection: Connection) -> None:
+        newest = connection.driver.pilot.newest
+        if newest is None or newest.stop.stopped or connection.robot.link == "down":
+            return
+        with suppress(CommandRefused):
+            await connection.driver.arm()
+
+    async def arm(self) -> Feedback:
+        """Let the robot move again, by one neutral command; the feedback that answers it.
+
+        Needed after a stop and its reset, a lost robot link, and whenever the robot says so; taking the seat arms too.
+        Call it when the responsible person wants the robot to move on, never as an answer to `NotArmed` alone.
+
+        Raises:
+            CommandRefused: the robot is stopped, this console does not hold the seat, …
+            ConsoleLost: the connection ended.
+        """
+        return await self._live().driver.arm()
+
+    def grant(self, peer: str) -> None:
+        """Hand the control seat to a peer that asked for it: one of `seat.claims`."""
+        self._live().session.answer(peer, grant=True)
+
+    def decline(self, peer: str) -> None:
+        """Refuse a peer that asked for the control seat."""
+        self._live().session.answer(peer, grant=False)
+
+    def release_seat(self) -> None:
+        """Give the control seat back, or take a request for it back."""
+        self._live().session.release_seat()
+
+    async def drive(self, values: Mapping[str, float] | Sequence[float]) -> Feedback:
+        """Send one command as soon as the gate is open; the feedback that answers it.
+
+        `values` has one value per axis in the description's order, or names axes; those not named get their value
+        at rest. The first call arms: from then on, whenever 200 ms pass without another call, the console sends
+        neutral values, five times a second, until `rest`. A lost command is repeated; a command that arrived too late
+        is tried again on fresh feedback.
+
+        Raises:
+            CommandError: an unknown axis, or a value that is not finite.
+            NotArmed: after a stop, a reset, a lost robot link or a new seat `arm` comes first.
+            CommandRefused: the robot is stopped, this console does not hold the seat, …
+            ConsoleLost: the connection ended.
+        """
+        connection = self._live()
+        command, pilot = self._command(values), connection.driver.pilot
+        if connection.session.holds_seat and not pilot.ready:
+            if pilot.newest is not None and pilot.newest.stop.stopped:
+                raise CommandRefused("stopped", pilot.newest.stop.reason)
+            raise NotArmed
+        return await connection.driver.drive(command)
+
+    def _command(self, values: Mapping[str, float] | Sequence[float]) -> list[float]:
+        axes = self.description.axes
+        if isinstance(values, Mapping):
+            unknown = values.keys() - {axis.name for axis in axes}
+            if unknown:
+                known = ", ".join(axis.name for axis in axes)
+                raise CommandError(f"no axis {', '.join(sorted(unknown))}; there are {known}")
+            command = [float(values.get(axis.name, axis.rest)) for axis in axes]
+        else:
+            command = [float(value) for value in values]
+        if len(command) != len(axes):
+            raise CommandError(f"{len(command)} values for {len(axes)} axes")
+        if not all(math.isfinite(value) for value in command):
+            raise CommandError("a value is NaN or infinite")
+        return command
+
+    async def rest(self) -> None:
+        """Let go: past the gate, at once, repeated until the robot is proven to be at rest. Disarms."""
+        await self._live().driver.rest()
+
+    async def stop(self, reason: str = "") -> StopState:
+        """Latch the stop, from any role, at any time; over HTTP as well when the data channel does not confirm it.
+
+        Returns when the robot has confirmed this very press, with the number that it got.
+
+        Raises:
+            StopUnconfirmed: the robot has not; the console keeps it if it was reached.
+        """
+        return await self._live().stop(reason)
+
+    async def reset(self, number: int | None = None) -> StopState:
+        """Release stop `number`, or the newest that this connection knows; moves nothing, and `arm` comes next.
+
+        Raises:
+            CommandRefused: neither holder of the seat nor supervisor, a newer stop (`stale_reset`), less than a second
+                after the stop (`too_soon`), a person at the robot keeps the stop (`locked_out`), …
+        """
+        session = self._live().session
+        return await session.reset(self._live().options.name, session.newest_stop if number is None else number)
+
+    async def note(self, text: str) -> SharedNote:
+        """Write a note to everyone; it keeps the event reference of that moment.
+
+        Raises:
+            CommandRefused: too many notes, or nothing in it can be printed.
+        """
+        return await self._live().session.note(text)
+
+    # Watching
+
+    async def feedbacks(self) -> AsyncGenerator[Feedback]:
+        """Every new feedback, the newest first if the reader is slow. Raises ConsoleLost when the connection ends."""
+        connection = self._live()
+        queue: NewestQueue[Feedback] = NewestQueue(1)
+        connection.feedback_readers.append(queue)
+        if connection.lost is not None:
+            queue.close()
+        try:
+            while True:
+                yield await queue.get()
+        except QueueClosed:
+            self._raise_lost(connection)
+        finally:
+            connection.feedback_readers.remove(queue)
+
+    async def pictures(self, camera: str = "", *, keep: int = 2) -> AsyncGenerator[Picture]:
+        """Pictures of a camera ("" is the main one) that passed the gate, each judged once more when it is taken.
+
+        A reader that is slow loses the oldest: at most `keep` wait. Raises ConsoleLost when the connection ends.
+        """
+        connection = self._live()
+        async for stream, medium in self._media(connection, connection.media.stream("video", camera), keep):
+            yield Picture(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)
+
+    async def sounds(self, microphone: str = "", *, keep: int = 50) -> AsyncGenerator[Sound]:
+        """Segments of a microphone ("" is the first) that passed the gate; as `pictures`."""
+        connection = self._live()
+        async for stream, medium in self._media(connection, connection.media.stream("audio", microphone), keep):
+            yield Sound(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)
+
+    async def _media(self, connection: Connection, stream: Stream, keep: int) -> AsyncGenerator[tuple[Stream, Any]]:
+        reader = stream.open_reader(keep)
+        try:
+            while True:
+                medium = await reader.get()
+                if stream.check(medium)[0] == "render":
+                    yield stream, medium
+                else:
+                    reader.dropped += 1
+        except QueueClosed:
+            self._raise_lost(connection)
+        finally:
+            stream.close_reader(reader)
+
+    @staticmethod
+    def _raise_lost(connection: Connection) -> None:
+        if connection.lost is not None:
+            raise connection.lost
+
+    def _live(self) -> Connection:
+        if self._connection is None:
+            raise ConsoleLost("not connected: use `async with Console(link) as console`")
+        return self._connection

@@ -1,0 +1,1 @@
+"""When a command may leave, and what became of it."""

@@ -1,0 +1,96 @@
+"""The gate for commands: when the next one may leave. Held to tests/vectors/pacing.json. No I/O."""
+
+from typing import Literal, NamedTuple
+
+from lockstep.protocol.serial import event_after, event_gap
+
+__all__ = ["CommandGate", "GateState", "NextCommand", "Pacing"]
+
+Pacing = Literal["feedback", "media"]
+GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture"]
+
+
+class NextCommand(NamedTuple):
+    """What a command sent now would be."""
+
+    event: int
+    issue: int  # of the feedback it answers
+
+
+class CommandGate:
+    """Open when the last command was answered, the event rate allows it and, with pacing `media`, the picture
+    on screen will be within tolerance of the next feedback as well."""
+
+    def __init__(self, pacing: Pacing, tolerance: int, min_interval: float) -> None:
+        self.pacing = pacing
+        self.tolerance = tolerance
+        self.min_interval = min_interval  # s between the first sendings of two events
+        self._feedback: tuple[int, int] | None = None  # newest (event, issue)
+        self._in_flight: int | None = None
+        self._sent_at: float | None = None
+        self._shown: int | None = None
+
+    @property
+    def in_flight(self) -> int | None:
+        """The event that was sent and not answered."""
+        return self._in_flight
+
+    def feedback(self, event: int, issue: int) -> bool:
+        """Take a feedback; whether it is newer than all before."""
+        if self._feedback is not None:
+            ahead = event_gap(event, self._feedback[0])
+            if ahead < 0 or (ahead == 0 and issue <= self._feedback[1]):
+                return False
+        self._feedback = (event, issue)
+        if self._in_flight is not None and event_gap(event, self._in_flight) >= 0:
+            self._in_flight = None
+        return True
+
+    def sent(self, now: float) -> None:
+        """The next command left for the first time."""
+        self._in_flight = self.next().event
+        self._sent_at = now
+
+    def refused(self, event: int) -> bool:
+        """The robot or the console refused `event`; whether that was the one in flight."""
+        if event != self._in_flight:
+            return False
+        self._in_flight = None
+        return True
+
+    def shown(self, stamp: int) -> None:
+        """A picture stamped `stamp` is on screen."""
+        self._shown = stamp
+
+    def state(self, now: float) -> GateState:
+        """Open, or the reason why not."""
+        if self._feedback is None:
+            return "no_feedback"
+        if self._in_flight is not None:
+            return "in_flight"
+        if self._sent_at is not None and now < self.opens_at():
+            return "rate"
+        if self.pacing == "media" and not self._picture_is_near(self._feedback[0]):
+            return "picture"
+        return "open"
+
+    def opens_at(self) -> float:
+        """When the event rate allows the next command."""
+        return float("-inf") if self._sent_at is None else self._sent_at + self.min_interval
+
+    def next(self) -> NextCommand:
+        """The command that an open gate lets pass.
+
+        Raises:
+            RuntimeError: there is no feedback yet.
+        """
+        if self._feedback is None:
+            raise RuntimeError("no feedback to answer")
+        return NextCommand(event_after(self._feedback[0]), self._feedback[1])
+
+    def _picture_is_near(self, event: int) -> bool:
+        """Near enough to stay within tolerance when the next feedback arrives, one event on. At tolerance 0 no picture
+        is; there the picture of the newest event suffices."""
+        if self._shown is None:
+            return False
+        return -self.tolerance <= event_gap(event, self._shown) <= max(self.tolerance - 1, 0)

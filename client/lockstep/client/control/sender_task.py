@@ -1,0 +1,132 @@
+"""The shell around the pilot: its timer, and the futures of callers that wait for feedback."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from lockstep.client.control.command_sender import CommandSender
+from lockstep.client.errors import CommandRefused, ConsoleLost, NotArmed
+from lockstep.client.statistics import PictureDelay
+from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest
+
+__all__ = ["Driver"]
+
+
+class Driver:
+    """Sends the pilot's commands and rests, at once and at the right times."""
+
+    def __init__(self, pilot: CommandSender, send: Callable[[Command | Rest], None]) -> None:
+        self.pilot = pilot
+        self.picture_delay = PictureDelay()
+        self._send = send
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+        self._waiting: list[tuple[int, asyncio.Future[Feedback]]] = []
+        self._rested: list[asyncio.Future[None]] = []
+        self._lost: ConsoleLost | None = None
+
+    def feedback(self, feedback: Feedback) -> bool:
+        """Take a feedback; whether it is newer than all before."""
+        newer = self.pilot.feedback(feedback, self._loop.time())
+        self.pump()
+        return newer
+
+    def refusal(self, refusal: Refusal) -> None:
+        self.pilot.refusal(refusal)
+        self.pump()
+
+    def shown(self, stamp: int) -> None:
+        """A picture of the main camera is on screen."""
+        self.picture_delay.shown(stamp, self._loop.time())
+        self.pilot.shown(stamp)
+        self.pump()
+
+    def loss(self) -> None:
+        """A message of this connection was lost."""
+        self.pilot.loss(self._loop.time())
+
+    async def drive(self, values: Sequence[float]) -> Feedback:
+        """Send `values` as soon as the gate opens; the feedback that answers.
+
+        Raises:
+            NotArmed: a neutral command comes first.
+            CommandRefused: another try would be refused as well.
+            ConsoleLost: the connection ended.
+        """
+        answered: asyncio.Future[Feedback] = self._future()
+        self._waiting.append((self.pilot.intend(values, self._loop.time()), answered))
+        self.pump()
+        return await answered
+
+    async def arm(self) -> Feedback:
+        """Send a neutral command; the feedback that answers it. Raises as `drive`."""
+        answered: asyncio.Future[Feedback] = self._future()
+        self._waiting.append((self.pilot.arm(), answered))
+        self.pump()
+        return await answered
+
+    def hold_back(self, reason: RefusalReason) -> None:
+        """The robot may not move until the program arms again."""
+        self.pilot.hold_back(reason)
+        self.pump()
+
+    async def rest(self) -> None:
+        """Rest at once; returns when the robot is proven to be at rest. Raises ConsoleLost."""
+        self.pilot.rest(self._loop.time())
+        rested: asyncio.Future[None] = self._future()
+        self._rested.append(rested)
+        self.pump()
+        await rested
+
+    def _future(self) -> "asyncio.Future[Any]":
+        if self._lost is not None:
+            raise self._lost
+        return self._loop.create_future()
+
+    def pump(self) -> None:
+        """Send what the pilot has due, hand out outcomes, and set the timer for the next time."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._lost is not None:
+            return
+        now = self._loop.time()
+        for message in self.pilot.due(now):
+            self._send(message)
+        while self.pilot.sent_at:
+            self.picture_delay.sent(*self.pilot.sent_at.popleft())
+        self._hand_out()
+        wake_at = self.pilot.wake_at(now)
+        if wake_at < float("inf"):
+            self._timer = self._loop.call_at(wake_at, self.pump)
+
+    def _hand_out(self) -> None:
+        for outcome in self.pilot.outcomes():
+            while self._waiting and self._waiting[0][0] <= outcome.ticket:
+                _, waiting = self._waiting.pop(0)
+                if waiting.done():
+                    continue
+                if outcome.feedback is not None:
+                    waiting.set_result(outcome.feedback)
+                elif outcome.refusal is not None:
+                    waiting.set_exception(_error(outcome.refusal))
+        if not self.pilot.resting:
+            for rested in self._rested:
+                if not rested.done():
+                    rested.set_result(None)
+            self._rested.clear()
+
+    def end(self, lost: ConsoleLost) -> None:
+        """The connection ended: end every wait."""
+        self._lost = lost
+        self.pump()
+        pending: list[asyncio.Future[Any]] = [*(future for _, future in self._waiting), *self._rested]
+        self._waiting.clear()
+        self._rested.clear()
+        for future in pending:
+            if not future.done():
+                future.set_exception(lost)
+
+
+def _error(refusal: Refusal) -> CommandRefused:
+    return NotArmed() if refusal.reason == "not_neutral" else CommandRefused(refusal.reason, refusal.detail)

@@ -1,0 +1,132 @@
+"""Errors of the client.
+
+ConsoleError
+├── LinkFormatError         the link given to Console is not one that `lockstep up` prints     (caller)
+├── CommandError            values that no robot accepts (caller)
+├── NoSuchStream            a camera or microphone that is not received                        (caller)
+├── SignallingRefused       the console answered WHEP with an error
+├── ConnectFailed           the console, or the way to it, did not work within the time allowed
+├── ConsoleLost             an established connection ended; terminal, make a new Console
+├── StopUnconfirmed         the robot has not confirmed a stop; it is not lost, but do not rely on it
+└── Refused                 the console or the robot said no
+    ├── CommandRefused      … to a command
+    │   └── NotArmed        … until `await console.arm()`: after a stop, a reset, a lost link, …
+    └── SeatRefused         … to the control seat
+"""
+
+__all__ = [
+    "CommandError",
+    "CommandRefused",
+    "ConnectFailed",
+    "ConsoleError",
+    "ConsoleLost",
+    "LinkFormatError",
+    "NoSuchStream",
+    "NotArmed",
+    "Refused",
+    "SeatRefused",
+    "SignallingRefused",
+    "StopUnconfirmed",
+]
+
+ADVICE = {
+    "unauthorized": "use a link of this console: one that it printed, or that `lockstep invite` made",
+    "link_expired": "ask for a new link",
+    "link_revoked": "ask the person who invited you",
+    "not_allowed": "this link's role does not permit it; use the operator's link",
+    "robot_unreachable": "start the robot bridge, or give the console its address",
+    "too_many_peers": "close another connection first",
+}
+
+
+class ConsoleError(Exception):
+    """Base of all errors of this package."""
+
+    def __init__(self, detail: str) -> None:
+        super().__init__(detail)
+        self.detail = detail
+
+    def __str__(self) -> str:
+        return self.detail
+
+
+class LinkFormatError(ConsoleError):
+    """The link is not `http://host:port/#token=…`."""
+
+
+class CommandError(ConsoleError):
+    """An axis that the robot does not have, or a value that is not a number."""
+
+
+class NoSuchStream(ConsoleError):
+    """The robot has no such camera or microphone, or the console was told not to receive it."""
+
+
+class SignallingRefused(ConsoleError):
+    """The console refused the connection.
+
+    Attributes:
+        status: HTTP status
+        error: stable name given by the console, "" when it gave none
+    """
+
+    def __init__(self, status: int, error: str, detail: str) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.error = error
+
+    def __str__(self) -> str:
+        said = f"the console answered {self.status} {self.error}".rstrip()
+        advice = ADVICE.get(self.error, "")
+        return said + (f": {self.detail}" if self.detail else "") + (f"; {advice}" if advice else "")
+
+
+class ConnectFailed(ConsoleError):
+    """No connection within the time allowed."""
+
+
+class ConsoleLost(ConsoleError):
+    """The connection ended. The bridge brings the robot to rest; a new Console connects again."""
+
+
+class Refused(ConsoleError):
+    """A refusal.
+
+    Attributes:
+        reason: one of `lockstep.protocol.messages.RefusalReason`
+    """
+
+    def __init__(self, reason: str, detail: str = "") -> None:
+        super().__init__(f"{reason}: {detail}" if detail else reason)
+        self.reason = reason
+        self.detail = detail
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class CommandRefused(Refused):
+    """The command was not executed, and repeating it would not help."""
+
+
+class NotArmed(CommandRefused):
+    """The robot may not move before a neutral command: call `await console.arm()` when it is safe to go on."""
+
+    def __init__(self) -> None:
+        super().__init__("not_neutral", "the robot was stopped, reset or away, or the seat is new: arm() first")
+
+
+class StopUnconfirmed(ConsoleError):
+    """A stop that the robot has not confirmed. The console keeps it, if the stop reached it; use the hardware stop.
+
+    Attributes:
+        press: its id; the same press may be sent again
+    """
+
+    def __init__(self, press: str, detail: str) -> None:
+        super().__init__(detail)
+        self.press = press
+
+
+class SeatRefused(Refused):
+    """The control seat was not given."""

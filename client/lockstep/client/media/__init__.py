@@ -1,0 +1,1 @@
+"""From RTP packets to pictures and sounds that carry their event."""

@@ -1,0 +1,218 @@
+"""One received stream: packets → frames → decoder → gate → readers."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import NamedTuple
+
+import av
+
+from lockstep.client.media.decoder import Decoded, Decoder, is_h264_keyframe, is_vp8_keyframe
+from lockstep.client.media.frame_assembler import Assembler, AudioAssembler, EncodedFrame, MediaPacket, VideoAssembler
+from lockstep.client.media.media_gate import Gated, MediaGate, Verdict
+from lockstep.client.media.newest_queue import NewestQueue
+from lockstep.client.media.render_log import Rendering, RenderLog
+from lockstep.client.statistics import StreamStatistics
+from lockstep.protocol.carriers import Carrier, split_trailer
+
+__all__ = ["Picture", "Sound", "Stream"]
+
+ENCODED_BOUND = 12  # frames that may wait for the decoder
+KEYFRAMES = {"VP8": is_vp8_keyframe, "H264": is_h264_keyframe}
+
+
+class Picture(NamedTuple):
+    """A picture that may be shown now."""
+
+    stream: str  # name of the camera
+    stamp: int | None  # event reference at capture; None only with the gate off
+    gap: int | None  # newest feedback's event minus the stamp
+    frame: av.VideoFrame
+
+
+class Sound(NamedTuple):
+    """A segment of sound that may be played now; fields as in `Picture`."""
+
+    stream: str
+    stamp: int | None
+    gap: int | None
+    frame: av.AudioFrame
+
+
+class Stream:
+    """Give it packets, run `run`, tell it of feedbacks, read from `open_reader`."""
+
+    def __init__(
+        self,
+        name: str,
+        kind: str,
+        codecs: dict[int, str],
+        carrier: Carrier,
+        gate: MediaGate[Decoded],
+        on_render: Callable[[str, int], None],
+        wall_clock: Callable[[], float] = time.time,
+    ) -> None:
+        self.name = name
+        self.kind = kind
+        self.carrier = carrier
+        self.gate = gate
+        self.codec = ""
+        self.log = RenderLog()
+        self._codecs = codecs
+        self._wall_clock = wall_clock
+        self._on_render = on_render
+        self._assembler: Assembler | None = None
+        self._encoded: NewestQueue[EncodedFrame] = NewestQueue(ENCODED_BOUND)
+        self._readers: list[NewestQueue[Decoded]] = []
+        self._packets = 0
+        self._frames = 0
+        self._unstamped = 0
+        self._closed = False
+        self._round_trip = 0.0  # s; 0 before one was measured
+        self._unread = 0  # dropped by readers that are gone
+
+    # From the network
+
+    def packet(self, payload_type: int, packet: MediaPacket) -> bool:
+        """Take one packet; whether to ask the sender for a keyframe."""
+        now = asyncio.get_running_loop().time()
+        assembler = self._assembler_for(payload_type)
+        if assembler is None:
+            return False
+        self._packets += 1
+        for frame in assembler.add(packet, now):
+            if not self._assembled(frame, assembler):
+                break  # those behind it build on it
+        return assembler.wants_keyframe(now)
+
+    def round_trip(self, seconds: float) -> None:
+        """A round trip to the sender takes so long."""
+        self._round_trip = seconds
+        if self._assembler is not None:
+            self._assembler.round_trip = seconds
+
+    def _assembler_for(self, payload_type: int) -> Assembler | None:
+        codec = self._codecs.get(payload_type, "")
+        if codec != self.codec and (codec in KEYFRAMES or self.kind == "audio"):
+            self.codec = codec
+            self._assembler = AudioAssembler() if self.kind == "audio" else VideoAssembler(KEYFRAMES[codec])
+            self._assembler.round_trip = self._round_trip
+        return self._assembler
+
+    def _assembled(self, frame: EncodedFrame, assembler: Assembler) -> bool:
+        """Whether the decoder will get it."""
+        self._frames += 1
+        if self.carrier == "trailer":
+            frame = _without_trailer(frame)
+        if frame.stamp is None:
+            self._unstamped += 1
+        if len(self._encoded) >= ENCODED_BOUND:
+            self._start_over(assembler)  # the decoder is too slow, and frames build on each other
+            return False
+        self._encoded.put(frame)
+        return True
+
+    def _start_over(self, assembler: Assembler) -> None:
+        self._encoded.clear()
+        assembler.broken()
+
+    # Through the decoder
+
+    async def run(self, executor: Executor) -> None:
+        """Decode until cancelled."""
+        loop = asyncio.get_running_loop()
+        decoder: Decoder | None = None
+        codec = ""
+        while True:
+            encoded = await self._encoded.get()
+            if decoder is None or codec != self.codec:
+                codec = self.codec
+                decoder = Decoder(codec)
+            try:
+                frames = await loop.run_in_executor(executor, decoder.decode, encoded)
+            except av.FFmpegError:
+                if self._assembler is not None:
+                    self._start_over(self._assembler)
+                continue
+            for frame in frames:
+                self._render(self.gate.offer(frame, frame.stamp, self._age(frame)))
+
+    # Through the gate, to the readers
+
+    def feedback(self, event: int) -> None:
+        """The newest feedback is of `event`."""
+        self._render(self.gate.feedback(event))
+
+    def check(self, medium: Decoded) -> tuple[Verdict, int | None]:
+        """The verdict now on a medium that a reader took."""
+        return self.gate.check(medium.stamp, self._age(medium))
+
+    def _age(self, medium: Decoded) -> float | None:
+        """Its age in s, if the sender's clock and this one agree; None when the medium does not carry its capture
+        time."""
+        return None if medium.captured is None else self._wall_clock() - medium.captured
+
+    def _render(self, gated: Gated[Decoded] | None) -> None:
+        if gated is None:
+            return
+        now = asyncio.get_running_loop().time()
+        feedback = self.gate.newest_feedback
+        self.log.add(Rendering(now, gated.stamp, gated.gap, feedback, self._age(gated.medium)))
+        for reader in self._readers:
+            reader.put(gated.medium)
+        if gated.stamp is not None:
+            self._on_render(self.name, gated.stamp)
+
+    def open_reader(self, bound: int) -> NewestQueue[Decoded]:
+        reader: NewestQueue[Decoded] = NewestQueue(bound)
+        if self._closed:
+            reader.close()
+        self._readers.append(reader)
+        return reader
+
+    def close_reader(self, reader: NewestQueue[Decoded]) -> None:
+        self._readers.remove(reader)
+        self._unread += reader.dropped
+
+    def close(self) -> None:
+        """No more media will arrive: readers read the remaining ones, and end."""
+        self._closed = True
+        for reader in self._readers:
+            reader.close()
+
+    def statistics(self) -> StreamStatistics:
+        gate = self.gate
+        return StreamStatistics(
+            stream=self.name,
+            kind=self.kind,
+            codec=self.codec,
+            carrier=self.carrier,
+            stamp=gate.stamp,
+            gap=gate.gap,
+            max_gap=gate.max_gap,
+            mean_gap=gate.mean_gap,
+            tolerance=gate.tolerance,
+            lag=gate.lag,
+            received=gate.received,
+            rendered=gate.rendered,
+            discarded=gate.discarded,
+            held=gate.held,
+            violations=gate.violations,
+            gate=gate.mode,
+            packets=self._packets,
+            frames=self._frames,
+            lost=self._assembler.lost if self._assembler is not None else 0,
+            unstamped=self._unstamped,
+            dropped=self._unread + self._encoded.dropped + sum(reader.dropped for reader in self._readers),
+        )
+
+
+def _without_trailer(frame: EncodedFrame) -> EncodedFrame:
+    data, trailer = split_trailer(frame.data)
+    if trailer is None:
+        return EncodedFrame(frame.timestamp, data, None)
+    microseconds = trailer.capture_time_us
+    return EncodedFrame(
+        frame.timestamp, data, trailer.event, None if microseconds is None else microseconds / 1_000_000
+    )

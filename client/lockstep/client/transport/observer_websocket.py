@@ -1,0 +1,192 @@
+"""An observer's way to the console beside a relay: one WebSocket for all that data channels would carry."""
+
+import asyncio
+import ssl
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, WebSocketException
+
+from lockstep.client.console_url import ConsoleLink
+from lockstep.client.errors import ConnectFailed, ConsoleError, SignallingRefused
+from lockstep.client.shielded_close import cancel_all
+from lockstep.client.transport.sdp import Section
+from lockstep.client.transport.sfu_media import RelayTicket
+from lockstep.client.transport.webrtc_peer import ChannelName
+from lockstep.client.transport.whep import Whep
+from lockstep.protocol.console import ClientMessage, Report, encode_console_message
+from lockstep.protocol.messages import Ping, StopTaken
+
+__all__ = ["LineBlocked", "ObserverWebSocket"]
+
+OPEN_SECONDS = 5.0
+UNREAD_SECONDS = 0.5  # more for an answer: a client that was held up has it waiting and has not read it
+CLOSE_SECONDS = 3.0
+MAX_MESSAGE = 1024 * 1024  # bytes; the list of a thousand participants is the largest
+MAX_WAITING = 64  # messages that could not leave yet; then the oldest go
+
+
+class LineBlocked(ConnectFailed):
+    """No WebSocket to the console, which answers over HTTP: a proxy or firewall on the way lets no WebSocket pass."""
+
+
+class ObserverWebSocket:
+    """Used as `Peer` is. Order: `negotiate`, `connect`, then `send` until `ended` is set, then `close`."""
+
+    def __init__(
+        self,
+        link: ConsoleLink,
+        relay: str,
+        tls_ca: Path | None,
+        on_message: Callable[[str | bytes], None],
+        silence_seconds: float,
+    ) -> None:
+        """`silence_seconds`: in which the console says something after a ping."""
+        self.ended = asyncio.Event()
+        self.why = ""  # it ended
+        self.skipped = 0  # messages that did not fit
+        self._link = link
+        self._relay = relay
+        self._tls_ca = tls_ca
+        self._on_message = on_message
+        self._silence_seconds = silence_seconds
+        self._whep = Whep(link, tls_ca)
+        self._socket: ClientConnection | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+        self._waiting: deque[str] = deque()
+        self._filled = asyncio.Event()
+        self._answer_due: asyncio.TimerHandle | None = None
+        self._closing = False
+
+    async def relay_ticket(self, peer: str = "") -> RelayTicket | None:
+        """Raises as `Whep.offer`."""
+        return await self._whep.relay(peer)
+
+    async def negotiate(self) -> list[Section]:
+        """Open the line. There are no media sections.
+
+        Raises:
+            SignallingRefused, ConnectFailed: as `Whep.offer`.
+            LineBlocked: the console takes one, but it cannot be opened; or it is a console that knows none.
+        """
+        try:
+            ticket = await self._whep.watch(self._relay)
+        except SignallingRefused as error:
+            if error.status in (404, 405):
+                raise LineBlocked("this console has no lines") from error
+            raise
+        try:
+            self._socket = await connect(
+                f"{self._link.base.replace('http', 'ws', 1)}/watch/{ticket}",
+                ssl=self._trust(),
+                open_timeout=OPEN_SECONDS,
+                close_timeout=1.0,
+                max_size=MAX_MESSAGE,
+                ping_interval=None,  # the reports ask, and so does the console
+                compression=None,
+                proxy=None if self._link.loopback else True,
+            )
+        except (OSError, TimeoutError, ImportError, WebSocketException) as error:
+            # ImportError: a proxy of a kind that takes a package which is not there.
+            await self._give_back(ticket)
+            raise LineBlocked(f"no WebSocket to the console ({error or type(error).__name__})") from error
+        return []
+
+    async def connect(self, seconds: float) -> None:
+        """Returns at once: the line is open."""
+        loop = asyncio.get_running_loop()
+        self._tasks = [
+            loop.create_task(self._hear(), name="watch line in"),
+            loop.create_task(self._tell(), name="watch line out"),
+        ]
+
+    def send(self, channel: ChannelName, message: ClientMessage) -> None:
+        """The kind of a message says which channel it is for."""
+        if self.ended.is_set():
+            return
+        if len(self._waiting) >= MAX_WAITING:
+            self._waiting.popleft()
+            self.skipped += 1
+        self._waiting.append(encode_console_message(message))
+        self._filled.set()
+        if self._answer_due is None and isinstance(message, Ping | Report):
+            self._answer_due = asyncio.get_running_loop().call_later(self._silence_seconds, self._overdue)
+
+    def lose(self, why: str) -> None:
+        """Count the connection as lost; the first reason stands."""
+        if not self._closing and not self.ended.is_set():
+            self.why = why
+            self.ended.set()
+
+    async def restart_ice(self, seconds: float) -> None:
+        """Raises ConnectFailed: there is no ICE in TCP."""
+        raise ConnectFailed("this observer's WebSocket to the console is TCP: for another path make a new Console")
+
+    async def stop_by_http(self, reason: str, press: str) -> StopTaken:
+        """The way to stop that needs no line; raises as `Whep.stop`."""
+        return await self._whep.stop(reason, press)
+
+    async def close(self) -> None:
+        """Idempotent."""
+        if self._closing:
+            return
+        self._closing = True
+        self.ended.set()
+        self._heard()
+        try:
+            await cancel_all(self._tasks)
+            if self._socket is not None:
+                async with asyncio.timeout(CLOSE_SECONDS):
+                    await self._socket.close()
+        except TimeoutError:
+            pass  # the console notices without a message
+        finally:
+            await self._whep.aclose()
+
+    async def _hear(self) -> None:
+        if self._socket is None:
+            return
+        try:
+            while True:
+                data = await self._socket.recv()
+                self._heard()
+                self._on_message(data)
+        except ConnectionClosed:
+            reason = self._socket.close_reason
+            self.lose(f"the console closed the connection ({reason})" if reason else "the console is gone")
+
+    async def _tell(self) -> None:
+        if self._socket is None:
+            return
+        try:
+            while True:
+                while self._waiting:
+                    await self._socket.send(self._waiting.popleft())
+                self._filled.clear()
+                await self._filled.wait()
+        except ConnectionClosed:
+            return  # heard as well
+
+    def _heard(self) -> None:
+        if self._answer_due is not None:
+            self._answer_due.cancel()
+            self._answer_due = None
+
+    def _overdue(self) -> None:
+        self._answer_due = asyncio.get_running_loop().call_later(UNREAD_SECONDS, self._no_answer)
+
+    def _no_answer(self) -> None:
+        self._answer_due = None
+        self.lose(f"the console did not answer for {self._silence_seconds:g} s")
+
+    def _trust(self) -> ssl.SSLContext | None:
+        return ssl.create_default_context(cafile=self._tls_ca) if self._link.secure else None
+
+    async def _give_back(self, ticket: str) -> None:
+        try:
+            async with asyncio.timeout(CLOSE_SECONDS):
+                await self._whep.decline(ticket)
+        except (TimeoutError, ConsoleError):
+            pass  # it ends without being cancelled

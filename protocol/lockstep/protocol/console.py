@@ -1,0 +1,393 @@
+"""Messages on the console's data channels: JSON text, the key `type` names the kind (docs/console-api.md).
+
+They stand here and not in `server/` because the server and the headless client both speak them and neither may
+import the other. JSON Schemas and the page's TypeScript types are generated from this file (scripts/generate_wire.py).
+
+| channel | reliability | who | messages |
+|---|---|---|---|
+| control | unordered, 0 retransmits | client | command, rest, report, ping |
+| | | server | feedback, refusal, pong |
+| session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
+| | | client | silence_stops |
+| | | server | welcome, robot, seat, participants, quality, speed_cap, sources, voice, recording, note_shared |
+| | | server | notice, refusal |
+| stop | reliable | client | stop, reset |
+| | | server | stop_state, stop_taken, refusal |
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from lockstep.protocol.carriers import Carrier
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.errors import MessageError
+from lockstep.protocol.messages import (
+    Command,
+    EventReference,
+    Feedback,
+    Ping,
+    Pong,
+    Refusal,
+    Reset,
+    Rest,
+    Stop,
+    StopState,
+    StopTaken,
+)
+
+__all__ = [
+    "ClientMessage",
+    "Note",
+    "Notice",
+    "Participant",
+    "Participants",
+    "Quality",
+    "RecordingState",
+    "Rename",
+    "Report",
+    "RobotState",
+    "Role",
+    "Seat",
+    "SeatClaim",
+    "SeatDecline",
+    "SeatGrant",
+    "SeatRelease",
+    "SeatRequest",
+    "SeatTake",
+    "ServerMessage",
+    "SharedNote",
+    "SilenceStops",
+    "SourceStatus",
+    "Sources",
+    "SpeedCapMode",
+    "SpeedCapState",
+    "StopStateNotice",
+    "StreamInfo",
+    "StreamOffer",
+    "StreamQuality",
+    "StreamReport",
+    "Tier",
+    "Voice",
+    "Welcome",
+    "decode_client_message",
+    "decode_server_message",
+    "encode_console_message",
+]
+
+Role = Literal["operator", "observer", "supervisor"]
+SpeedCapMode = Literal["on", "off", "operator"]  # the console's setting; "operator": as the holder of the seat wants
+Tier = Literal["operator", "high", "low"]  # of the encoded media: the operator's own, and the observers' two
+Name = Annotated[str, msgspec.Meta(max_length=60)]
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # a JavaScript number holds these exactly
+Difference = Annotated[int, msgspec.Meta(ge=-(2**53 - 1), le=2**53 - 1)]
+Milliseconds = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
+MAX_STREAMS = 32
+
+
+class StreamReport(msgspec.Struct, frozen=True, kw_only=True):
+    """How one stream does at a client, since it connected."""
+
+    stream: Name
+    carrier: Carrier
+    stamp: Count = 0  # last one seen; 0 before the first
+    gap: Difference = 0  # at the last rendering
+    max_gap: Difference = 0  # largest |gap| rendered
+    rendered: Count = 0
+    discarded: Count = 0
+    held: Count = 0
+    tolerance: Count = 0  # events; the tolerance of the person at the client
+    lag: Difference = 0  # largest feedback - stamp among what arrived since the last report, rendered or not
+    violations: Count = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
+    gate: Literal["event", "off", "age"] = "event"  # how it is gated now
+
+
+class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="report"):
+    """A client's statistics, a few times a second; also its heartbeat for the control seat."""
+
+    event: Count = 0  # newest feedback; 0 before the first
+    armed: bool = False
+    streams: Annotated[list[StreamReport], msgspec.Meta(max_length=MAX_STREAMS)] = []
+    picture_delay_ms: Milliseconds | None = None  # command to picture, on the client's own clock; None: not known now
+    round_trip_ms: Milliseconds | None = None
+    speed_cap: bool = False  # whether the operator wants the speed capped by the delay
+    ping: Difference | None = None  # id of a ping that travels with it; answered as a ping is
+
+
+class SeatRequest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_request"):
+    """Ask for the control seat; answered by `seat` to all, or by a refusal.
+
+    While another peer holds it the request is put to that peer, unless `only_if_free`: then it is refused.
+    """
+
+    only_if_free: bool = False
+
+
+class SeatGrant(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_grant"):
+    """The holder hands the seat to a peer that asked for it."""
+
+    peer: Name
+
+
+class SeatDecline(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_decline"):
+    """The holder refuses a peer that asked for the seat."""
+
+    peer: Name
+
+
+class SeatTake(msgspec.Struct, frozen=True, tag_field="type", tag="seat_take"):
+    """A supervisor takes the seat from its holder, at once."""
+
+
+class SeatRelease(msgspec.Struct, frozen=True, tag_field="type", tag="seat_release"):
+    """Give the control seat back."""
+
+
+class SilenceStops(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="silence_stops"):
+    """A supervisor silences the link of a peer that keeps pressing STOP, or lets it press again."""
+
+    peer: Name
+    silent: bool = True
+
+
+class Rename(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="rename"):
+    """The name that others see."""
+
+    name: Name
+
+
+class Note(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note"):
+    """Text to everyone."""
+
+    text: Annotated[str, msgspec.Meta(min_length=1, max_length=500)]
+
+
+class StreamInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """One negotiated medium."""
+
+    mid: str  # the media section of the answer
+    stream: str  # name of the camera or microphone
+    label: str
+    kind: Literal["video", "audio"]
+    codec: str  # "H264", "VP8", "opus", "PCMU"
+    carrier: Carrier
+
+
+class StreamOffer(msgspec.Struct, frozen=True, kw_only=True):
+    """A medium that a peer can ask for: the i-th of a kind is for the offer's i-th section of that kind."""
+
+    stream: str
+    label: str
+    kind: Literal["video", "audio"]
+
+
+class Welcome(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="welcome"):
+    """First message on `session`."""
+
+    peer: str  # this connection's id
+    role: Role
+    name: str
+    streams: list[StreamInfo]
+    voice: str = ""  # the media section in which this peer's voice is taken; "" when it is not
+
+
+class RobotState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="robot"):
+    """State of the robot link. A new epoch always comes with a new connection: the server closes the old one."""
+
+    link: Literal["up", "down"]
+    epoch: str
+    description: RobotDescription
+    detail: str = ""  # why it is down
+
+
+class SeatClaim(msgspec.Struct, frozen=True, kw_only=True):
+    """A request for the seat that its holder has not answered yet."""
+
+    peer: str
+    name: str
+    seconds_left: float  # then it counts as declined
+
+
+class Seat(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat"):
+    """Who may drive. `holder` is a peer id, empty when the seat is free."""
+
+    holder: str = ""
+    name: str = ""
+    why: str = ""  # "released", "heartbeat lost", "disconnected", "granted", "taken", "idle" …
+    claims: list[SeatClaim] = []
+    idle_seconds_left: float | None = None  # until the idle holder loses it; sent when the countdown begins or ends
+
+
+class Participant(msgspec.Struct, frozen=True, kw_only=True):
+    peer: str
+    name: str
+    role: Role
+    carrier: Carrier
+    gap: int = 0
+    picture_delay_ms: float | None = None
+    round_trip_ms: float | None = None
+    loss: float | None = None  # 0 to 1, of the media on the way to this peer
+    tier: Tier | None = None  # None: receives no video
+    silenced: bool = False  # a supervisor silenced the stops of its link
+
+
+class StreamQuality(msgspec.Struct, frozen=True, kw_only=True):
+    """How one camera's pictures are encoded for this peer now."""
+
+    stream: str
+    tier: Tier
+    width: int  # pixels
+    height: int
+    frames_per_second: float
+    bits_per_second: float  # the encoder's target
+    camera_frames_per_second: float = 0.0  # of which those are some or all; 0: not known
+
+
+class Quality(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="quality"):
+    """What the quality controller decided for this peer's pictures, and why; sent when it changes."""
+
+    streams: list[StreamQuality]
+    reason: str = ""  # "loss", "gap", "bandwidth", "round trip", "" when nothing limits
+    crowd: int = 0  # more than so many watch, so that each gets fewer pictures; 0: no crowd
+
+
+class SpeedCapState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="speed_cap"):
+    """Whether and how far the console caps the speed for the delay; sent to newcomers and when it changes."""
+
+    mode: SpeedCapMode
+    holds: bool = False  # whether the cap is in force
+    share: float = 1.0  # of each axis' full speed that may be used
+    delay_ms: float | None = None  # that it goes by; None: not known, or the cap is not in force
+    why: Literal["", "delay", "unknown"] = ""  # why the share is below 1
+
+
+class SourceStatus(msgspec.Struct, frozen=True, kw_only=True):
+    """A camera or microphone that is attached to the console itself."""
+
+    stream: str
+    label: str
+    state: Literal["waiting", "connecting", "live", "reconnecting"]  # waiting: for a publisher
+    detail: str = ""  # why it is not live; for a published one, its publisher
+
+
+class Sources(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="sources"):
+    """How they all do; sent to newcomers and on every change. Without any it is never sent."""
+
+    sources: list[SourceStatus]
+
+
+class Voice(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="voice"):
+    """Who is heard at the robot now; sent to everyone when it changes."""
+
+    peer: str = ""  # "" when no peer speaks
+    name: str = ""
+    trouble: str = ""  # why no voice can be heard now, as when the loudspeaker does not work
+
+
+class RecordingState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="recording"):
+    """Whether the session is recorded; sent to newcomers, when it changes, and every few seconds while it is."""
+
+    state: Literal["off", "recording", "failed"]
+    id: str = ""  # of the file that is written now; "" before the robot was reached
+    recording: str = ""  # common to all its files
+    name: str = ""  # that a person gave it
+    by: str = ""  # the person who started it; "" for none
+    since: float = 0.0  # s since 1970
+    bytes: Count = 0
+    lost: Count = 0  # records that were left out because the disk was too slow
+    detail: str = ""  # why it failed, or the reason to wait
+
+
+class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note_shared"):
+    """A participant's note, with the event it belongs to. Newcomers get the last ones."""
+
+    id: int
+    peer: str
+    name: str
+    role: Role
+    text: str
+    epoch: str  # of the event; "" before the robot was reached
+    event: EventReference
+    time: float  # s since 1970, the console's clock: for people to read, never for a decision
+
+
+class Participants(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="participants"):
+    participants: list[Participant]
+
+
+class StopStateNotice(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="stop_state"):
+    """The robot's stop state, as the bridge reports it; sent on every change and to newcomers."""
+
+    stop: StopState
+    event: EventReference
+
+
+class Notice(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="notice"):
+    """Something a person should read."""
+
+    level: Literal["info", "warning", "error"]
+    text: str
+
+
+ClientMessage = (
+    Command
+    | Rest
+    | Report
+    | Ping
+    | SeatRequest
+    | SeatGrant
+    | SeatDecline
+    | SeatTake
+    | SeatRelease
+    | SilenceStops
+    | Rename
+    | Note
+    | Stop
+    | Reset
+)
+ServerMessage = (
+    Feedback
+    | Refusal
+    | Pong
+    | Welcome
+    | RobotState
+    | Seat
+    | Participants
+    | Quality
+    | SpeedCapState
+    | Sources
+    | Voice
+    | RecordingState
+    | SharedNote
+    | Notice
+    | StopStateNotice
+    | StopTaken
+)
+
+_client_decoder: msgspec.json.Decoder[ClientMessage] = msgspec.json.Decoder(ClientMessage)
+_server_decoder: msgspec.json.Decoder[ServerMessage] = msgspec.json.Decoder(ServerMessage)
+_encoder = msgspec.json.Encoder()
+
+
+def encode_console_message(message: ClientMessage | ServerMessage) -> str:
+    return _encoder.encode(message).decode()
+
+
+def decode_client_message(text: str | bytes) -> ClientMessage:
+    """What a client sent.
+
+    Raises:
+        MessageError: not JSON, an unknown kind, or a field of the wrong type or range.
+    """
+    try:
+        return _client_decoder.decode(text)
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise MessageError(str(error)) from error
+
+
+def decode_server_message(text: str | bytes) -> ServerMessage:
+    """What the server sent; raises as `decode_client_message`."""
+    try:
+        return _server_decoder.decode(text)
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise MessageError(str(error)) from error

@@ -1,0 +1,233 @@
+"""`lockstep robot`: run a bridge."""
+
+import asyncio
+import contextlib
+import faulthandler
+import json
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvloop
+
+from lockstep.protocol.errors import SecretError
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.errors import (
+    BadRobot,
+    BridgeError,
+    DescriptionError,
+    InsecureLink,
+    ModelError,
+    SettingsError,
+    UnknownRobot,
+)
+from lockstep.robot_bridge.link.check_link import check_link
+from lockstep.robot_bridge.link.link_tls import LinkTls
+from lockstep.robot_bridge.new_robot import CannotWrite, class_name, write_new_robot
+from lockstep.robot_bridge.robots.base import Robot
+from lockstep.robot_bridge.robots.registry import create_robot, simulated_names
+from lockstep.robot_bridge.service_manager import ServiceManager
+from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.stop.mounts import is_in_memory
+from lockstep.robot_bridge.stop.state_place import default_place, older_places
+from lockstep.robot_bridge.watchdog.liveness import LIMIT, Liveness
+
+__all__ = ["main", "robot_app", "run"]
+
+SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+# Another try cannot mend these errors; the others may end, as a robot that is not switched on yet.
+CANNOT_BE_MEANT = (UnknownRobot, BadRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
+
+_logger = logging.getLogger(__name__)
+
+robot_app = typer.Typer(pretty_exceptions_enable=False)
+
+
+@robot_app.callback(invoke_without_command=True, context_settings={"allow_interspersed_args": True})
+def run(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class. "
+            "Or `new`, with a name behind it: writes a folder with a robot of your own to begin with."
+        ),
+    ] = "mobile-manipulator",
+    new_name: Annotated[str | None, typer.Argument(metavar="[NEW_NAME]", help="Behind `new` only: my_arm.")] = None,
+    ros2: Annotated[
+        Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
+    ] = None,
+    mjcf: Annotated[Path | None, typer.Option(help="Instead: a MuJoCo model of your own, this MJCF file.")] = None,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any free one.")] = 5600,
+    state_dir: Annotated[
+        Path | None,
+        typer.Option(
+            help="Directory of this robot alone that keeps a latched STOP over restarts; by default one of the robot's "
+            "name below ~/.local/state/lockstep/stops. Two robots of the same name need one each.",
+        ),
+    ] = None,
+    lockout_file: Annotated[
+        Path | None,
+        typer.Option(help="While this file exists the robot is locked; also while its folder cannot be read."),
+    ] = None,
+    event_log: Annotated[
+        Path | None, typer.Option(help="Append a JSON line for each event, refusal and medium.")
+    ] = None,
+    link_secret_file: Annotated[
+        Path | None,
+        typer.Option(
+            envvar="LOCKSTEP_LINK_SECRET_FILE",
+            help="File with the secret that clients have to know; or LOCKSTEP_LINK_SECRET.",
+        ),
+    ] = None,
+    link_tls_cert: Annotated[Path | None, typer.Option(help="Certificate: speak TLS.")] = None,
+    link_tls_key: Annotated[Path | None, typer.Option(help="Its key, if it stands in another file.")] = None,
+    link_tls_ca: Annotated[
+        Path | None, typer.Option(help="Ask clients for a certificate that this one signed.")
+    ] = None,
+    insecure_link: Annotated[
+        bool, typer.Option(help="Listen beyond loopback although any client there could drive the robot.")
+    ] = False,
+    event_strip: Annotated[
+        bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")
+    ] = False,
+    operator_grace: Annotated[
+        float,
+        typer.Option(min=0, help="Seconds for which a console whose link broke keeps the robot from other consoles."),
+    ] = 10.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the address as one JSON line once ready.")] = False,
+) -> None:
+    """Run a robot and its bridge until interrupted."""
+    if name == "new":
+        _write(new_name)
+        return
+    if new_name is not None:
+        raise typer.BadParameter(f"{new_name!r} is one argument too many")
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    file = ros2 or mjcf
+    known_as = (name,) if file is None else (file.stem, name)
+    place = state_dir or default_place(known_as[0])
+    try:
+        settings = BridgeSettings(
+            host=host,
+            port=port,
+            event_log=event_log,
+            lockout_file=lockout_file,
+            state_dir=place,
+            older_state_dirs=older_places(place, known_as),
+            secret=_secret(link_secret_file),
+            tls=_tls(link_tls_cert, link_tls_key, link_tls_ca),
+            insecure=insecure_link,
+            operator_grace=operator_grace,
+            event_strip=event_strip,
+        )
+        _warn_of_state(place)
+        check_link(settings)  # before the robot is made, which can take long
+        label, make = _choice(name, ros2, mjcf)
+        uvloop.run(_serve(label, make, settings, as_json))
+    except (BridgeError, SecretError) as error:
+        typer.echo(f"lockstep robot: {error.detail}", err=True)
+        raise typer.Exit(EXIT_USAGE if isinstance(error, CANNOT_BE_MEANT) else EXIT_FAILED) from error
+    except OSError as error:
+        typer.echo(f"lockstep robot: {error}", err=True)
+        raise typer.Exit(EXIT_FAILED) from error
+
+
+def _write(name: str | None) -> None:
+    """The folder of a new robot."""
+    if name is None:
+        raise typer.BadParameter("`new` needs a name: lockstep robot new my_arm")
+    try:
+        folder = write_new_robot(name, Path.cwd())
+    except (CannotWrite, OSError) as error:
+        typer.echo(f"lockstep robot new: {error}", err=True)
+        raise typer.Exit(EXIT_USAGE) from error
+    typer.echo(f"{folder.name}/ is written. Now: cd {folder.name} && lockstep up --robot {name}:{class_name(name)}")
+
+
+def _warn_of_state(directory: Path) -> None:
+    """Where a latched stop does not last."""
+    there = next(each for each in (directory, *directory.parents) if each.exists())
+    if is_in_memory(there):
+        _logger.warning("a latched STOP is lost when this machine is switched off: %s is in memory", directory)
+
+
+def _secret(path: Path | None) -> LinkSecret | None:
+    """The file's, or the environment's: an argument would be seen by everybody on the machine."""
+    if path is not None:
+        return LinkSecret.read(path)
+    text = os.environ.get(SECRET_VARIABLE, "")
+    return LinkSecret(text) if text else None
+
+
+def _tls(certificate: Path | None, key: Path | None, authority: Path | None) -> LinkTls | None:
+    if certificate is None and key is None and authority is None:
+        return None
+    return LinkTls(certificate=certificate, key=key, authority=authority)
+
+
+def _choice(name: str, ros2: Path | None, mjcf: Path | None) -> tuple[str, Callable[[], Robot]]:
+    """What is announced, and what makes the robot."""
+    if ros2 is not None and mjcf is not None:
+        raise typer.BadParameter("--ros2 and --mjcf are two robots; a bridge has one")
+    if ros2 is not None:
+        return str(ros2), partial(_ros2, ros2)
+    return (str(mjcf), partial(_mjcf, mjcf)) if mjcf is not None else (name, partial(create_robot, name))
+
+
+def _ros2(path: Path) -> Robot:
+    """Imported only when asked for, as all robots are."""
+    from lockstep.robot_bridge.robots.ros2 import create
+
+    return create(path)
+
+
+def _mjcf(path: Path) -> Robot:
+    from lockstep.robot_bridge.robots.mjcf import create
+
+    return create(path)
+
+
+async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings, as_json: bool) -> None:
+    stopping = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    # SIGHUP: its terminal was closed; SIGQUIT: Ctrl-\ there.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        loop.add_signal_handler(number, stopping.set)
+    liveness = Liveness(LIMIT, ServiceManager(os.environ))
+    async with Bridge(make(), settings, liveness=liveness) as bridge:
+        _announce(name, bridge, "tcp" if settings.tls is None else "tls", as_json)
+        waits = {loop.create_task(stopping.wait()), loop.create_task(bridge.wait())}
+        try:
+            done, _ = await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in waits:
+                task.cancel()
+        for task in done:
+            task.result()
+        bridge.report()
+
+
+def _announce(name: str, bridge: Bridge, scheme: str, as_json: bool) -> None:
+    host, port = bridge.address
+    url = f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
+    typer.echo(json.dumps({"robot": url}) if as_json else f"{name} at {url}")
+    sys.stdout.flush()
+    if as_json:  # the reader of that line may never read on, and a full pipe would hold up the ticks
+        with contextlib.suppress(OSError):
+            os.dup2(2, 1)  # later output goes to the log
+
+
+def main() -> None:
+    """The robot's own entry point, without the console."""
+    faulthandler.enable()  # a crash in native code, as of a GL driver, says where every thread was
+    robot_app(prog_name="lockstep robot")

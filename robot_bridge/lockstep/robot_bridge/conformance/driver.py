@@ -1,0 +1,220 @@
+"""An operator of the conformance check: answers feedback, moves little, and ends when somebody else stops the robot."""
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Command, Feedback, Goodbye, LinkMessage, Refusal, Reset, Stop, StopTaken
+from lockstep.protocol.serial import event_after, is_newer
+from lockstep.robot_bridge.conformance.errors import NotApplicable, StoppedByOther, Violation, expect
+from lockstep.robot_bridge.conformance.peer import Peer
+from lockstep.robot_bridge.conformance.waiting import PATIENCE, within
+from lockstep.robot_bridge.control.feedback_fit import misfit
+
+__all__ = ["BY", "Driver", "Motion", "first_motion"]
+
+BY = "lockstep check"  # who stops and resets
+TRIES = 5  # of a command that a bridge on a busy machine refuses, because it was held up itself
+MOST_AHEAD = 3  # events by which a bridge may delay feedback, to keep max_event_rate
+RESET_AGAIN = 0.1  # s between two tries to reset a stop that is too new
+
+
+class Motion(Protocol):
+    """What the cases may move, and which stops are theirs."""
+
+    presses: set[str]
+
+    def next_values(self, description: RobotDescription) -> list[float]:
+        """Of a small motion; the next one goes the other way."""
+
+
+class Driver:
+    """An operator link, its description and the newest feedback."""
+
+    def __init__(self, peer: Peer, description: RobotDescription, motion: Motion) -> None:
+        self.peer = peer
+        self.description = description
+        self.feedback = Feedback(event=1, issue=1, time=0.0, axes=[])  # until the first has come
+        self.began: dict[int, float] = {}  # event -> s of the bridge's clock, when it was first measured
+        self._motion = motion
+        self._next_command = 0.0  # s of the loop's clock: not before that, to keep max_event_rate
+
+    @property
+    def neutral(self) -> list[float]:
+        return [axis.rest for axis in self.description.axes]
+
+    def moving(self) -> list[float]:
+        """Raises:
+        NotApplicable: no axis of this robot moves.
+        """
+        return self._motion.next_values(self.description)
+
+    def command(self, values: Sequence[float], *, nonce: int | None = None, issue: int | None = None) -> Command:
+        """The next event, as an answer to the newest feedback unless told otherwise."""
+        newest = self.feedback
+        return Command(
+            event=event_after(newest.event),
+            issue=newest.issue if issue is None else issue,
+            values=list(values),
+            nonce=newest.nonce if nonce is None else nonce,
+        )
+
+    async def next(self) -> LinkMessage:
+        """The next message.
+
+        Raises:
+            Violation: the link ended, or a feedback does not fit the description.
+        """
+        message = await self.peer.next()
+        if message is None or isinstance(message, Goodbye):
+            raise Violation(f"the operator link ended: {message.error if message else 'without a goodbye'}")
+        if isinstance(message, Feedback):
+            self._take(message)
+        return message
+
+    async def heard(self, condition: Callable[[Feedback], bool], what: str, patience: float = PATIENCE) -> Feedback:
+        """The newest feedback, once it meets the condition.
+
+        Raises:
+            Violation: that took too long.
+        """
+        async with within(patience, f"no feedback within {patience:g} s says: {what}"):
+            while not condition(self.feedback):
+                await self.next()
+        return self.feedback
+
+    async def becomes(self, command: Command) -> Feedback:
+        """The first feedback of the event that this command is to become."""
+        return await self.heard(lambda feedback: feedback.event == command.event, f"event {command.event}")
+
+    async def fresh(self) -> Feedback:
+        """The next feedback, whichever."""
+        before = self.feedback
+        return await self.heard(lambda feedback: feedback is not before, "the state, once more")
+
+    async def drive(self, values: Sequence[float]) -> Feedback:
+        """One command, and its feedback. A bridge that was held up gets the neutral command first that it asks for.
+
+        Raises:
+            Violation: it was refused.
+        """
+        for _ in range(TRIES):
+            await self._pace()
+            refusal = await self._executed(self.command(values))
+            if refusal is None:
+                return self.feedback
+            expect(
+                refusal.reason in ("not_neutral", "late"),
+                f"a proper command was refused {refusal.reason}: {refusal.detail}",
+            )
+            await self.fresh()
+            if refusal.reason == "not_neutral" and list(values) != self.neutral:
+                await self.arm()
+        raise Violation(f"a proper command was refused {TRIES} times, not_neutral or late")
+
+    async def arm(self) -> None:
+        """What has to come before the first moving command."""
+        tries = 0
+        while self.feedback.neutral_needed or self.feedback.warning > 0:
+            await self.drive(self.neutral)
+            tries = 0 if self.feedback.warning > 0 else tries + 1
+            expect(tries < TRIES, "a neutral command executed, and neutral_needed stays true")
+
+    async def refused(self, message: Command | Reset, *reasons: str) -> Refusal:
+        """Send what has to be refused.
+
+        Raises:
+            Violation: it executed or was accepted, or was refused for another reason.
+        """
+        self.peer.send(message)
+        before = self.feedback.event
+        number = message.number if isinstance(message, Reset) else 0
+        wanted = message.event if isinstance(message, Command) else 0
+        async with within(PATIENCE, f"neither executed nor refused; it had to be refused {reasons[0]!r}"):
+            while True:
+                said = await self.next()
+                if isinstance(said, Refusal) and said.event in (wanted, 0) and said.stop == number:
+                    expect(said.reason in reasons, f"refused {said.reason!r}, not {' or '.join(map(repr, reasons))}")
+                    return said
+                if isinstance(said, Feedback) and isinstance(message, Command) and is_newer(said.event, before):
+                    raise Violation(f"it executed as event {said.event}; it had to be refused {reasons[0]!r}")
+                if isinstance(said, Feedback) and isinstance(message, Reset) and not said.stop.stopped:
+                    raise Violation(f"it released the stop; it had to be refused {reasons[0]!r}")
+
+    async def stop(self, press: str, peer: Peer | None = None) -> int:
+        """Press STOP, on this link or another; the number that the press has."""
+        self._motion.presses.add(press)
+        on = peer or self.peer
+        on.send(Stop(by=BY, reason="a case of the conformance check", press=press))
+        async with within(PATIENCE, "a stop was not answered with stop_taken"):
+            while not isinstance(said := await self.next() if on is self.peer else await on.find(StopTaken), StopTaken):
+                pass
+        expect(said.press == press, f"stop_taken names the press {said.press!r}, not {press!r}")
+        return said.number
+
+    async def reset(self) -> None:
+        """Release the newest stop as soon as the bridge lets that happen."""
+        number = self.feedback.stop.number
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + PATIENCE
+        while self.feedback.stop.stopped:
+            expect(loop.time() < deadline, f"a reset that names the newest stop, {number}, does not release it")
+            self.peer.send(Reset(by=BY, number=number))
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(RESET_AGAIN):
+                    while self.feedback.stop.stopped:
+                        await self.next()
+
+    async def _executed(self, command: Command) -> Refusal | None:
+        """None: it did."""
+        self.peer.send(command)
+        longest = PATIENCE + MOST_AHEAD / self.description.max_event_rate
+        async with within(longest, "a proper command was neither executed nor refused"):
+            while self.feedback.event != command.event:
+                said = await self.next()
+                if isinstance(said, Refusal) and said.event == command.event:
+                    return said
+                jumped = isinstance(said, Feedback) and is_newer(said.event, command.event)
+                expect(not jumped, f"event {command.event} was commanded, and event {self.feedback.event} is current")
+        return None
+
+    async def _pace(self) -> None:
+        loop = asyncio.get_running_loop()
+        await asyncio.sleep(max(0.0, self._next_command - loop.time()))
+        self._next_command = loop.time() + 1 / self.description.max_event_rate
+
+    def _take(self, feedback: Feedback) -> None:
+        stop = feedback.stop
+        if stop.stopped and (stop.by != BY or stop.press not in self._motion.presses):
+            raise StoppedByOther(f"somebody stopped the robot: {stop.by or 'nobody named'}: {stop.reason}")
+        if wrong := misfit(feedback, self.description):
+            raise Violation(wrong)
+        expect(
+            not is_newer(self.feedback.event, feedback.event) or not self.feedback.axes,
+            f"event {self.feedback.event} was current, and now {feedback.event} is",
+        )
+        self.feedback = feedback
+        if feedback.issue == 1:  # a later one says nothing of when the event began
+            self.began[feedback.event] = feedback.time
+
+
+def first_motion(description: RobotDescription, fraction: float, direction: int) -> list[float]:
+    """Every axis at rest but one, which gets a fraction of its range.
+
+    Raises:
+        NotApplicable: no axis moves.
+    """
+    values = [axis.rest for axis in description.axes]
+    signal = "" if description.start_warning is None else description.start_warning.axis
+    for index, axis in enumerate(description.axes):
+        if axis.name == signal or axis.minimum == axis.maximum:
+            continue
+        up, down = axis.maximum - axis.rest, axis.rest - axis.minimum
+        if direction > 0:
+            values[index] += fraction * up if up > 0 else -fraction * down
+        else:
+            values[index] -= fraction * down if down > 0 else -fraction * up
+        return values
+    raise NotApplicable("no axis of this robot moves")

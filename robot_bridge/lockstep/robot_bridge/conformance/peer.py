@@ -1,0 +1,244 @@
+"""One connection to a bridge that says only what a case tells it to, besides heartbeats."""
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import TypeVar
+
+from lockstep.protocol.errors import FramingError, LinkLost, LinkRefused, MessageError
+from lockstep.protocol.framing import MAX_CONTROL_FRAME, MAX_MEDIA_FRAME, FrameReader, frame
+from lockstep.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
+from lockstep.protocol.messages import (
+    Challenge,
+    Goodbye,
+    Hello,
+    LinkMessage,
+    LinkRole,
+    Ping,
+    Pong,
+    decode_message,
+    encode_message,
+)
+from lockstep.robot_bridge.conformance.errors import Violation
+from lockstep.robot_bridge.conformance.place import Place
+from lockstep.robot_bridge.conformance.waiting import PATIENCE, within
+
+__all__ = ["Peer", "opened"]
+
+Kind = TypeVar("Kind", bound=LinkMessage)
+
+PING_INTERVAL = 0.2  # s
+MAX_WAITING = 64  # messages that wait for the case; of more, the oldest is forgotten
+
+
+class Peer(asyncio.Protocol):
+    """`send` and `write` say something, `next` and `find` hear. Heartbeats run while `beats` is true."""
+
+    def __init__(self) -> None:
+        self.beats = True  # False: neither pings nor pongs, so that the bridge should take this side for dead
+        self.ended = False  # the connection is over
+        self.pings: list[int] = []  # ids of those that came
+        self._frames = FrameReader(MAX_MEDIA_FRAME)
+        self._waiting: deque[LinkMessage] = deque(maxlen=MAX_WAITING)
+        self._broken: Violation | None = None  # what the bridge sent cannot be read
+        self._news = asyncio.Event()
+        self._transport: asyncio.Transport | None = None
+        self._beat: asyncio.TimerHandle | None = None
+        self._pinged = 0
+
+    # What a case does
+
+    def send(self, *messages: LinkMessage) -> None:
+        self.write(b"".join(frame(encode_message(message)) for message in messages))
+
+    def write(self, data: bytes) -> None:
+        """Bytes as they are."""
+        if self._transport is not None and not self.ended:
+            self._transport.write(data)
+
+    async def next(self, patience: float = PATIENCE) -> LinkMessage | None:
+        """The next message besides heartbeats; None at the end of the stream.
+
+        Raises:
+            Violation: nothing came in time, or something that is no message.
+        """
+        async with within(patience, f"nothing came for {patience:g} s"):
+            while not self._waiting and not self.ended and self._broken is None:
+                self._news.clear()
+                await self._news.wait()
+        if self._waiting:
+            return self._waiting.popleft()
+        if self._broken is not None:
+            raise self._broken
+        return None
+
+    async def find(
+        self, kind: type[Kind], accept: Callable[[Kind], bool] = lambda message: True, patience: float = PATIENCE
+    ) -> Kind:
+        """The next message of this kind that is accepted; others are passed over.
+
+        Raises:
+            Violation: it did not come in time, or the link ended.
+        """
+        wanted = kind.__name__.lower()
+        async with within(patience, f"no such {wanted} within {patience:g} s"):
+            while (message := await self.next(patience + 1)) is not None:
+                if isinstance(message, kind) and accept(message):
+                    return message
+                if isinstance(message, Goodbye):
+                    raise Violation(f"the link ended: {message.error}; a {wanted} was expected")
+        raise Violation(f"the connection ended; a {wanted} was expected")
+
+    async def ends(self, *errors: str, patience: float = PATIENCE) -> None:
+        """The bridge ends the link, with a goodbye that names one of these errors.
+
+        Raises:
+            Violation: it does not, or for another reason.
+        """
+        goodbye = await self._goodbye(patience)
+        if goodbye.error not in errors:
+            raise Violation(f"the link ended with {goodbye.error!r}, not {' or '.join(map(repr, errors))}")
+        if await self.next() is not None:
+            raise Violation("a message came after the goodbye")
+
+    async def hello(self, role: LinkRole, secret: LinkSecret | None = None, name: str = "") -> Hello:
+        """Shake hands.
+
+        Raises:
+            LinkRefused: the bridge said goodbye; the detail begins with its error.
+            Violation: its answer is none that the protocol knows.
+        """
+        said = Hello(role=role, name=name, nonce=b"" if secret is None else draw_nonce())
+        self.send(said)
+        answer = await self._answer()
+        nonce = b""
+        if isinstance(answer, Challenge) and secret is not None:
+            nonce = answer.nonce
+            if len(nonce) != NONCE_BYTES:
+                raise Violation(f"a challenge of {len(nonce)} bytes, not {NONCE_BYTES}")
+            proof = secret.client_proof(said.nonce, nonce, role)
+            self.send(Hello(role=role, name=name, nonce=said.nonce, proof=proof))
+            answer = await self._answer()
+        if isinstance(answer, Goodbye):
+            raise LinkRefused(f"{answer.error}: {answer.detail}")
+        if not isinstance(answer, Hello):
+            raise Violation(f"a hello was answered with {type(answer).__name__.lower()}")
+        if secret is not None and (
+            not nonce or not LinkSecret.same(answer.proof, secret.bridge_proof(said.nonce, nonce, answer.epoch))
+        ):
+            raise Violation("the bridge does not prove that it knows the link secret")
+        self._frames.max_frame = MAX_MEDIA_FRAME if role == "media" else MAX_CONTROL_FRAME
+        return answer
+
+    def drain(self) -> list[LinkMessage]:
+        """What has come and waits, without waiting for more."""
+        waiting = list(self._waiting)
+        self._waiting.clear()
+        return waiting
+
+    async def pinged(self, times: int, patience: float) -> int:
+        """Wait until so many pings came, or for so long; how many came."""
+        try:
+            async with asyncio.timeout(patience):
+                while len(self.pings) < times and not self.ended:
+                    self._news.clear()
+                    await self._news.wait()
+        except TimeoutError:
+            pass
+        return len(self.pings)
+
+    def leave(self) -> None:
+        """Say goodbye and close."""
+        self.send(Goodbye(error="closing"))
+        self._close()
+
+    def cut(self) -> None:
+        """Close without a word, as a link that breaks."""
+        self._close()
+
+    async def gone(self) -> None:
+        """Wait until the connection is closed."""
+        async with asyncio.timeout(PATIENCE):
+            while not self.ended:
+                self._news.clear()
+                await self._news.wait()
+
+    # asyncio.Protocol
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)  # TCP
+        self._transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        self._frames.feed(data)
+        try:
+            for payload in self._frames.frames():
+                self._take(decode_message(payload))
+        except (FramingError, MessageError) as error:
+            self._broken = self._broken or Violation(f"the bridge sent what is no message: {error.detail}")
+        self._news.set()
+
+    def connection_lost(self, error: Exception | None) -> None:
+        self.ended = True
+        self._stop_beating()
+        self._news.set()
+
+    async def _goodbye(self, patience: float) -> Goodbye:
+        async with within(patience, f"the link is still open after {patience:g} s"):
+            while not isinstance(said := await self.next(patience + 1), Goodbye):
+                if said is None:
+                    raise Violation("the connection ended without a goodbye")
+                if isinstance(said, Hello):
+                    raise Violation("it was admitted")
+        return said
+
+    async def _answer(self) -> LinkMessage | None:
+        answer = await self.next()
+        if isinstance(answer, Hello) and self._beat is None:
+            self._ping()
+        return answer
+
+    def _take(self, message: LinkMessage) -> None:
+        if isinstance(message, Ping):
+            self.pings.append(message.id)
+            if self.beats:
+                self.send(Pong(id=message.id))
+        elif not (isinstance(message, Pong) and 0 < message.id <= self._pinged):  # our own heartbeats' are no news
+            self._waiting.append(message)
+
+    def _ping(self) -> None:
+        if self.beats and not self.ended:
+            self._pinged += 1
+            self.send(Ping(id=self._pinged))
+        self._beat = asyncio.get_running_loop().call_later(PING_INTERVAL, self._ping)
+
+    def _stop_beating(self) -> None:
+        if self._beat is not None:
+            self._beat.cancel()
+        self._beat = None
+
+    def _close(self) -> None:
+        self._stop_beating()
+        if self._transport is not None:
+            self._transport.close()
+
+
+@asynccontextmanager
+async def opened(place: Place) -> AsyncIterator[Peer]:
+    """A connection on which nothing was said yet; left with a goodbye, unless it is over.
+
+    Raises:
+        LinkLost: nobody listens there.
+    """
+    loop = asyncio.get_running_loop()
+    try:
+        async with asyncio.timeout(PATIENCE):
+            _, peer = await loop.create_connection(Peer, place.host, place.port, ssl=place.tls)
+    except (OSError, TimeoutError) as error:
+        raise LinkLost(f"{place.host}:{place.port}: {error or 'no answer'}") from error
+    try:
+        yield peer
+    finally:
+        peer.leave()
+        await peer.gone()

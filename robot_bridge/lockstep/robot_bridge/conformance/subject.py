@@ -1,0 +1,125 @@
+"""The bridge that is checked: opens links to it for the cases, and remembers which way the last motion went."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.errors import LinkRefused
+from lockstep.protocol.messages import Feedback, Hello, LinkRole
+from lockstep.robot_bridge.conformance.driver import Driver, first_motion
+from lockstep.robot_bridge.conformance.errors import NotApplicable, NotReady, Violation
+from lockstep.robot_bridge.conformance.peer import Peer, opened
+from lockstep.robot_bridge.conformance.place import Place
+from lockstep.robot_bridge.conformance.waiting import PATIENCE
+from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.errors import DescriptionError
+
+__all__ = ["FRACTION", "Subject", "described", "needs"]
+
+FRACTION = 0.1  # of an axis' limit, that the cases move it with
+TAKEN_AGAIN = 0.05  # s between two tries while the bridge has not yet seen that the last case left
+
+
+class Subject:
+    """Where it is, and what the cases share."""
+
+    def __init__(self, place: Place, fraction: float = FRACTION) -> None:
+        self.place = place
+        self.presses: set[str] = set()  # STOP presses of the cases
+        self._fraction = fraction
+        self._direction = -1  # of the last motion
+
+    def next_values(self, description: RobotDescription) -> list[float]:
+        """The values of a small motion; each goes the other way than the last, so that the robot stays where it is."""
+        self._direction = -self._direction
+        return first_motion(description, self._fraction, self._direction)
+
+    @asynccontextmanager
+    async def stranger(self) -> AsyncIterator[Peer]:
+        """A connection on which nothing was said yet."""
+        async with opened(self.place) as peer:
+            yield peer
+
+    @asynccontextmanager
+    async def link(self, role: LinkRole) -> AsyncIterator[tuple[Peer, Hello]]:
+        """With the handshake done.
+
+        Raises:
+            LinkRefused: the bridge said goodbye.
+        """
+        async with opened(self.place) as peer:
+            yield peer, await peer.hello(role, self.place.secret)
+
+    @asynccontextmanager
+    async def operator(self, *, armed: bool = True) -> AsyncIterator[Driver]:
+        """`armed`: the neutral command that comes before the first motion was executed."""
+        async with self._operator() as (peer, hello):
+            driver = Driver(peer, described(hello), self)
+            await driver.heard(lambda feedback: bool(feedback.axes), "the first state")
+            if armed and not driver.feedback.stop.stopped:
+                await driver.arm()
+            yield driver
+
+    async def first_look(self) -> Feedback:
+        """What the robot says before anything is tried.
+
+        Raises:
+            NotReady: it is stopped, locked or taken: that is not ours to change.
+            LinkLost: nobody listens there.
+        """
+        try:
+            async with self._operator() as (peer, _):
+                feedback = await peer.find(Feedback)
+        except LinkRefused as error:
+            raise NotReady(f"the bridge refuses an operator link: {error.detail}") from error
+        if feedback.stop.locked_out:
+            raise NotReady(f"the robot is locked: {feedback.stop.locked_out}")
+        if feedback.stop.stopped:
+            raise NotReady(f"the robot is stopped by {feedback.stop.by!r} ({feedback.stop.reason}): reset it first")
+        return feedback
+
+    async def clean_up(self) -> None:
+        """After a case: the robot at rest, and released where the case stopped it."""
+        async with self.operator(armed=False) as driver:
+            if driver.feedback.stop.stopped:
+                await driver.reset()
+            await driver.heard(lambda feedback: feedback.at_rest, "at rest after the case")
+        self.presses.discard("")  # from now on, a press without an id is somebody else's again
+
+    @asynccontextmanager
+    async def _operator(self) -> AsyncIterator[tuple[Peer, Hello]]:
+        """The last case's operator may only just have left, so `taken` is tried again for a while."""
+        deadline = asyncio.get_running_loop().time() + PATIENCE
+        while True:
+            async with opened(self.place) as peer:
+                try:
+                    hello = await peer.hello("operator", self.place.secret)
+                except LinkRefused as error:
+                    if not error.detail.startswith("taken") or asyncio.get_running_loop().time() > deadline:
+                        raise
+                else:
+                    yield peer, hello
+                    return
+            await asyncio.sleep(TAKEN_AGAIN)
+
+
+def described(hello: Hello) -> RobotDescription:
+    """Raises:
+    Violation: there is none, or it makes no sense.
+    """
+    if hello.description is None:
+        raise Violation("the bridge sent no description")
+    try:
+        check_description(hello.description)
+    except DescriptionError as error:
+        raise Violation(f"the description makes no sense: {error.detail}") from error
+    return hello.description
+
+
+def needs(condition: bool, what: str) -> None:
+    """Raises:
+    NotApplicable: this robot has nothing of the kind.
+    """
+    if not condition:
+        raise NotApplicable(what)

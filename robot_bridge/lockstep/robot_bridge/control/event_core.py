@@ -1,0 +1,320 @@
+"""The event reference and exactly-once execution. No I/O, no clock: the caller hands in `now`.
+
+Call order: `issue` once (the first feedback), then `command`, `rest`, `stop`, `reset` and the others in any order;
+after every tick, when `issue_due`, measure the robot and call `issue`, which answers the pending command or measures
+the current event again. Rules and reasons: docs/robot-link.md, "Exactly once" and "Coming to rest".
+"""
+
+import math
+import secrets
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from lockstep.protocol.description import Axis, StartWarning
+from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, StopState
+from lockstep.protocol.serial import FIRST_EVENT, event_after, event_gap, is_event, is_newer
+from lockstep.robot_bridge.control.restart_interlock import RestartInterlock
+from lockstep.robot_bridge.robots.base import Measurement
+from lockstep.robot_bridge.stop.stop_latch import ResetOutcome, ResetTaken, StopGiven, StopLatch, WriteOutcome
+
+__all__ = ["Absorbed", "Answered", "CommandOutcome", "EventCore", "Executed", "Refused", "draw_nonce"]
+
+REFRESH_INTERVAL = 0.5  # s between issues of the same event while nothing is commanded
+BURST = 2  # events that may arrive ahead of the event rate: the network bunches timely commands
+MAX_REMEMBERED_ISSUES = 1024  # of the current event; a forgotten issue counts as late
+MAX_NONCE = 2**53 - 1  # a JavaScript number holds these exactly
+
+
+def draw_nonce() -> int:
+    """A nonce that cannot be guessed; never 0, which stands for a command without a nonce."""
+    return 1 + secrets.randbelow(MAX_NONCE)
+
+
+class _Issued(NamedTuple):
+    """What a command has to know of the issue that it answers."""
+
+    time: float  # s
+    nonce: int
+    spell: int  # of the restart interlock
+
+
+class Executed(NamedTuple):
+    """Drive the axes with these values; the event is pending until the next `issue`."""
+
+    event: int
+    values: list[float]
+
+
+class Answered(NamedTuple):
+    """A repeat of the current event: send its stored feedback again."""
+
+    feedback: Feedback
+
+
+class Absorbed(NamedTuple):
+    """A repeat of the pending event: its feedback is on the way."""
+
+    event: int
+
+
+class Refused(NamedTuple):
+    refusal: Refusal
+
+
+CommandOutcome = Executed | Answered | Absorbed | Refused
+
+
+class EventCore:
+    """Owns `s`. Executes each event at most once, never on the strength of an old feedback or of one not seen, and
+    moves nothing before a neutral command where the interlock asks for one."""
+
+    def __init__(
+        self,
+        axes: Sequence[Axis],
+        *,
+        max_event_age: float,
+        first_event: int = FIRST_EVENT,
+        max_event_rate: float = math.inf,
+        refresh_interval: float = REFRESH_INTERVAL,
+        start_warning: StartWarning | None = None,
+        nonces: Callable[[], int] = draw_nonce,
+    ) -> None:
+        """`max_event_rate`: Hz, of answered commands. `nonces`: draws that of each issue."""
+        if not is_event(first_event):
+            raise ValueError(f"the first event must be a valid reference, not {first_event}")
+        self._rest_values = [axis.rest for axis in axes]
+        self._signal = "" if start_warning is None else start_warning.axis
+        self._drives = [axis.name != self._signal for axis in axes]  # all axes but a light or horn
+        self._max_event_age = max_event_age
+        self._refresh_interval = refresh_interval
+        self._interval = 1 / max_event_rate  # s between two answers
+        self._answer_at = -math.inf  # s, when an answer would be due if all of them kept that interval
+        self._current = first_event  # s: latest executed and answered event, 1
+        self._pending: int | None = None  # executed, waiting for its feedback, 2
+        self._feedback: Feedback | None = None  # latest issue of the current event; None before the first
+        self._issued_at = -math.inf  # s, when that was
+        self._issue = 0  # number of the current event's latest issue, 2
+        self._issued: dict[int, _Issued] = {}  # issues of the current event, oldest first
+        self._nonces = nonces
+        self._issue_wanted = True  # issue again at the end of this tick
+        self._rested: int | None = None  # moving commands up to this event are void, 2
+        self._latch = StopLatch()
+        self._interlock = RestartInterlock(start_warning)
+
+    @property
+    def current(self) -> int:
+        """The event reference `s`."""
+        return self._current
+
+    @property
+    def pending(self) -> int | None:
+        """The event that was executed and waits for its feedback; None without such an event."""
+        return self._pending
+
+    @property
+    def feedback(self) -> Feedback | None:
+        """The latest issue; None before the first."""
+        return self._feedback
+
+    @property
+    def stop_state(self) -> StopState:
+        return self._latch.state
+
+    def begin(self, latch: StopLatch) -> None:
+        """Before the first issue: the latch as it was left. From then on its verbs are called through the core."""
+        self._latch = latch
+
+    @property
+    def neutral_needed(self) -> bool:
+        """No moving command executes before a neutral one."""
+        return self._interlock.needed
+
+    def warns(self, now: float) -> float:
+        """s that the robot still warns before it may move; 0 when it does not."""
+        return self._interlock.warns(now)
+
+    def moves(self, values: Sequence[float]) -> bool:
+        """Whether these values are an intention to move; a light or horn alone is not."""
+        return any(
+            value != rest and drives
+            for value, rest, drives in zip(values, self._rest_values, self._drives, strict=True)
+        )
+
+    def command(self, command: Command, now: float) -> CommandOutcome:
+        """Decide about a command that arrived now."""
+        if len(command.values) != len(self._rest_values):
+            return self._refuse(
+                command, "wrong_size", f"{len(command.values)} values for {len(self._rest_values)} axes"
+            )
+        if not all(map(math.isfinite, command.values)):
+            return self._refuse(command, "not_a_number")
+        if self._latch.state.stopped:
+            return self._refuse(command, "stopped", self._latch.state.reason)
+        if command.event == self._current and self._feedback is not None:
+            return Answered(self._feedback)
+        if command.event == self._pending:
+            return Absorbed(command.event)
+        if command.event != event_after(self._current):  # also while an event is pending: that is the one after s
+            return self._refuse(command, "out_of_order")
+        return self._next_command(command, now)
+
+    def _next_command(self, command: Command, now: float) -> CommandOutcome:
+        issued = self._issued.get(command.issue)
+        if issued is None or now - issued.time > self._max_event_age:
+            self._issue_wanted = True
+            return self._refuse(command, "late")
+        if command.nonce != issued.nonce:
+            return self._refuse(command, "unseen")
+        moving = self.moves(command.values)
+        if moving and self._rested is not None and not is_newer(command.event, self._rested):
+            return self._refuse(command, "rested")
+        self._look(now)
+        if moving and (reason := self._interlock.refuses(now)) is not None:
+            return self._refuse(command, reason)
+        self._interlock.executed(moving=moving, spell=issued.spell, now=now)
+        if not self._interlock.needed:
+            self._latch.may_move()
+        self._pending = command.event
+        self._rested = None  # every event it could void is now behind; a stale mark must not survive the wrap
+        return Executed(command.event, command.values)
+
+    def refusal(self, event: int, reason: RefusalReason, detail: str = "", *, stop: int = 0) -> Refusal:
+        """A refusal that names the current event. `stop`: that a refused reset named."""
+        return Refusal(event=event, reason=reason, current=self._current, detail=detail[:500], stop=stop)
+
+    def rest(self, event: int) -> bool:
+        """Void moving commands up to `event`. True: bring the axes to rest; False: superseded by a newer event.
+
+        A reference further ahead than the next event cannot come from a correct peer. The axes still come to rest,
+        but nothing beyond the next event is voided, or one bad message would stop the robot for good.
+        """
+        newest = self._current if self._pending is None else self._pending
+        if is_newer(newest, event):
+            return False
+        following = event_after(newest)
+        ahead = is_newer(event, following) or event_gap(event, newest) < 0
+        voided = following if ahead else event
+        if self._rested is None or is_newer(voided, self._rested):  # rests may arrive in any order
+            self._rested = voided
+        return True
+
+    def stop(self, press: str, by: str, reason: str, now: float) -> StopGiven:
+        """Latch the stop, or count a further one. The axes come to rest if `is_new`."""
+        given = self._latch.stop(press, by, reason, now)
+        if given.is_new:
+            self.need_neutral()
+        return given
+
+    def reset(self, number: int, now: float) -> ResetOutcome:
+        """Release the stop, now or when the reset is on the disk; moves nothing."""
+        outcome = self._latch.reset(number, now)
+        if isinstance(outcome, ResetTaken):
+            self.need_neutral()
+        return outcome
+
+    def written(self, version: int, error: str = "") -> WriteOutcome:
+        """The latch's record of `version` is on the disk, or could not be written: what became of a reset."""
+        outcome = self._latch.written(version, error)
+        self._issue_wanted = True  # whether the state is kept is fed back too
+        if isinstance(outcome, ResetTaken):
+            self.need_neutral()
+        return outcome
+
+    def lock_out(self, reason: str, now: float) -> StopGiven | None:
+        """Somebody at the robot keeps it from being driven: a stop that no reset releases before `let_in`."""
+        given = self._latch.lock_out(reason, now)
+        self._issue_wanted = True
+        if given is not None:
+            self.need_neutral()
+        return given
+
+    def let_in(self) -> bool:
+        """The lock-out is over; the stop stays. False when there was none."""
+        if not self._latch.let_in():
+            return False
+        self.need_neutral()
+        return True
+
+    def need_neutral(self) -> None:
+        """From now on no moving command executes before a neutral one. The caller brings the axes to rest."""
+        self._interlock.require()
+        self._issue_wanted = True
+
+    def _look(self, now: float) -> None:
+        if self._interlock.look(now):
+            self._issue_wanted = True
+
+    def want_issue(self) -> None:
+        """Issue again at the end of this tick (a client joined)."""
+        self._issue_wanted = True
+
+    def issue_due(self, now: float) -> bool:
+        """Whether to measure and `issue` now.
+
+        An answer that comes sooner than the event rate allows waits, and with it the next event: nothing is refused.
+        A stop is fed back at once.
+        """
+        self._look(now)
+        if self._pending is not None and not self._latch.state.stopped:
+            return now >= self._answer_at - BURST * self._interval
+        if self._pending is not None or self._issue_wanted or self._feedback is None:
+            return True
+        return now - self._issued_at >= self._refresh_interval
+
+    def issue(
+        self,
+        measured: Measurement,
+        now: float,
+        limits: Sequence[str] = (),
+        unknown: Sequence[str] = (),
+        *,
+        time: float | None = None,
+    ) -> Feedback:
+        """The feedback of the pending event, which thereby becomes current, or of the current event again.
+
+        `time`: its time of issue, on the clock of capture times; None: `now`.
+        """
+        if self._pending is not None:
+            self._current, self._pending = self._pending, None
+            self._answer_at = max(now, self._answer_at) + self._interval
+            self._issued.clear()
+            self._issue = 0
+        self._issue += 1
+        self._issue_wanted = False
+        nonce, stop = self._nonces(), self._latch.state
+        self._remember_issue(_Issued(now, nonce, self._interlock.spell))
+        self._latch.shown(stop, now)
+        self._issued_at = now
+        self._feedback = Feedback(
+            event=self._current,
+            issue=self._issue,
+            time=now if time is None else time,
+            axes=measured.axes,
+            joints=measured.joints,
+            wrench=measured.wrench,
+            ranges=measured.ranges,
+            at_rest=measured.at_rest,
+            stop=stop,
+            faults=measured.faults,
+            limits=list(limits),
+            unknown=list(unknown),
+            nonce=nonce,
+            neutral_needed=self._interlock.needed,
+            warning=self._interlock.warns(now),
+        )
+        return self._feedback
+
+    def _remember_issue(self, issued: _Issued) -> None:
+        """Issues come in order of time, so the forgotten ones are always the oldest."""
+        while self._issued:
+            oldest = next(iter(self._issued))
+            if (
+                len(self._issued) < MAX_REMEMBERED_ISSUES
+                and issued.time - self._issued[oldest].time <= self._max_event_age
+            ):
+                break
+            del self._issued[oldest]
+        self._issued[self._issue] = issued
+
+    def _refuse(self, command: Command, reason: RefusalReason, detail: str = "") -> Refused:
+        return Refused(self.refusal(command.event, reason, detail))

@@ -1,0 +1,43 @@
+"""What stands in a feedback where the robot could not measure: the last value that was known. No I/O."""
+
+import math
+from collections.abc import Sequence
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.base import Measurement
+
+__all__ = ["LastKnown"]
+
+
+class LastKnown:
+    """Makes measurements fit for sending: every number is finite, and unknown ones are named."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._axis_names = [axis.name for axis in description.axes]
+        self._joint_names = [joint.name for joint in description.joints]
+        self._axes = [axis.rest for axis in description.axes]
+        self._joints = [0.0] * len(description.joints)
+
+    def settle(self, measured: Measurement) -> tuple[Measurement, list[str]]:
+        """The measurement, and the names of the axes and joints whose values in it are not of now."""
+        unknown: list[str] = []
+        self._axes = _settled(self._axis_names, measured.axes, self._axes, unknown)
+        self._joints = _settled(self._joint_names, measured.joints, self._joints, unknown)
+        return measured._replace(
+            axes=list(self._axes),
+            joints=list(self._joints),
+            wrench=_whole(measured.wrench),
+            ranges=_whole(measured.ranges),
+        ), unknown
+
+
+def _settled(names: Sequence[str], values: Sequence[float], before: Sequence[float], unknown: list[str]) -> list[float]:
+    if all(map(math.isfinite, values)):
+        return list(values)
+    unknown += [name for name, value in zip(names, values, strict=True) if not math.isfinite(value)]
+    return [value if math.isfinite(value) else last for value, last in zip(values, before, strict=True)]
+
+
+def _whole(values: list[float]) -> list[float]:
+    """A sensor's values belong together: one that is not a number leaves none of them."""
+    return values if all(map(math.isfinite, values)) else []

@@ -1,0 +1,92 @@
+"""What can go wrong in the bridge itself; the link's errors are in `lockstep.protocol.errors`.
+
+BridgeError
+├── RobotUnavailable        something that the robot needs is missing on this machine
+├── UnknownRobot            no robot of that name
+├── BadRobot                a class that was named makes no robot
+├── SettingsError           a settings file cannot be used; names its line and key
+├── ModelError              a MuJoCo model cannot be driven
+├── DescriptionError        the robot's description contradicts itself
+├── ListenError             the bridge cannot listen on the address
+├── InsecureLink            the bridge will not listen there without a secret or client certificates
+├── StateDirInUse           another bridge keeps its stop in the directory
+├── StateDirUnusable        the directory that keeps the stop cannot be made, read or written
+└── RobotFailed             the robot adapter raised while running
+"""
+
+__all__ = [
+    "BadRobot",
+    "BridgeError",
+    "DescriptionError",
+    "InsecureLink",
+    "ListenError",
+    "ModelError",
+    "RobotFailed",
+    "RobotUnavailable",
+    "SettingsError",
+    "StateDirInUse",
+    "StateDirUnusable",
+    "UnknownRobot",
+]
+
+
+class BridgeError(Exception):
+    """Base of the bridge's errors.
+
+    Attributes:
+        name: stable, lower-case identifier
+        detail: the fault and, where known, the remedy
+    """
+
+    name = "bridge"
+
+    def __init__(self, detail: str) -> None:
+        super().__init__(detail)
+        self.detail = detail
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.detail}"
+
+
+class RobotUnavailable(BridgeError):
+    name = "robot_unavailable"
+
+
+class UnknownRobot(BridgeError):
+    name = "unknown_robot"
+
+
+class BadRobot(BridgeError):
+    name = "bad_robot"
+
+
+class SettingsError(BridgeError):
+    name = "settings"
+
+
+class ModelError(BridgeError):
+    name = "model"
+
+
+class DescriptionError(BridgeError):
+    name = "description"
+
+
+class ListenError(BridgeError):
+    name = "listen"
+
+
+class InsecureLink(BridgeError):
+    name = "insecure_link"
+
+
+class StateDirInUse(BridgeError):
+    name = "state_dir_in_use"
+
+
+class StateDirUnusable(BridgeError):
+    name = "state_dir"
+
+
+class RobotFailed(BridgeError):
+    name = "robot_failed"

@@ -1,0 +1,93 @@
+"""A file of all that happened to events, one JSON line each: the truth that tests compare against.
+
+Lines are written by a thread of its own from a bounded queue, never on the loop; what does not fit is counted.
+"""
+
+import logging
+import queue
+import threading
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from lockstep.robot_bridge.thread_name import name_thread
+
+__all__ = ["EventKind", "EventLog"]
+
+EventKind = Literal[
+    "locked_out",
+    "let_in",
+    "start",
+    "executed",
+    "feedback",
+    "refused",
+    "media",
+    "stop",
+    "reset",
+    "rest",
+    "limit",
+    "driven",
+    "at_rest",
+    "stall",
+]
+Field = str | int | float | bool | list[float] | list[str]
+
+MAX_WAITING = 10_000  # lines
+
+_logger = logging.getLogger(__name__)
+
+
+class EventLog:
+    """`record` may be called from the loop at any rate; `close` writes the waiting lines and blocks until they are
+    written."""
+
+    def __init__(self, path: Path) -> None:
+        """Appends to `path`.
+
+        Raises:
+            OSError: it cannot be opened.
+        """
+        self.dropped = 0
+        self._waiting: queue.Queue[dict[str, Field] | None] = queue.Queue(MAX_WAITING)
+        self._file = path.open("ab")
+        self._writer = threading.Thread(target=self._write, name="event-log", daemon=True)
+        self._writer.start()
+
+    def record(self, kind: EventKind, time: float, event: int, **fields: Field) -> None:
+        """`time` is the bridge's monotonic clock, as in feedback and media."""
+        try:
+            self._waiting.put_nowait({"kind": kind, "time": time, "event": event, **fields})
+        except queue.Full:
+            self.dropped += 1
+
+    def close(self) -> None:
+        """Call from a thread, or when blocking does not matter. May be called again."""
+        if self._writer.is_alive():
+            self._waiting.put(None)
+            self._writer.join()
+
+    def _write(self) -> None:
+        name_thread("event-log")
+        works = True
+        while (line := self._waiting.get()) is not None:
+            if works:
+                works = self._try(partial(self._append, line))
+            else:
+                self.dropped += 1
+        self._try(self._file.close)
+
+    def _append(self, line: dict[str, Field]) -> None:
+        self._file.write(msgspec.json.encode(line) + b"\n")
+        if self._waiting.empty():
+            self._file.flush()
+
+    def _try(self, work: Callable[[], None]) -> bool:
+        try:
+            work()
+        except OSError as error:
+            _logger.error("the event log is cut off here: %s", error)
+            return False
+        return True

@@ -1,0 +1,1 @@
+"""The robot link: connections, sessions, and their bounds (docs/robot-link.md)."""

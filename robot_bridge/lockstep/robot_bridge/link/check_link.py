@@ -1,0 +1,32 @@
+"""Whether the robot link may listen where it is told to, checked before it does."""
+
+import ipaddress
+
+from lockstep.robot_bridge.errors import InsecureLink
+from lockstep.robot_bridge.settings import BridgeSettings
+
+__all__ = ["check_link", "is_loopback"]
+
+
+def check_link(settings: BridgeSettings) -> None:
+    """Raises:
+    InsecureLink: nothing would keep strangers from driving the robot.
+    """
+    if settings.insecure or settings.secret is not None or is_loopback(settings.host):
+        return
+    if settings.tls is not None and settings.tls.authority is not None:
+        return
+    raise InsecureLink(
+        f"any client that reaches {settings.host or 'this machine'} could drive the robot: give --link-secret-file, or"
+        " --link-tls-cert with --link-tls-ca for client certificates, or --insecure-link if that is wanted"
+    )
+
+
+def is_loopback(host: str) -> bool:
+    """A name other than localhost may lead anywhere."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

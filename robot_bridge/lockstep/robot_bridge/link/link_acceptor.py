@@ -1,0 +1,201 @@
+"""Accepts connections of the robot link, at a bounded rate, and shakes hands for TLS where that is asked for."""
+
+import asyncio
+import contextlib
+import socket
+import ssl
+from collections.abc import Callable
+from functools import partial
+
+from lockstep.robot_bridge.link.applicants import Applicants
+from lockstep.robot_bridge.link.known_addresses import KnownAddresses
+
+__all__ = ["LinkAcceptor", "listening_socket"]
+
+HANDSHAKE_TIMEOUT = 2.0  # s
+SILENCE = 4.0  # s that a TLS client may take for its first record
+PAUSE = 0.1  # s, when the system has no descriptor left
+BACKLOG = 128
+RATE = 1000.0  # connections accepted per second; the others wait in the kernel, and cost the robot nothing
+BURST = 100
+HANDSHAKE_RATE = 100.0  # TLS handshakes a second, each a millisecond of the loop, and as many of known addresses
+HANDSHAKE_BURST = 20
+TLS_HEADER = 5  # bytes of a TLS record, of which the last two are its length (RFC 8446 5.1)
+MAX_HELLO = 16 * 1024  # bytes of a record
+
+
+def listening_socket(host: str, port: int) -> socket.socket:
+    """Raises:
+    OSError: the address cannot be had.
+    """
+    if not host and socket.has_dualstack_ipv6():
+        return socket.create_server(("", port), family=socket.AF_INET6, dualstack_ipv6=True, backlog=BACKLOG)
+    found = {
+        each[0] for each in socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    }
+    family = socket.AF_INET if socket.AF_INET in found else socket.AF_INET6
+    return socket.create_server((host, port), family=family, backlog=BACKLOG)
+
+
+class _Pace:
+    """`rate` a second, `burst` at once; the others wait in the order in which they came."""
+
+    def __init__(self, rate: float, burst: float) -> None:
+        self._rate, self._burst = rate, burst
+        self._tokens = burst
+        self._filled = 0.0  # s, when tokens were added last
+        self._turn = asyncio.Lock()
+
+    async def take(self) -> None:
+        async with self._turn:
+            now = asyncio.get_running_loop().time()
+            self._tokens = min(self._burst, self._tokens + (now - self._filled) * self._rate)
+            self._filled = now
+            if self._tokens < 1.0:
+                await asyncio.sleep((1.0 - self._tokens) / self._rate)
+            self._tokens -= 1.0
+
+
+class LinkAcceptor:
+    """Takes over a listening socket. `close` ends it and the handshakes under way. TLS begins when the client's first
+    record has arrived whole: a connection that sends less costs only a descriptor. Addresses from which a link was
+    admitted before do not wait for the handshakes of others.
+    """
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        context: ssl.SSLContext | None,
+        factory: Callable[[], asyncio.Protocol],
+        failed: Callable[[], None],
+        *,
+        max_handshakes: int,
+        known: KnownAddresses | None = None,
+    ) -> None:
+        """`failed`: a TLS handshake did. `max_handshakes`: that wait for a first record, and as many that go on."""
+        self._listener = listener
+        self._context = context
+        self._factory = factory
+        self._failed = failed
+        self._silent: Applicants[asyncio.Task[None]] = Applicants(max_handshakes)
+        self._shaking: Applicants[asyncio.Task[None]] = Applicants(max_handshakes)
+        self._accepting: asyncio.Task[None] | None = None
+        self._accepts = _Pace(RATE, BURST)
+        self._strangers = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
+        self._acquainted = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
+        self._known = known or KnownAddresses(None)
+        self._writing: asyncio.Task[None] | None = None
+        self._is_unwritten = False
+
+    def start(self) -> None:
+        self._listener.setblocking(False)
+        self._accepting = asyncio.get_running_loop().create_task(self._accept(), name="link acceptor")
+
+    def admitted(self, address: str) -> None:
+        """A link from there was."""
+        if self._context is None or not self._known.add(address):
+            return
+        self._is_unwritten = True
+        if self._writing is None or self._writing.done():
+            self._writing = asyncio.get_running_loop().create_task(self._write_known(), name="known addresses")
+
+    async def _write_known(self) -> None:
+        while self._is_unwritten:
+            self._is_unwritten = False
+            await asyncio.to_thread(self._known.write)
+
+    async def close(self) -> None:
+        """May be called again."""
+        accepting, self._accepting = self._accepting, None
+        try:
+            if accepting is not None:
+                accepting.cancel()
+                await asyncio.wait([accepting])
+            if self._writing is not None:
+                await asyncio.wait([self._writing])
+        finally:  # also when the closing is cancelled: no other code closes it
+            self._listener.close()
+
+    async def _accept(self) -> None:
+        loop = asyncio.get_running_loop()
+        async with asyncio.TaskGroup() as tasks:
+            while True:
+                await self._accepts.take()
+                try:
+                    connection, address = await loop.sock_accept(self._listener)
+                except OSError:
+                    await asyncio.sleep(PAUSE)
+                    continue
+                task = tasks.create_task(self._open(connection, address[0]))
+                task.add_done_callback(partial(_close_if_cancelled, connection))
+                task.add_done_callback(self._silent.remove)
+                task.add_done_callback(self._shaking.remove)
+                if self._context is not None:
+                    self._bound(self._silent, task, address[0])
+
+    def _bound(self, applicants: Applicants[asyncio.Task[None]], task: asyncio.Task[None], address: str) -> None:
+        gone = applicants.add(task, address)
+        if gone is not None:
+            gone.cancel()
+
+    async def _open(self, connection: socket.socket, address: str) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            connection.setblocking(False)
+            if self._context is None:
+                await loop.connect_accepted_socket(self._factory, connection)
+                return
+            await _first_record(connection)
+            task = asyncio.current_task()
+            assert task is not None  # this is one
+            self._silent.remove(task)
+            self._bound(self._shaking, task, address)
+            await (self._acquainted if address in self._known else self._strangers).take()
+            await loop.connect_accepted_socket(
+                self._factory, connection, ssl=self._context, ssl_handshake_timeout=HANDSHAKE_TIMEOUT
+            )
+        except OSError:  # ssl.SSLError and TimeoutError among them
+            if self._context is not None:
+                self._failed()
+            with contextlib.suppress(OSError):
+                connection.close()
+        except asyncio.CancelledError:
+            self._failed()
+            raise
+
+
+def _close_if_cancelled(connection: socket.socket, task: asyncio.Task[None]) -> None:
+    """Also a task that was cancelled before its first step."""
+    if task.cancelled():
+        with contextlib.suppress(OSError):
+            connection.close()
+
+
+async def _first_record(connection: socket.socket) -> None:
+    """Returns when a whole TLS record can be read. Raises OSError when no record arrives in time."""
+    async with asyncio.timeout(SILENCE):
+        await _readable(connection, TLS_HEADER)
+        header = connection.recv(TLS_HEADER, socket.MSG_PEEK)
+        length = int.from_bytes(header[3:])
+        if len(header) < TLS_HEADER or length > MAX_HELLO:
+            raise ConnectionAbortedError("no TLS")
+        await _readable(connection, TLS_HEADER + length)
+
+
+async def _readable(connection: socket.socket, count: int) -> None:
+    """Returns when so many bytes are there, or the connection has ended."""
+    loop = asyncio.get_running_loop()
+    came = loop.create_future()
+
+    def readable() -> None:
+        loop.remove_reader(connection)
+        if not came.done():
+            came.set_result(None)
+
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)
+    loop.add_reader(connection, readable)
+    try:
+        await came
+    finally:
+        loop.remove_reader(connection)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, 1)

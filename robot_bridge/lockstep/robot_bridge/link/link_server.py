@@ -1,0 +1,319 @@
+"""The bridge's listening side: admits links, hands their messages on, sends to them by role."""
+
+import asyncio
+import math
+import ssl
+import time
+from collections import Counter
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Protocol
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.framing import frame
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.messages import (
+    Command,
+    EventNotice,
+    Feedback,
+    Goodbye,
+    Hello,
+    LinkMessage,
+    Media,
+    Reset,
+    Rest,
+    Stop,
+    encode_message,
+)
+from lockstep.robot_bridge.counters import BridgeCounters
+from lockstep.robot_bridge.errors import ListenError
+from lockstep.robot_bridge.link.applicants import Applicants
+from lockstep.robot_bridge.link.known_addresses import KnownAddresses
+from lockstep.robot_bridge.link.link_acceptor import LinkAcceptor, listening_socket
+from lockstep.robot_bridge.link.link_session import BadInput, BridgeSession
+from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL, LinkTransport
+from lockstep.robot_bridge.link.message_rate import MessageRate
+
+__all__ = ["LinkHandler", "LinkPeer", "LinkServer"]
+
+CLOSE_TIMEOUT = 1.0  # s for goodbyes to leave when the bridge closes
+READ_RATE = 500.0  # messages per second of a link that are read, on average; a watcher sends less than a tenth
+OPERATOR_READ_RATE = 5000.0  # of the operator link, on which a console passes on the stops of many people
+READ_BURST = 50.0  # at once: about a millisecond of the loop
+
+
+GOODBYES = frozenset(
+    ("handshake", "version", "role", "unauthorised", "taken", "full", "framing", "silent", "closing", "lost")
+)  # names that are counted; docs/robot-link.md, "Goodbyes"
+
+
+class LinkHandler(Protocol):
+    """What the server needs of the bridge. All methods return at once."""
+
+    def link_opened(self, peer: "LinkPeer") -> None:
+        """A link was admitted; its hello is on the way."""
+
+    def link_message(self, peer: "LinkPeer", message: Command | Rest | Stop | Reset) -> None:
+        """A valid message that the link's role permits."""
+
+    def link_bad_input(self, peer: "LinkPeer", bad: BadInput) -> None:
+        """Something else, on a link that lives on; already counted."""
+
+    def operator_lost(self) -> None:
+        """The operator link ended, for any reason."""
+
+
+class LinkPeer(LinkTransport):
+    """One admitted or applying link."""
+
+    def __init__(self, server: "LinkServer", clock: Callable[[], float], secret: LinkSecret | None) -> None:
+        now = clock()
+        session = BridgeSession(now, self._admit, secret)
+        self._reads = MessageRate(READ_RATE, READ_BURST, now)
+        super().__init__(session, clock, self._reads)
+        self._bridge_session = session
+        self._server = server
+        self.name = ""  # the client's own name, "console"
+        self.address = ""  # where it comes from, "10.0.0.9"
+
+    def _admit(self, hello: Hello) -> Hello | Goodbye:
+        self.name = hello.name
+        answer = self._server.admit(self, hello)
+        if isinstance(answer, Hello) and hello.role == "operator":
+            self._reads.rate = OPERATOR_READ_RATE
+        return answer
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        address = transport.get_extra_info("peername")
+        self.address = str(address[0]) if address else ""
+        self._server.connected(self)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if self._bridge_session.challenged:
+            self._server.challenged(self)
+
+    def received(self, event: LinkMessage | BadInput) -> None:
+        self._server.received(self, event)
+
+    def lost(self) -> None:
+        self._server.ended(self)
+
+    def connection_lost(self, error: Exception | None) -> None:
+        super().connection_lost(error)
+        self._server.disconnected(self)
+
+
+class LinkServer:
+    """Owns the listening socket and every link. `run` must be running for heartbeats."""
+
+    def __init__(
+        self,
+        handler: LinkHandler,
+        description: RobotDescription,
+        epoch: str,
+        counters: BridgeCounters,
+        *,
+        max_links: int,
+        max_strangers: int,
+        operator_grace: float = 0.0,
+        addresses_file: Path | None = None,
+        secret: LinkSecret | None = None,
+        tls: ssl.SSLContext | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._handler = handler
+        self._hello = Hello(role="robot", name=description.name, epoch=epoch, description=description)
+        self._counters = counters
+        self._max_links = max_links
+        self._max_strangers = max_strangers
+        self._operator_grace = operator_grace
+        self._addresses = KnownAddresses(addresses_file)
+        self._kept_for = ""  # name of the client whose operator link broke; "" when none has
+        self._kept_until = -math.inf  # s, for that client
+        self._secret = secret
+        self._tls = tls
+        self._clock = clock
+        self._connections: set[LinkPeer] = set()  # sockets, those that are closing included
+        self._silent: Applicants[LinkPeer] = Applicants(max_strangers)  # have not said hello
+        self._challenged: Applicants[LinkPeer] = Applicants(max_strangers)  # have, and owe the proof
+        self._known: set[LinkPeer] = set()  # admitted
+        self._operator: LinkPeer | None = None
+        self._events: set[LinkPeer] = set()
+        self._media: set[LinkPeer] = set()
+        self._acceptor: LinkAcceptor | None = None
+        self._all_gone = asyncio.Event()
+
+    @property
+    def operator(self) -> LinkPeer | None:
+        """The operator link; None without one."""
+        return self._operator
+
+    @property
+    def links(self) -> int:
+        """Sockets that are open."""
+        return len(self._connections)
+
+    async def listen(self, host: str, port: int) -> tuple[str, int]:
+        """Listen; returns the address.
+
+        Raises:
+            ListenError: the address cannot be had.
+        """
+        await asyncio.to_thread(self._addresses.read)
+        try:
+            listener = await asyncio.to_thread(listening_socket, host, port)  # which may look up a name
+        except OSError as error:
+            raise ListenError(f"cannot listen on {host}:{port}: {error}") from error
+        address = listener.getsockname()
+        self._acceptor = LinkAcceptor(
+            *(listener, self._tls, self._new_peer, self._tls_failed),
+            max_handshakes=self._max_strangers,
+            known=self._addresses,
+        )
+        self._acceptor.start()
+        return str(address[0]), int(address[1])
+
+    def _new_peer(self) -> LinkPeer:
+        return LinkPeer(self, self._clock, self._secret)
+
+    def _tls_failed(self) -> None:
+        self._counters.bad_input["tls"] += 1
+
+    async def run(self) -> None:
+        """Heartbeats, until cancelled."""
+        while True:
+            await asyncio.sleep(TICK_INTERVAL)
+            for peer in list(self._connections):
+                peer.tick()
+
+    async def close(self, reason: str = "the bridge is closing") -> None:
+        """Stop listening, say goodbye to all with this reason, and wait until they are gone."""
+        acceptor, self._acceptor = self._acceptor, None
+        if acceptor is not None:
+            await acceptor.close()
+        for peer in list(self._connections):
+            peer.end("closing", reason)
+        try:
+            async with asyncio.timeout(CLOSE_TIMEOUT):
+                while self._connections:
+                    self._all_gone.clear()
+                    await self._all_gone.wait()
+        except TimeoutError:
+            for peer in list(self._connections):
+                peer.abort()
+
+    def publish_feedback(self, feedback: Feedback) -> None:
+        """To the operator link; its event to the event links."""
+        if self._operator is not None:
+            self._operator.send(feedback)
+        if self._events:
+            notice = encode_once(EventNotice(event=feedback.event, time=feedback.time))
+            for peer in self._events:
+                peer.send_encoded("event", notice)
+
+    def publish_media(self, media: Media) -> None:
+        """To every media link, newest wins per stream."""
+        encoded = encode_once(media)
+        for peer in self._media:
+            peer.send_media(media, encoded)
+
+    def drops(self) -> Counter[str]:
+        """What links that did not keep up have missed, those gone included."""
+        return sum((peer.drops for peer in self._connections), self._counters.drops)
+
+    # called by the links
+
+    def admit(self, peer: LinkPeer, hello: Hello) -> Hello | Goodbye:
+        """Called once the peer has proven the secret, where there is one."""
+        if not self._has_room(hello):
+            return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
+        if hello.role == "operator" and self._operator is not None:
+            return Goodbye(error="taken", detail="another operator link is open")
+        if hello.role == "operator" and self._is_kept_from(hello.name):
+            left = self._kept_until - self._clock()
+            return Goodbye(error="taken", detail=f"kept for {self._kept_for}, whose link broke, for {left:.0f} s more")
+        self._forget_applicant(peer)
+        self._known.add(peer)
+        if self._acceptor is not None:
+            self._acceptor.admitted(peer.address)
+        match hello.role:
+            case "operator":
+                self._operator = peer
+                self._kept_for = ""
+            case "events":
+                self._events.add(peer)
+                return Hello(role="robot", name=self._hello.name, epoch=self._hello.epoch)
+            case _:
+                self._media.add(peer)
+        return self._hello
+
+    def _has_room(self, hello: Hello) -> bool:
+        """The last place is the operator's: a console comes back, no matter how many links others open."""
+        others = len(self._known) - (self._operator is not None)
+        return others < (self._max_links if hello.role == "operator" else self._max_links - 1)
+
+    def _is_kept_from(self, name: str) -> bool:
+        """Whether another client's operator link broke just now: a stall gives the robot to no other client."""
+        return self._kept_for not in ("", name) and self._clock() < self._kept_until
+
+    def connected(self, peer: LinkPeer) -> None:
+        self._connections.add(peer)
+        if self._acceptor is None:
+            peer.end("closing", "the bridge is closing")
+        else:
+            self._bound(self._silent, peer)
+
+    def challenged(self, peer: LinkPeer) -> None:
+        """It has said hello and owes the proof: those who say nothing cannot push it out any more."""
+        if peer in self._silent:
+            self._silent.remove(peer)
+            self._bound(self._challenged, peer)
+
+    def _bound(self, applicants: Applicants[LinkPeer], peer: LinkPeer) -> None:
+        gone = applicants.add(peer, peer.address)
+        if gone is not None:
+            gone.end("full", "too many connections that have not been admitted")
+
+    def _forget_applicant(self, peer: LinkPeer) -> None:
+        self._silent.remove(peer)
+        self._challenged.remove(peer)
+
+    def received(self, peer: LinkPeer, event: LinkMessage | BadInput) -> None:
+        match event:
+            case BadInput():
+                self._counters.bad_input[event.name] += 1
+                if peer.session.ended is None:
+                    self._handler.link_bad_input(peer, event)
+            case Hello():
+                self._handler.link_opened(peer)
+            case Command() | Rest() | Stop() | Reset():
+                self._handler.link_message(peer, event)
+            case _:
+                raise AssertionError(f"the session let {type(event).__name__} through")
+
+    def ended(self, peer: LinkPeer) -> None:
+        if peer.session.ended is not None:
+            error = peer.session.ended.error  # which the peer may have made up
+            self._counters.endings[error if error in GOODBYES else "other"] += 1
+        self._forget_applicant(peer)
+        self._known.discard(peer)
+        self._events.discard(peer)
+        self._media.discard(peer)
+        if self._operator is peer:
+            self._operator = None
+            if not peer.session.left:
+                self._kept_for, self._kept_until = peer.name, self._clock() + self._operator_grace
+            self._handler.operator_lost()
+
+    def disconnected(self, peer: LinkPeer) -> None:
+        self._connections.discard(peer)
+        self._counters.drops.update(peer.drops)
+        self._all_gone.set()
+
+
+def encode_once(message: LinkMessage) -> Callable[[], bytes]:
+    """The message's frame, encoded at the first call and shared by the others."""
+    return cache(lambda: frame(encode_message(message)))

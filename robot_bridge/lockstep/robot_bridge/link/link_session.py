@@ -1,0 +1,380 @@
+"""One connection of the robot link, seen from either side. No I/O, no clock (docs/robot-link.md, "Connections").
+
+Call order: `receive` with bytes as they come, `tick` every 50 ms or so, `end` to say goodbye; after each of them send
+what `take_outgoing` returns and, once `ended` is set, close. An ended session stays ended.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Generator
+from contextlib import closing
+from enum import Enum
+from typing import Literal, NamedTuple
+
+import msgspec
+
+from lockstep.protocol.errors import FramingError, MessageError
+from lockstep.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader
+from lockstep.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
+from lockstep.protocol.messages import (
+    PROTOCOL_VERSION,
+    Challenge,
+    Command,
+    EventNotice,
+    Feedback,
+    Goodbye,
+    Hello,
+    LinkMessage,
+    LinkRole,
+    Media,
+    Ping,
+    Pong,
+    Refusal,
+    Reset,
+    Rest,
+    Stop,
+    StopTaken,
+    decode_message,
+)
+from lockstep.robot_bridge.control.feedback_fit import misfit
+from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.errors import DescriptionError
+from lockstep.robot_bridge.link.message_rate import MessageRate
+
+__all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState", "kind_of"]
+
+PING_INTERVAL = 0.2  # s
+SILENCE = 1.0  # s without a valid message after which the other side is taken for dead, and `ROUND_TRIPS` besides
+ROUND_TRIPS = 4  # in which TCP has found out about a loss and repaired it, though what repairs it may be lost too
+MOST_SILENCE = 5.0  # s, even when the other side lengthens the round trip by late pongs
+PINGS_OUT = 64  # of which a pong still tells the round trip
+HELLO_TIMEOUT = 2.0  # s
+OWN_STALL = 0.5  # s between two ticks; more means that we did not look, not that the other side was silent
+
+FROM_CLIENT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
+    "operator": (Command, Rest, Stop, Reset),
+    "events": (Stop,),
+    "media": (Stop,),
+}
+FROM_ROBOT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
+    "operator": (Feedback, Refusal, StopTaken),
+    "events": (EventNotice, Refusal, StopTaken),
+    "media": (Media, Refusal, StopTaken),
+}
+
+
+class LinkState(Enum):
+    HANDSHAKE = "handshake"
+    OPEN = "open"
+    ENDED = "ended"
+
+
+class BadInput(NamedTuple):
+    """Something the other side should not have sent; it counts as nothing but bad input."""
+
+    name: Literal["malformed", "not_allowed", "framing", "handshake", "unauthorised"]
+    detail: str
+    event: int = 0  # of a command that was not allowed; 0 otherwise
+
+
+class LinkSession:
+    """What both sides share: frames, permissions, heartbeats, silence."""
+
+    def __init__(self, now: float, *, max_frame: int) -> None:
+        self.state = LinkState.HANDSHAKE
+        self.role: LinkRole | None = None  # the client's role; None before it is known
+        self.ended: Goodbye | None = None  # why it ended, by either side; None while it lives
+        self.left = False  # the other side ended it because it goes away
+        self._reader = FrameReader(max_frame)
+        self._allowed: tuple[type[LinkMessage], ...] = ()
+        self._outgoing: list[LinkMessage] = []
+        self._opened = now
+        self._last_valid = now
+        self._last_tick = now
+        self._last_ping = now
+        self._ping_id = 0
+        self._pings: OrderedDict[int, float] = OrderedDict()  # id -> when it was sent, of those without a pong
+        self._round_trip = 0.0  # s, smoothed; 0 before it was measured
+
+    @property
+    def patience(self) -> float:
+        """Seconds of silence after which the other side is taken for dead.
+
+        A loss holds back everything behind it until TCP has repeated it, which takes round trips: on a long path a
+        link that waited for a second alone would end with nearly every loss.
+        """
+        return min(SILENCE + ROUND_TRIPS * self._round_trip, MOST_SILENCE)
+
+    @property
+    def missing(self) -> int:
+        """Bytes that a large message still needs; 0: none is on its way."""
+        return self._reader.missing
+
+    @property
+    def waits(self) -> bool:
+        """Whether received bytes were not read because `rate` was used up: call `receive` again later."""
+        return self.ended is None and self._reader.has_frame
+
+    def receive(self, data: bytes, now: float, rate: MessageRate | None = None) -> list[LinkMessage | BadInput]:
+        """The messages in these bytes, in order; heartbeats are answered here and not returned. `rate`: messages beyond
+        it wait; None: no bound.
+        """
+        events: list[LinkMessage | BadInput] = []
+        self._reader.feed(data)
+        with closing(self._reader.frames()) as frames:
+            self._read(frames, events, now, rate)
+        return events
+
+    def _read(
+        self,
+        frames: Generator[bytes | bytearray],
+        events: list[LinkMessage | BadInput],
+        now: float,
+        rate: MessageRate | None,
+    ) -> None:
+        while self.ended is None and (rate is None or rate.left):
+            try:
+                payload = next(frames, None)
+            except FramingError as error:
+                events.append(BadInput("framing", error.detail))
+                self.end("framing", error.detail)
+                break
+            if payload is None:
+                break
+            if rate is not None:
+                rate.spend(len(payload))
+            event = self._receive_frame(payload, now)
+            if event is not None:
+                events.append(event)
+
+    def _receive_frame(self, payload: bytes | bytearray, now: float) -> LinkMessage | BadInput | None:
+        try:
+            message = decode_message(payload)
+        except MessageError as error:
+            if self.state is LinkState.HANDSHAKE:
+                self.end("handshake", error.detail)
+            return BadInput("malformed", error.detail)
+        if self.state is LinkState.HANDSHAKE:
+            return self._shake_hands(message, now)
+        return self._receive_open(message, now)
+
+    def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        match message:
+            case Ping(id=number):
+                self._last_valid = now
+                self._outgoing.append(Pong(id=number))
+                return None
+            case Pong(id=number):
+                self._last_valid = now
+                sent = self._pings.pop(number, None)
+                if sent is not None:
+                    self._measured(now - sent)
+                return None
+            case Goodbye():
+                self.left = message.error == "closing"
+                self._finish(message)
+                return None
+        if isinstance(message, self._allowed):
+            self._last_valid = now
+            return message
+        event = message.event if isinstance(message, Command) else 0
+        return BadInput("not_allowed", f"{kind_of(message)} on a link of role {self.role}", event)
+
+    def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        raise NotImplementedError
+
+    def _open(self, role: LinkRole, allowed: tuple[type[LinkMessage], ...], now: float) -> None:
+        self.role, self._allowed, self._last_valid = role, allowed, now
+        self.state = LinkState.OPEN
+
+    def _measured(self, round_trip: float) -> None:
+        """One more round trip; smoothed as TCP does (RFC 6298 2.3)."""
+        before = self._round_trip
+        self._round_trip = round_trip if before == 0.0 else before + (round_trip - before) / 8
+
+    def tick(self, now: float) -> None:
+        """Send heartbeats that are due; end a silent session."""
+        gap, self._last_tick = now - self._last_tick, now
+        if gap > OWN_STALL:
+            self._last_valid = min(now, self._last_valid + gap)
+            self._opened += gap
+        if self.ended is not None:
+            return
+        if self.state is LinkState.HANDSHAKE:
+            if now - self._opened > HELLO_TIMEOUT:
+                self.end("silent", f"no hello within {HELLO_TIMEOUT:g} s")
+        elif now - self._last_valid > self.patience:
+            self.end("silent", f"nothing valid received for {self.patience:.1f} s")
+        elif now - self._last_ping >= PING_INTERVAL:
+            self._last_ping = now
+            self._ping_id += 1
+            self._pings[self._ping_id] = now
+            if len(self._pings) > PINGS_OUT:
+                self._pings.popitem(last=False)
+            self._outgoing.append(Ping(id=self._ping_id))
+
+    def end(self, error: str, detail: str = "") -> None:
+        """Say goodbye; nothing is received afterwards."""
+        if self.ended is None:
+            goodbye = Goodbye(error=error, detail=detail[:500])
+            self._outgoing.append(goodbye)
+            self._finish(goodbye)
+
+    def lose(self, detail: str) -> None:
+        """The connection ended without a goodbye."""
+        if self.ended is None:
+            self._finish(Goodbye(error="lost", detail=detail[:500]))
+
+    def _finish(self, goodbye: Goodbye) -> None:
+        self.ended = goodbye
+        self.state = LinkState.ENDED
+
+    def take_outgoing(self) -> list[LinkMessage]:
+        """What the session wants sent, in order; each message is returned once."""
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing
+
+
+class BridgeSession(LinkSession):
+    """The bridge's side. `admit` answers a hello of a known version and role: with our hello, or a goodbye.
+
+    With a secret it is asked only about clients that have proven to know it.
+    """
+
+    def __init__(self, now: float, admit: Callable[[Hello], Hello | Goodbye], secret: LinkSecret | None = None) -> None:
+        super().__init__(now, max_frame=MAX_HELLO_FRAME)
+        self._admit = admit
+        self._secret = secret
+        self._challenged: Hello | None = None  # the hello that was answered with a challenge
+        self._challenged_at = now
+        self._nonce = b""  # of that challenge
+
+    @property
+    def challenged(self) -> bool:
+        """Whether the client has said a proper hello and owes the proof."""
+        return self._challenged is not None and self.state is LinkState.HANDSHAKE
+
+    def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        """Returns the hello when it was admitted."""
+        if not isinstance(message, Hello):
+            return self._reject("handshake", f"the first message must be hello, not {kind_of(message)}")
+        if message.version != PROTOCOL_VERSION:
+            return self._reject("version", f"this bridge speaks version {PROTOCOL_VERSION}, not {message.version}")
+        if message.role not in FROM_CLIENT:
+            return self._reject("role", f"a client cannot have the role {message.role}")
+        if self._secret is None:
+            return self._open_for(message, b"", now)
+        if self._challenged is None:
+            return self._challenge(message, now)
+        self._measured(now - self._challenged_at)
+        return self._check(message, self._challenged, self._secret, now)
+
+    def _challenge(self, hello: Hello, now: float) -> BadInput | None:
+        if len(hello.nonce) != NONCE_BYTES:
+            return self._reject("unauthorised", "this bridge asks for the link secret")
+        self._challenged, self._challenged_at, self._nonce = hello, now, draw_nonce()
+        self._outgoing.append(Challenge(nonce=self._nonce))
+        return None
+
+    def _check(self, hello: Hello, first: Hello, secret: LinkSecret, now: float) -> LinkMessage | BadInput | None:
+        proof = secret.client_proof(first.nonce, self._nonce, first.role)
+        if not LinkSecret.same(hello.proof, proof) or (hello.role, hello.nonce) != (first.role, first.nonce):
+            return self._reject("unauthorised", "wrong link secret")
+        return self._open_for(hello, first.nonce, now)
+
+    def _open_for(self, hello: Hello, client_nonce: bytes, now: float) -> LinkMessage | None:
+        answer = self._admit(hello)
+        if isinstance(answer, Goodbye):
+            self.end(answer.error, answer.detail)
+            return None
+        if self._secret is not None:
+            proof = self._secret.bridge_proof(client_nonce, self._nonce, answer.epoch)
+            answer = msgspec.structs.replace(answer, proof=proof)
+        self._open(hello.role, FROM_CLIENT[hello.role], now)
+        self._reader.max_frame = MAX_CONTROL_FRAME
+        self._outgoing.append(answer)
+        return hello
+
+    def _reject(self, error: str, detail: str) -> BadInput:
+        self.end(error, detail)
+        return BadInput("unauthorised" if error == "unauthorised" else "handshake", detail)
+
+
+class ClientSession(LinkSession):
+    """The client's side: sends its hello at once and returns the bridge's.
+
+    With a secret it goes on only with a bridge that has proven to know it too.
+    """
+
+    def __init__(self, now: float, role: LinkRole, name: str = "", secret: LinkSecret | None = None) -> None:
+        super().__init__(now, max_frame=MAX_CONTROL_FRAME)
+        if role not in FROM_ROBOT:
+            raise ValueError(f"a client cannot have the role {role}")
+        self.role = role
+        self.hello: Hello | None = None  # the bridge's; None before the handshake
+        self._secret = secret
+        self._bridge_nonce: bytes | None = None  # None before a challenge
+        self._said = Hello(role=role, name=name, nonce=b"" if secret is None else draw_nonce())
+        self._outgoing.append(self._said)
+
+    def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        if isinstance(message, Goodbye):
+            self._finish(message)
+            return None
+        if isinstance(message, Challenge):
+            return self._answer(message)
+        if not isinstance(message, Hello):
+            return self._reject("handshake", f"expected hello, not {kind_of(message)}")
+        if message.version != PROTOCOL_VERSION or message.role != "robot" or not message.epoch:
+            return self._reject("version", f"not a bridge of version {PROTOCOL_VERSION}")
+        if self.role != "events" and message.description is None:
+            return self._reject("handshake", "the bridge sent no description")
+        if not self._is_proven(message):
+            return self._reject("unauthorised", "the bridge does not prove that it knows the link secret")
+        try:
+            if message.description is not None:
+                check_description(message.description)
+        except DescriptionError as error:
+            return self._reject("description", f"the bridge's description is invalid: {error}")
+        assert self.role is not None  # set by __init__
+        self._measured(now - self._opened)
+        self._open(self.role, FROM_ROBOT[self.role], now)
+        self._reader.max_frame = MAX_MEDIA_FRAME if self.role == "media" else MAX_CONTROL_FRAME
+        self.hello = message
+        return message
+
+    def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
+        """A feedback that does not fit the description is bad input: no part could show or record it."""
+        described = None if self.hello is None else self.hello.description
+        if isinstance(message, Feedback) and isinstance(message, self._allowed) and described is not None:
+            wrong = misfit(message, described)
+            if wrong:
+                return BadInput("malformed", wrong)
+        return super()._receive_open(message, now)
+
+    def _answer(self, challenge: Challenge) -> BadInput | None:
+        if self._secret is None:
+            return self._reject("unauthorised", "the bridge asks for the link secret")
+        if self._bridge_nonce is not None or len(challenge.nonce) != NONCE_BYTES:
+            return self._reject("handshake", "not a challenge of this protocol")
+        self._bridge_nonce = challenge.nonce
+        proof = self._secret.client_proof(self._said.nonce, challenge.nonce, self._said.role)
+        self._outgoing.append(msgspec.structs.replace(self._said, proof=proof))
+        return None
+
+    def _is_proven(self, hello: Hello) -> bool:
+        """Without a secret the bridge needs no proof; with one, a bridge that did not ask for it is refused too."""
+        if self._secret is None:
+            return True
+        if self._bridge_nonce is None:
+            return False
+        proof = self._secret.bridge_proof(self._said.nonce, self._bridge_nonce, hello.epoch)
+        return LinkSecret.same(hello.proof, proof)
+
+    def _reject(self, error: str, detail: str) -> BadInput:
+        self.end(error, detail)
+        return BadInput("unauthorised" if error == "unauthorised" else "handshake", detail)
+
+
+def kind_of(message: LinkMessage) -> str:
+    """The `type` of the message on the wire."""
+    return str(message.__struct_config__.tag)

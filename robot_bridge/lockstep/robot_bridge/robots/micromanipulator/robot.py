@@ -1,0 +1,117 @@
+"""The micromanipulator: stepping drives, a needle that bends, and the microscope's view of them."""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
+from lockstep.robot_bridge.robots.camera_source import CameraSource
+from lockstep.robot_bridge.robots.micromanipulator.description import DESCRIPTION, MICROPHONE, MICROSCOPE, SIDE, START
+from lockstep.robot_bridge.robots.micromanipulator.draughtsman import Draughtsman
+from lockstep.robot_bridge.robots.micromanipulator.needle import Contact, Needle
+from lockstep.robot_bridge.robots.micromanipulator.sound import Sound
+from lockstep.robot_bridge.robots.micromanipulator.stepper import Stepper
+from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
+
+__all__ = ["MicromanipulatorState", "Micromanipulator"]
+
+LIGHT_RANGE: Final = (20.0, 130.0)  # %
+TOO_MUCH: Final = 300e-6  # N on the needle, from where on it is said so
+
+Vector = tuple[float, float, float]
+
+
+class MicromanipulatorState(NamedTuple):
+    """All that pictures need. Lengths in m, x forward, y left, z up from the glass."""
+
+    holder: Vector = START  # where the tip would be if the needle were straight
+    tip: Vector = START
+    force: Vector = (0.0, 0.0, 0.0)  # N, on the needle
+    contact: Contact | None = None
+    focus: float = 0.0  # height of the plane that is sharp
+    light: float = 100.0  # %
+
+
+class Micromanipulator(Robot):
+    """Axes: the probe's velocity along x, y and z, the focus' velocity, and the change of the light."""
+
+    tick_seconds = 0.004
+    rests_from_thread = True
+
+    def __init__(self) -> None:
+        self._drives = (*(Stepper(place) for place in START), Stepper(0.0))
+        self._needle = Needle(self._holder())
+        self._light = MicromanipulatorState().light
+        self._values: list[float] = [0.0] * len(DESCRIPTION.axes)
+        self._stopped = False  # no drive has a command to step
+        self._draughtsman = Draughtsman()
+        self._sound = Sound()
+        self._sources: tuple[MediaSource, ...] = (
+            CameraSource(MICROSCOPE, self._draughtsman.microscope, self.state),
+            CameraSource(SIDE, self._draughtsman.side, self.state),
+            MicrophoneSource(MICROPHONE, self._hear),
+        )
+
+    def describe(self) -> RobotDescription:
+        return DESCRIPTION
+
+    def apply(self, values: Sequence[float]) -> None:
+        self._values = [0.0] * len(DESCRIPTION.axes) if self._stopped else list(values)
+
+    def tick(self) -> None:
+        dt = self.tick_seconds
+        for drive, velocity in zip(self._drives, self._values, strict=False):
+            drive.tick(velocity, dt)
+        low, high = LIGHT_RANGE
+        self._light = min(max(self._light + self._values[-1] * dt, low), high)
+        self._needle.move(self._holder())
+
+    def measure(self) -> Measurement:
+        force = self._needle.force
+        return Measurement(
+            axes=[*(drive.speed for drive in self._drives), self._values[-1]],
+            joints=[drive.position for drive in self._drives],
+            wrench=[*force, 0.0, 0.0, 0.0],
+            ranges=[],
+            at_rest=not any(self._values) and not any(drive.speed for drive in self._drives),
+            faults=["the needle is bent too far"] if max(map(abs, force)) > TOO_MUCH else [],
+        )
+
+    def positions(self) -> Sequence[float]:
+        return [drive.position for drive in self._drives]
+
+    def state(self) -> MicromanipulatorState:
+        """The state now."""
+        needle = self._needle
+        return MicromanipulatorState(
+            holder=self._holder(),
+            tip=needle.tip,
+            force=needle.force,
+            contact=needle.contact,
+            focus=self._drives[3].position,
+            light=self._light,
+        )
+
+    def rest_from_thread(self) -> None:
+        self._values = [0.0] * len(DESCRIPTION.axes)
+
+    def stop(self) -> None:
+        self._stopped = True
+        self._values = [0.0] * len(DESCRIPTION.axes)
+
+    def reset(self) -> None:
+        self._stopped = False
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._sources
+
+    def close(self) -> None:
+        self._draughtsman.close()
+
+    def _hear(self) -> bytes:
+        return self._sound.segment(sum(drive.rate for drive in self._drives), math.hypot(*self._needle.force))
+
+    def _holder(self) -> Vector:
+        x, y, z, _ = self._drives
+        return (x.position, y.position, z.position)

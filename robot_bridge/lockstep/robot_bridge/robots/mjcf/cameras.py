@@ -1,0 +1,35 @@
+"""The model's cameras as streams; a free one when it has none."""
+
+from typing import Any, Final
+
+from lockstep.protocol.description import Camera
+from lockstep.robot_bridge.robots.mjcf.names import label_of, name_of
+from lockstep.robot_bridge.robots.mujoco_view.canvas import FREE_CAMERA
+
+__all__ = ["cameras_of"]
+
+MOST: Final = 4
+MAIN: Final = (640, 480, 30.0)
+OTHERS: Final = (320, 240, 15.0)
+SMALLEST, LARGEST = 64, 1280  # pixels
+
+
+def cameras_of(model: Any) -> dict[Camera, int]:
+    """Each with its number in the model, the main one first."""
+    if model.ncam == 0:
+        width, height, rate = MAIN
+        return {Camera(name="free", label="Overview", width=width, height=height, frame_rate=rate): FREE_CAMERA}
+    return {_camera(model, number): number for number in range(min(model.ncam, MOST))}
+
+
+def _camera(model: Any, number: int) -> Camera:
+    width, height, rate = MAIN if number == 0 else OTHERS
+    wide, high = (int(pixels) for pixels in model.cam_resolution[number])
+    if min(wide, high) > 1:  # the model says so itself
+        width, height = _fitting(wide), _fitting(high)
+    name = name_of(model, "camera", number)
+    return Camera(name=name, label=label_of(name), width=width, height=height, frame_rate=rate)
+
+
+def _fitting(pixels: int) -> int:
+    return min(max(pixels, SMALLEST), LARGEST) // 2 * 2

@@ -1,0 +1,241 @@
+"""A robot out of a MuJoCo model: its drives, senses and cameras around one simulation."""
+
+import logging
+import math
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from lockstep.protocol.description import AxisGain, Body, PositionLimit, RobotDescription
+from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
+from lockstep.robot_bridge.robots.camera_source import CameraSource
+from lockstep.robot_bridge.robots.mjcf.actuators import Kind, actuators_of
+from lockstep.robot_bridge.robots.mjcf.bodies import DRAWN_GROUPS, bodies_of
+from lockstep.robot_bridge.robots.mjcf.cameras import cameras_of
+from lockstep.robot_bridge.robots.mjcf.controls import layers_of
+from lockstep.robot_bridge.robots.mjcf.drives import Drive, drives_of
+from lockstep.robot_bridge.robots.mjcf.joints import joints_of
+from lockstep.robot_bridge.robots.mjcf.model_file import load_model
+from lockstep.robot_bridge.robots.mjcf.names import label_of
+from lockstep.robot_bridge.robots.mjcf.senses import range_sense, wrench_sense
+from lockstep.robot_bridge.robots.mujoco_view.canvas import Look
+from lockstep.robot_bridge.robots.mujoco_view.renderer import Renderer
+
+__all__ = ["MjcfRobot"]
+
+TICK: Final = 0.004  # s, about
+BUSIEST: Final = 0.6  # share of a tick that the simulation may take
+TRIED_TICKS: Final = 25
+WATCHDOG: Final = 0.25  # s; a simulation hurts no person, and busy machines hold it up
+REST_SPEED: Final = 0.02  # rad/s, or of the model's size per second
+MARGIN: Final = 0.01  # of a joint's range, that servos run on
+LATENCY: Final = 0.03  # s that servos follow late
+
+_logger = logging.getLogger(__name__)
+
+
+class MjcfRobot(Robot):
+    """Every actuator is an axis, but for velocity servos that only damp a position servo."""
+
+    rests_from_thread = True
+
+    def __init__(self, path: Path) -> None:
+        """Raises:
+        ModelError: the file is no model that can be driven.
+        RobotUnavailable: OpenGL cannot be used here.
+        """
+        mujoco.set_mju_user_warning(warn)  # else MuJoCo writes a file into the working directory
+        self.model = model = load_model(path)
+        self.data = data = mujoco.MjData(model)
+        self.restarts = 0
+        self._begin()
+        actuators = actuators_of(model)
+        self._drives = drives_of(model, data, actuators)
+        self._joints = joints_of(model)
+        self._wrench = wrench_sense(model)
+        self._ranges = range_sense(model, data)
+        cameras = cameras_of(model)
+        self._rest_values = [drive.axis.rest for drive in self._drives]
+        self._values = self._rest_values
+        self._stopped = False  # every drive holds its place, at any applied value
+        self._moving = self._moving_dofs()
+        self._description = self._describe(path.stem, tuple(cameras))
+        step = float(model.opt.timestep)
+        self._steps = max(1, round(TICK / step))
+        self.tick_seconds = self._steps * step
+        self._slowness = self._keep_up()
+        look = Look(
+            groups=tuple(int(group in DRAWN_GROUPS) for group in range(6)),
+            max_geoms=max(1000, 2 * model.ngeom),
+            cameras={camera.name: number for camera, number in cameras.items()},
+            has_soft_parts=bool(model.ntendon or model.nflex or model.nskin),
+        )
+        width, height = (max(getattr(camera, side) for camera in cameras) for side in ("width", "height"))
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        model.vis.quality.offsamples = model.vis.quality.shadowsize = 0  # on a CPU they cost ten times the rest
+        self._renderer = Renderer(model, width, height, look)
+        self._sources = tuple(CameraSource(camera, self._renderer.drawing(camera), self.snapshot) for camera in cameras)
+
+    def describe(self) -> RobotDescription:
+        return self._description
+
+    def apply(self, values: Sequence[float]) -> None:
+        self._values = self._rest_values if self._stopped else list(values)
+
+    def tick(self) -> None:
+        before = self.data.time
+        self._drive()
+        mujoco.mj_step(self.model, self.data, self._steps)
+        if self.data.time <= before or not np.isfinite(self.data.qvel).all():
+            self._restart()
+        if self._wrench is not None:
+            self._wrench.read(self.data, self.tick_seconds)
+
+    def measure(self) -> Measurement:
+        data = self.data
+        is_still = not self._moving.size or bool((np.abs(data.qvel) * self._moving).max() < REST_SPEED)
+        return Measurement(
+            axes=[short(drive.measured(data)) for drive in self._drives],
+            joints=[short(value) for value in self.positions()],
+            wrench=[] if self._wrench is None else [short(value) for value in self._wrench.value.tolist()],
+            ranges=[] if self._ranges is None else [short(value) for value in self._ranges.read(data)],
+            at_rest=is_still and self._values == self._rest_values,
+            faults=self._faults(),
+        )
+
+    def positions(self) -> Sequence[float]:
+        qpos = self.data.qpos
+        return [value for joint in self._joints for value in joint.values(qpos)]
+
+    def rest_from_thread(self) -> None:
+        self._values = self._rest_values
+
+    def stop(self) -> None:
+        self._stopped = True
+        self._values = self._rest_values
+
+    def reset(self) -> None:
+        self._stopped = False
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._sources
+
+    def close(self) -> None:
+        self._renderer.close()
+
+    def snapshot(self) -> npt.NDArray[np.float64]:
+        """Everything a picture needs of the state now."""
+        state: npt.NDArray[np.float64] = self.data.qpos.copy()
+        return state
+
+    def _begin(self) -> None:
+        """The model's first keyframe, if it has one, else its zero; nothing moves yet."""
+        if self.model.nkey:
+            mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+            self.data.qvel[:] = 0
+        else:
+            mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_forward(self.model, self.data)
+
+    def _restart(self) -> None:
+        self.restarts += 1
+        self._begin()
+        for drive in self._drives:
+            drive.release(self.data)
+        if self._wrench is not None:
+            self._wrench.clear()
+
+    def _drive(self) -> None:
+        for drive, value in zip(self._drives, self._values, strict=True):
+            drive.drive(self.data, value, self.tick_seconds)
+
+    def _keep_up(self) -> float:
+        """How many times slower than real time the simulation runs: its steps must leave the loop some time."""
+        began = time.process_time()
+        self._drive()
+        mujoco.mj_step(self.model, self.data, self._steps * TRIED_TICKS)
+        taken = (time.process_time() - began) / TRIED_TICKS
+        self._begin()
+        for drive in self._drives:
+            drive.release(self.data)
+        fitting = max(1, math.floor(self._steps * BUSIEST * self.tick_seconds / max(taken, 1e-9)))
+        if fitting >= self._steps:
+            return 1.0
+        slowness = self._steps / fitting
+        _logger.warning("the simulation takes too long: it runs %.1f times slower than real time", slowness)
+        self._steps = fitting
+        return slowness
+
+    def _moving_dofs(self) -> npt.NDArray[np.float64]:
+        """By degree of freedom: 0 where no actuator moves it, else the scale of its speed."""
+        weights = np.zeros(self.model.nv)
+        for drive in self._drives:
+            joint = drive.actuator.joint
+            if joint is not None:
+                size = 1.0 if drive.actuator.is_rotary else float(self.model.stat.extent)
+                weights[self.model.jnt_dofadr[joint]] = 1.0 / size
+        return weights
+
+    def _describe(self, name: str, cameras: tuple[Any, ...]) -> RobotDescription:
+        axes = tuple(drive.axis for drive in self._drives)
+        title = self.model.names[: self.model.names.index(b"\0")].decode(errors="replace")
+        return RobotDescription(
+            name=name,
+            watchdog=WATCHDOG,
+            label=label_of(name if title in ("", "MuJoCo Model") else title),
+            axes=axes,
+            joints=tuple(part for joint in self._joints for part in joint.parts),
+            layers=layers_of(self.model, self.data, axes, [drive.actuator for drive in self._drives]),
+            cameras=cameras,
+            wrench=None if self._wrench is None else self._wrench.description,
+            ranges=None if self._ranges is None else self._ranges.description,
+            bodies=self._bodies(),
+            position_limits=tuple(self._limit(drive) for drive in self._drives if self._is_limited(drive)),
+        )
+
+    def _bodies(self) -> tuple[Body, ...]:
+        found = bodies_of(self.model, self._joints)
+        rays = self._ranges
+        names = {body.name for body in found}
+        return (*found, rays.body) if rays is not None and rays.body.parent in names else found
+
+    def _is_limited(self, drive: Drive) -> bool:
+        joint = drive.actuator.joint
+        is_speed = drive.actuator.kind in (Kind.POSITION, Kind.VELOCITY)
+        return is_speed and joint is not None and bool(self.model.jnt_limited[joint])
+
+    def _limit(self, drive: Drive) -> PositionLimit:
+        low, high = (float(bound) for bound in self.model.jnt_range[drive.actuator.joint])
+        joint = next(each for each in self._joints if each.number == drive.actuator.joint)
+        return PositionLimit(
+            name=f"{drive.axis.name}.range",
+            label=drive.axis.label,
+            joint=joint.parts[0].name,
+            minimum=low,
+            maximum=high,
+            axes=(AxisGain(axis=drive.axis.name),),
+            margin=MARGIN * (high - low),
+            latency=LATENCY,
+        )
+
+    def _faults(self) -> list[str]:
+        faults = []
+        if self.restarts:
+            faults.append(f"the simulation diverged and was restarted ({self.restarts} times)")
+        if self._slowness > 1:
+            faults.append(f"the simulation runs {self._slowness:.1f} times slower than real time")
+        return faults
+
+
+def warn(text: str) -> None:
+    _logger.warning("MuJoCo: %s", text)
+
+
+def short(value: float) -> float:
+    """Six significant digits at any scale; keeps messages small. Never -0."""
+    return float(f"{value:.6g}") + 0.0

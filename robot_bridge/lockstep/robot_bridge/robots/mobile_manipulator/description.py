@@ -1,0 +1,58 @@
+"""What the mobile manipulator tells a console about itself."""
+
+from typing import Any, Final
+
+from lockstep.protocol.description import BodyTwist, Camera, ForceFeeling, Microphone, RobotDescription, WrenchSensor
+from lockstep.robot_bridge.robots.mobile_manipulator.controls import AXES, LAYERS
+from lockstep.robot_bridge.robots.mobile_manipulator.kinematics import describe_bodies, describe_joints
+from lockstep.robot_bridge.robots.mobile_manipulator.limits import BASE_ON_FLOOR, GEOFENCES, arm_limits
+from lockstep.robot_bridge.robots.mobile_manipulator.range_ring import RING
+from lockstep.robot_bridge.robots.mobile_manipulator.simulation import MOUNT
+
+__all__ = ["CAMERAS", "MICROPHONE", "describe"]
+
+CAMERAS: Final = (  # names are those of the model's cameras
+    Camera(name="overview", label="Overview", width=640, height=480, frame_rate=30.0),
+    Camera(name="wrist", label="Wrist", width=320, height=240, frame_rate=15.0),
+)
+MICROPHONE: Final = Microphone(name="microphone", label="Microphone", sample_rate=48_000)
+
+WRENCH: Final = WrenchSensor(
+    name="contact", body=MOUNT, threshold_force=3.0, full_scale_force=150.0, full_scale_torque=80.0
+)
+
+# A push at the wrist is seldom more than a tenth of the sensor's range: it is felt early.
+FEELING: Final = ForceFeeling(threshold_newtons=3.0, full_newtons=80.0, curve=0.6)
+TOOL_TWIST: Final = BodyTwist(
+    body="tool",
+    frame=MOUNT,
+    point=(0.17, 0.0, 0.0),  # the tip
+    linear=("tool.vx", "tool.vy", "tool.vz"),
+    angular=("tool.wx", "tool.wy", "tool.wz"),
+)
+
+
+def describe(model: Any) -> RobotDescription:
+    """The description that belongs to the compiled model."""
+    joints = describe_joints(model)
+    return RobotDescription(
+        name="mobile-manipulator",
+        label="Mobile manipulator (MuJoCo)",
+        axes=AXES,
+        joints=joints,
+        layers=LAYERS,
+        cameras=CAMERAS,
+        microphones=(MICROPHONE,),
+        wrench=WRENCH,
+        ranges=RING,
+        force_feeling=FEELING,
+        body_twists=(TOOL_TWIST,),
+        bodies=describe_bodies(model),
+        position_limits=arm_limits(joints),
+        planar_base=BASE_ON_FLOOR,
+        geofences=GEOFENCES,
+        hold=0.3,
+        watchdog=0.25,  # a simulation hurts no person, and busy machines hold it up
+        max_event_age=2.0,
+        max_event_rate=25.0,
+    )

@@ -1,0 +1,120 @@
+"""The mobile manipulator: its drives, senses, cameras and microphone around one simulation."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
+from lockstep.robot_bridge.robots.camera_source import CameraSource
+from lockstep.robot_bridge.robots.microphone_source import SEGMENT_SECONDS, MicrophoneSource
+from lockstep.robot_bridge.robots.mobile_manipulator.arm_drive import ArmDrive
+from lockstep.robot_bridge.robots.mobile_manipulator.base_drive import BaseDrive
+from lockstep.robot_bridge.robots.mobile_manipulator.contact_sense import ContactSense
+from lockstep.robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE, describe
+from lockstep.robot_bridge.robots.mobile_manipulator.hearing import Hearing
+from lockstep.robot_bridge.robots.mobile_manipulator.range_ring import RangeSensors
+from lockstep.robot_bridge.robots.mobile_manipulator.simulation import BASE, Simulation
+from lockstep.robot_bridge.robots.mobile_manipulator.sound import Sound
+from lockstep.robot_bridge.robots.mujoco_view.renderer import Renderer
+
+__all__ = ["MobileManipulator"]
+
+STEPS_PER_TICK: Final = 2
+DIGITS: Final = 5  # of measured values on the wire
+REST_SPEED: Final = 0.02  # m/s and rad/s, of every joint
+
+
+class MobileManipulator(Robot):
+    """Axes: the base's velocity in its own frame, then the tool's twist against the base, in the base frame."""
+
+    rests_from_thread = True
+
+    def __init__(self) -> None:
+        """Raises:
+        RobotUnavailable: OpenGL cannot be used here.
+        """
+        self.simulation = Simulation()
+        model = self.simulation.model
+        self.tick_seconds = STEPS_PER_TICK * float(model.opt.timestep)
+        self._description = describe(model)
+        self._base = BaseDrive()
+        self._arm = ArmDrive(self.simulation)
+        self._contacts = ContactSense(model)
+        self._ranges = RangeSensors(model)
+        self._hearing = Hearing(model)
+        self._sound = Sound(MICROPHONE.sample_rate, round(MICROPHONE.sample_rate * SEGMENT_SECONDS))
+        self._rest_values = [0.0] * len(self._description.axes)
+        self._values: Sequence[float] = self._rest_values
+        self._stopped = False  # the base is parked and the arm holds its posture, at any applied value
+        self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)
+        self._sources: tuple[MediaSource, ...] = (
+            *(CameraSource(each, self._renderer.drawing(each), self.simulation.snapshot) for each in CAMERAS),
+            MicrophoneSource(MICROPHONE, self._hear, begin=self._hearing.take),
+        )
+
+    def describe(self) -> RobotDescription:
+        return self._description
+
+    def apply(self, values: Sequence[float]) -> None:
+        self._values = self._rest_values if self._stopped else values
+
+    def tick(self) -> None:
+        data = self.simulation.data
+        self._base.drive(data, self._values[BASE])
+        self._arm.drive(self._values[BASE.stop :], self.tick_seconds)
+        if not self.simulation.step(STEPS_PER_TICK):
+            self._base.release()
+            self._arm.release()
+            self._contacts.clear()
+        self._hearing.listen(data, self._contacts.update(data, self.tick_seconds))
+
+    def measure(self) -> Measurement:
+        simulation = self.simulation
+        axes = np.concatenate((simulation.base_velocity(), simulation.tool_twist()))
+        return Measurement(
+            axes=on_wire(axes),
+            joints=on_wire(simulation.joints),
+            wrench=on_wire(self._contacts.wrench),
+            ranges=on_wire(self._ranges.read(simulation.data)),
+            at_rest=bool(np.abs(simulation.joint_velocities).max() < REST_SPEED),
+            faults=self._faults(),
+        )
+
+    def positions(self) -> Sequence[float]:
+        joints: list[float] = self.simulation.joints.tolist()
+        return joints
+
+    def joint_rates(self, values: Sequence[float]) -> Sequence[float]:
+        """The base's rates are left out: no limit by posture needs them."""
+        return [0.0, 0.0, 0.0, *self._arm.rates(values[BASE.stop :])]
+
+    def rest_from_thread(self) -> None:
+        self._values = self._rest_values
+
+    def stop(self) -> None:
+        self._stopped = True
+        self._values = self._rest_values
+
+    def reset(self) -> None:
+        self._stopped = False
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._sources
+
+    def close(self) -> None:
+        self._renderer.close()
+
+    def _hear(self) -> bytes:
+        return self._sound.segment(self._hearing.take())
+
+    def _faults(self) -> list[str]:
+        restarts = self.simulation.restarts
+        diverged = [f"the simulation diverged and was restarted ({restarts} times)"] if restarts else []
+        return [*diverged, *self._arm.faults]
+
+
+def on_wire(values: np.typing.NDArray[np.float64]) -> list[float]:
+    """Rounded to keep messages small; never -0."""
+    return [value + 0.0 for value in np.round(values, DIGITS).tolist()]

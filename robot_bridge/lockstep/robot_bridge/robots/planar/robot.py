@@ -1,0 +1,119 @@
+"""The planar robot: a holonomic disc in a walled room, integrated by hand."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
+from lockstep.robot_bridge.robots.camera_source import CameraSource
+from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW, RADIUS, RANGES
+from lockstep.robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
+from lockstep.robot_bridge.robots.planar.room import contacts, ray_hits
+from lockstep.robot_bridge.robots.planar.sound import Synthesiser
+
+__all__ = ["PlanarRobot", "PlanarState"]
+
+STIFFNESS = 150.0  # N per m/s that a contact blocks: the motors push harder the faster they should go
+ANGLES = RANGES.angle_min + RANGES.angle_increment * np.arange(RANGES.count, dtype=np.float64)
+
+
+class PlanarState(NamedTuple):
+    x: float = 0.0  # m
+    y: float = 0.0  # m
+    yaw: float = 0.0  # rad
+    vx: float = 0.0  # m/s, in the robot's frame
+    vy: float = 0.0  # m/s
+    wz: float = 0.0  # rad/s
+    fx: float = 0.0  # N, the force of the room on the robot, in the robot's frame
+    fy: float = 0.0  # N
+
+
+class PlanarRobot(Robot):
+    """A robot for tests and for machines without GL. Moves exactly as commanded unless something is in the way."""
+
+    tick_seconds = 0.004
+    rests_from_thread = True
+
+    def __init__(self, state: PlanarState | None = None) -> None:
+        self._state = state or PlanarState()
+        self._command = (0.0, 0.0, 0.0)
+        self._braked = False  # the stop holds the wheels
+        self._sound = Synthesiser()
+        drawings = ((OVERVIEW, OverviewDrawing), (FRONT, FrontDrawing))
+        self._sources: tuple[MediaSource, ...] = (
+            *(CameraSource(each, kind(each.width, each.height).draw, lambda: self._state) for each, kind in drawings),
+            MicrophoneSource(MICROPHONE, self._hear),
+        )
+
+    @property
+    def state(self) -> PlanarState:
+        return self._state
+
+    def describe(self) -> RobotDescription:
+        return DESCRIPTION
+
+    def apply(self, values: Sequence[float]) -> None:
+        vx, vy, wz = (0.0, 0.0, 0.0) if self._braked else values
+        self._command = (vx, vy, wz)
+
+    def tick(self) -> None:
+        dt = self.tick_seconds
+        vx, vy, wz = self._command
+        before = self._state
+        if not (vx or vy or wz or before.vx or before.vy or before.wz or before.fx or before.fy):
+            return
+        yaw = math.remainder(before.yaw + wz * dt, math.tau)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        x, y = before.x + (cos * vx - sin * vy) * dt, before.y + (sin * vx + cos * vy) * dt
+        fx = fy = 0.0
+        for contact in contacts(x, y, RADIUS):
+            x, y = x + contact.depth * contact.nx, y + contact.depth * contact.ny
+            force = STIFFNESS * contact.depth / dt
+            fx, fy = fx + force * contact.nx, fy + force * contact.ny
+        moved_x, moved_y = (x - before.x) / dt, (y - before.y) / dt
+        self._state = PlanarState(
+            x=x,
+            y=y,
+            yaw=yaw,
+            vx=cos * moved_x + sin * moved_y,
+            vy=-sin * moved_x + cos * moved_y,
+            wz=wz,
+            fx=cos * fx + sin * fy,
+            fy=-sin * fx + cos * fy,
+        )
+
+    def measure(self) -> Measurement:
+        state = self._state
+        distances, _ = ray_hits(state.x, state.y, state.yaw + ANGLES)
+        return Measurement(
+            axes=[state.vx, state.vy, state.wz],
+            joints=[state.x, state.y, state.yaw],
+            wrench=[state.fx, state.fy, 0.0, 0.0, 0.0, 0.0],
+            ranges=np.clip(distances, RANGES.range_min, RANGES.range_max).tolist(),
+            at_rest=max(abs(state.vx), abs(state.vy), abs(state.wz)) < 1e-3,
+            faults=[],
+        )
+
+    def positions(self) -> Sequence[float]:
+        return self._state[:3]
+
+    def rest_from_thread(self) -> None:
+        self._command = (0.0, 0.0, 0.0)
+
+    def stop(self) -> None:
+        self._braked = True
+        self._command = (0.0, 0.0, 0.0)
+
+    def reset(self) -> None:
+        self._braked = False
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._sources
+
+    def _hear(self) -> bytes:
+        state = self._state
+        return self._sound.segment(math.hypot(state.vx, state.vy) + 0.3 * abs(state.wz))

@@ -1,0 +1,40 @@
+"""Any robot that ROS 2 drives, described by one YAML file (docs/ros2.md). rclpy is imported when one is made."""
+
+from pathlib import Path
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.errors import DescriptionError, SettingsError
+from lockstep.robot_bridge.robots.base import Robot
+from lockstep.robot_bridge.robots.ros2.description import describe
+from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
+from lockstep.robot_bridge.yaml_file import SettingsPlace, YamlFile
+
+__all__ = ["create", "read_settings"]
+
+
+def create(path: Path) -> Robot:
+    """The robot that the file describes.
+
+    Raises:
+        SettingsError: the file cannot be used; names the line and the key.
+        RobotUnavailable: ROS 2 or something that it needs is missing.
+    """
+    settings, description = read_settings(path)
+    from lockstep.robot_bridge.robots.ros2.robot import Ros2Robot
+
+    return Ros2Robot(settings, description)
+
+
+def read_settings(path: Path) -> tuple[Ros2Settings, RobotDescription]:
+    """Needs no ROS. Raises SettingsError as `create` does."""
+    file = YamlFile(path)
+    settings = file.convert(Ros2Settings)
+    try:
+        description = describe(settings)
+        check_description(description)
+    except SettingsPlace as place:
+        raise file.error(place) from place
+    except DescriptionError as error:
+        raise SettingsError(f"{path}: {error.detail}") from error
+    return settings, description

@@ -1,0 +1,227 @@
+"""From the settings of a ROS 2 robot to its description for a console."""
+
+import math
+from typing import Final
+
+from lockstep.protocol.description import (
+    Axis,
+    AxisGain,
+    Body,
+    BodyJoint,
+    Camera,
+    ControlLayer,
+    Geom,
+    Joint,
+    PlanarBase,
+    PositionLimit,
+    RangeRing,
+    RobotDescription,
+    WrenchSensor,
+)
+from lockstep.robot_bridge.robots.ros2.controls import arm_layers, base_layer
+from lockstep.robot_bridge.robots.ros2.settings import Arm, ArmJoint, Base, BaseAxis, Ros2Settings
+from lockstep.robot_bridge.yaml_file import SettingsPlace
+
+__all__ = ["BASE_JOINTS", "describe"]
+
+BASE_JOINTS: Final = ("base.x", "base.y", "base.yaw")
+BASE_BODY: Final = "base"
+SLEW_TIME: Final = 0.5  # s from rest to full speed unless the settings say otherwise
+BRAKE_SHARE: Final = 0.5  # of `hold`, from full speed to rest
+_COLOUR = (0.25, 0.55, 0.85, 1.0)
+
+
+def describe(settings: Ros2Settings) -> RobotDescription:
+    """Raises:
+    SettingsPlace: the settings contradict each other.
+    """
+    base, arm = settings.base, settings.arm
+    if base is None and arm is None:
+        raise SettingsPlace((), "there is nothing to drive: give a base, an arm or both")
+    if base is None and settings.geofences:
+        raise SettingsPlace(("geofences",), "only a base can be kept in zones")
+    for number, camera in enumerate(settings.cameras):
+        if settings.use_sim_time and camera.captured == "header":
+            keys = ("cameras", number, "captured")
+            raise SettingsPlace(keys, "simulated time is not the bridge's time: set captured: arrival, and a latency")
+    base_axes = () if base is None else _base_axes(base, settings.hold)
+    arm_axes = () if arm is None else tuple(_arm_axis(arm, number, settings.hold) for number in range(len(arm.joints)))
+    layers: tuple[ControlLayer, ...] = ()
+    if base is not None:
+        layers += (base_layer("base.vx", "base.vy" if base.left else None, "base.wz" if base.turn else None),)
+    return RobotDescription(
+        name=settings.name,
+        label=settings.label or settings.name,
+        axes=base_axes + arm_axes,
+        joints=_joints(settings),
+        layers=settings.layers or layers + arm_layers(arm_axes),
+        cameras=tuple(
+            Camera(
+                name=camera.name,
+                label=camera.label or camera.name,
+                width=camera.width,
+                height=camera.height,
+                frame_rate=camera.frame_rate,
+            )
+            for camera in settings.cameras
+        ),
+        wrench=_wrench(settings),
+        ranges=_ranges(settings),
+        bodies=(() if base is None else (_base_body(base),)) + settings.bodies,
+        position_limits=() if arm is None else tuple(filter(None, map(_position_limit, arm.joints))),
+        planar_base=None if base is None else _planar_base(base),
+        geofences=settings.geofences,
+        hold=settings.hold,
+        watchdog=settings.watchdog,
+        max_event_age=settings.max_event_age,
+        max_event_rate=settings.max_event_rate,
+    )
+
+
+def _base_axes(base: Base, hold: float) -> tuple[Axis, ...]:
+    named = (
+        ("base.vx", "Forward", "m/s", base.forward, "forward"),
+        ("base.vy", "Left", "m/s", base.left, "left"),
+        ("base.wz", "Turn left", "rad/s", base.turn, "turn"),
+    )
+    return tuple(
+        _base_axis(name, label, unit, axis, hold, key) for name, label, unit, axis, key in named if axis is not None
+    )
+
+
+def _base_axis(name: str, label: str, unit: str, axis: BaseAxis, hold: float, key: str) -> Axis:
+    minimum = -axis.maximum if axis.minimum is None else axis.minimum
+    if minimum > 0:
+        raise SettingsPlace(("base", key, "minimum"), "must not be above 0, which is rest")
+    fastest = max(axis.maximum, -minimum)
+    return Axis(
+        name=name,
+        label=label,
+        unit=unit,
+        minimum=minimum,
+        maximum=axis.maximum,
+        slew=axis.slew or fastest / SLEW_TIME,
+        brake=_brake(axis.brake, fastest, hold, ("base", key, "brake")),
+    )
+
+
+def _arm_axis(arm: Arm, number: int, hold: float) -> Axis:
+    joint = arm.joints[number]
+    return Axis(
+        name=f"arm.{joint.name}",
+        label=joint.label or joint.name,
+        unit=f"{joint.unit}/s",
+        minimum=-joint.maximum,
+        maximum=joint.maximum,
+        slew=joint.slew or joint.maximum / SLEW_TIME,
+        brake=_brake(joint.brake, joint.maximum, hold, ("arm", "joints", number, "brake")),
+    )
+
+
+def _brake(brake: float | None, fastest: float, hold: float, keys: tuple[str | int, ...]) -> float:
+    if brake is None:
+        return fastest / (BRAKE_SHARE * hold)
+    if fastest > brake * hold:
+        taken = fastest / brake
+        raise SettingsPlace(keys, f"braking from {fastest:g} would take {taken:.2f} s, longer than hold ({hold:g} s)")
+    return brake
+
+
+def _joints(settings: Ros2Settings) -> tuple[Joint, ...]:
+    base: tuple[Joint, ...] = ()
+    if settings.base is not None:
+        base = tuple(Joint(name=name, unit="rad" if name == "base.yaw" else "m") for name in BASE_JOINTS)
+    arm = () if settings.arm is None else settings.arm.joints
+    return base + tuple(
+        Joint(name=joint.name, unit=joint.unit, minimum=joint.lower, maximum=joint.upper) for joint in arm
+    )
+
+
+def _position_limit(joint: ArmJoint) -> PositionLimit | None:
+    if joint.lower is None and joint.upper is None:
+        return None
+    return PositionLimit(
+        name=f"{joint.name}.range",
+        label=f"{joint.label or joint.name} range",
+        joint=joint.name,
+        minimum=joint.lower,
+        maximum=joint.upper,
+        axes=(AxisGain(axis=f"arm.{joint.name}"),),
+        margin=joint.margin,
+        latency=joint.latency,
+    )
+
+
+def _planar_base(base: Base) -> PlanarBase:
+    x, y, yaw = BASE_JOINTS
+    return PlanarBase(
+        x=x,
+        y=y,
+        yaw=yaw,
+        forward="base.vx",
+        left="base.vy" if base.left else "",
+        turn="base.wz" if base.turn else "",
+        radius=base.radius,
+        margin=base.margin,
+        latency=base.latency,
+    )
+
+
+def _base_body(base: Base) -> Body:
+    """A disc with a mark at its front, where the odometry says the base is."""
+    radius = max(base.radius, 0.05)
+    x, y, yaw = BASE_JOINTS
+    return Body(
+        name=BASE_BODY,
+        parent="",
+        joints=(
+            BodyJoint(joint=x, kind="prismatic", axis=(1, 0, 0)),
+            BodyJoint(joint=y, kind="prismatic", axis=(0, 1, 0)),
+            BodyJoint(joint=yaw, kind="revolute", axis=(0, 0, 1)),
+        ),
+        geoms=(
+            Geom(shape="cylinder", size=(radius, radius / 2, 0), position=(0, 0, radius / 2), rgba=_COLOUR),
+            Geom(
+                shape="box",
+                size=(radius / 3, radius / 10, radius / 20),
+                position=(radius / 2, 0, radius * 1.05),
+                rgba=(0.95, 0.95, 0.95, 1),
+            ),
+        ),
+    )
+
+
+def _sensor_body(settings: Ros2Settings, body: str | None) -> str:
+    if body is not None:
+        return body
+    return "" if settings.base is None else BASE_BODY
+
+
+def _ranges(settings: Ros2Settings) -> RangeRing | None:
+    ring = settings.ranges
+    if ring is None:
+        return None
+    if ring.range_min >= ring.range_max:
+        raise SettingsPlace(("ranges", "range_min"), "must be below range_max")
+    return RangeRing(
+        name="ranges",
+        body=_sensor_body(settings, ring.body),
+        count=ring.count,
+        angle_min=-math.pi,
+        angle_increment=math.tau / ring.count,
+        range_min=ring.range_min,
+        range_max=ring.range_max,
+    )
+
+
+def _wrench(settings: Ros2Settings) -> WrenchSensor | None:
+    sensor = settings.wrench
+    if sensor is None:
+        return None
+    return WrenchSensor(
+        name="wrench",
+        body=_sensor_body(settings, sensor.body),
+        threshold_force=sensor.threshold_force,
+        full_scale_force=sensor.full_scale_force,
+        full_scale_torque=sensor.full_scale_torque,
+    )

@@ -1,0 +1,1 @@
+"""Commands as ROS 2 messages."""

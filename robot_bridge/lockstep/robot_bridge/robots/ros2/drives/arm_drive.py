@@ -1,0 +1,101 @@
+"""An arm: joint positions out, ahead of the arm by a short horizon; joint states in."""
+
+from typing import Any
+
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.ros2.drives.command_stream import Said
+from lockstep.robot_bridge.robots.ros2.drives.drive import Drive, Sensed
+from lockstep.robot_bridge.robots.ros2.drives.joint_cache import BadJointState, JointCache
+from lockstep.robot_bridge.robots.ros2.drives.setpoints import Setpoints
+from lockstep.robot_bridge.robots.ros2.ros_side import RosSide, header_ns
+from lockstep.robot_bridge.robots.ros2.sensing.latest_message import Newest
+from lockstep.robot_bridge.robots.ros2.settings import Arm
+
+__all__ = ["ArmDrive"]
+
+
+class ArmDrive(Drive):
+    """One axis per joint: its velocity.
+
+    The last message of a motion names the setpoint itself with nothing ahead of it: the arm stays there.
+    """
+
+    def __init__(self, ros: RosSide, settings: Arm, tick_seconds: float) -> None:
+        command, states = settings.command, settings.states
+        package = "trajectory_msgs" if command.message == "JointTrajectory" else "sensor_msgs"
+        kind = ros.message(package, command.message)
+        super().__init__(ros, kind, command.topic, command.rate, len(settings.joints), tick_seconds)
+        self._names = [joint.name for joint in settings.joints]
+        self._horizon = command.horizon
+        self._setpoints = Setpoints([joint.maximum * command.lead for joint in settings.joints])
+        self._moving = False
+        self._still = states.still
+        self._timeout = states.timeout
+        self._book = JointCache(self._names)
+        self._states: Newest[None] = Newest(states.topic, states.timeout)
+        make = self._trajectory if command.message == "JointTrajectory" else self._joint_state
+        self._make = make
+        ros.subscribe(ros.message("sensor_msgs", "JointState"), states.topic, self._take)
+
+    def seen(self, now: float) -> bool:
+        return not self._book.missing(self._timeout, now)
+
+    def advance(self, said: Said, values: list[float], dt: float) -> Any:
+        now = clock.now()
+        moving = any(values)
+        if moving:
+            measured = self.joints(now)
+            if not self._moving:
+                self._setpoints.begin(measured)
+            self._setpoints.advance(values, measured, dt)
+        self._moving = moving
+        if said is Said.NOTHING:
+            return None
+        return self._make(said, values)
+
+    def sense(self, now: float) -> Sensed:
+        known = self._book.fresh(self._timeout, now)
+        velocities = [joint.velocity for joint in known]
+        still = all(abs(velocity) <= self._still for velocity in velocities)  # not when one is NaN
+        return Sensed(velocities, [joint.position for joint in known], still)
+
+    def joints(self, now: float) -> list[float]:
+        return [joint.position for joint in self._book.fresh(self._timeout, now)]
+
+    def sensor_faults(self, now: float) -> list[str]:
+        found = self._states.faults(now)
+        missing = self._book.missing(self._timeout, now)
+        if missing and not found:
+            found.append(f"{self._states.topic}: nothing of {', '.join(missing[:8])}")
+        return found
+
+    def _trajectory(self, said: Said, values: list[float]) -> Any:
+        """Positions alone: controllers refuse a trajectory that ends with a velocity."""
+        message = self._kind()
+        message.joint_names = self._names
+        point = self._ros.message("trajectory_msgs", "JointTrajectoryPoint")()
+        point.positions = self._points(said, values)
+        point.time_from_start = self._ros.span_message(self._horizon)
+        message.points = [point]
+        return message
+
+    def _joint_state(self, said: Said, values: list[float]) -> Any:
+        message = self._kind()
+        message.header.stamp = self._ros.now_message()
+        message.name = self._names
+        message.position = self._points(said, values)
+        message.velocity = values
+        return message
+
+    def _points(self, said: Said, values: list[float]) -> list[float]:
+        return self._setpoints.points if said is Said.ZERO else self._setpoints.ahead(values, self._horizon)
+
+    def _take(self, message: Any) -> None:
+        now = clock.now()
+        try:
+            self._book.take(message, header_ns(message.header), now)
+            self._states.put(None, now)
+        except BadJointState as error:
+            self._states.refuse(str(error), now)
+        except (TypeError, ValueError, OverflowError) as error:
+            self._states.refuse(f"joint states: {type(error).__name__}", now)

@@ -1,0 +1,107 @@
+"""What the parts of a ROS 2 robot that take commands have in common."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.ros2.drives.command_stream import CommandStream, Said
+from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
+
+__all__ = ["Drive", "Sensed"]
+
+LOOK_INTERVAL = 0.2  # s between looks at who listens
+
+
+class Sensed(NamedTuple):
+    """State of one part, NaN where it is not known."""
+
+    axes: list[float]
+    joints: list[float]
+    at_rest: bool
+
+
+class Drive(ABC):
+    """One command topic and the topic that says what became of the commands."""
+
+    def __init__(self, ros: RosSide, kind: Any, topic: str, rate: float, size: int, tick_seconds: float) -> None:
+        """`size`: how many axes."""
+        self.size = size
+        self._ros = ros
+        self._kind = kind
+        self._topic = topic
+        self._publisher = ros.publisher(kind, topic)
+        self._stream = CommandStream(rate, [0.0] * size, tick_seconds)
+        self._owes_zero = False  # the last word that got out was not zero
+        self._stopped = False
+        self._heard = False  # whether a node listens
+        self._looked = float("-inf")  # s, when that was looked up
+
+    @property
+    def full_topic(self) -> str:
+        """That commands go to, with namespace and node resolved."""
+        return str(self._publisher.topic_name)
+
+    def step(self, values: Sequence[float], dt: float) -> None:
+        """One tick with these values."""
+        now = clock.now()
+        if now - self._looked >= LOOK_INTERVAL:
+            self._heard, self._looked = self._publisher.get_subscription_count() > 0, now
+        lost = self._stopped or not (self._heard and self.seen(now))
+        step = self._stream.step(values, lost, now)
+        self._say(step.said, step.values, dt)
+
+    def end(self) -> None:
+        """The bridge closes: say zero if the last word was another."""
+        self._stream.end()
+        if self._owes_zero:
+            self._say(Said.ZERO, [0.0] * self.size, 0.0)
+
+    def rest_from_thread(self) -> None:
+        """Say zero if the last word was another; the bridge's own tick may hang anywhere in `step`."""
+        if self._owes_zero:
+            self._publisher.publish(self.advance(Said.ZERO, [0.0] * self.size, 0.0))
+
+    def stop(self) -> None:
+        """Say zero if the last word was another, and no moving values until `reset`."""
+        self._stopped = True
+        self.end()
+
+    def reset(self) -> None:
+        self._stopped = False
+
+    def _say(self, said: Said, values: list[float], dt: float) -> None:
+        message = self.advance(said, values, dt)
+        if message is not None:
+            self._owes_zero = True  # also when publishing raises
+            self._publisher.publish(message)
+            self._owes_zero = said is not Said.ZERO
+
+    def faults(self, now: float) -> list[str]:
+        """What keeps this part from being driven, for a person."""
+        found = self.sensor_faults(now)
+        if not self._heard:
+            found.append(f"{self._topic}: no subscriber for {self._kind.__name__}")
+        if self._stream.withheld and not self._stopped and not found:
+            found.append(f"{self._topic}: let go once; the robot's side was lost while it was driven")
+        return found
+
+    @abstractmethod
+    def seen(self, now: float) -> bool:
+        """Whether the state is known well enough to move."""
+
+    @abstractmethod
+    def advance(self, said: Said, values: list[float], dt: float) -> Any:
+        """The message to publish; None for nothing. Called in every tick."""
+
+    @abstractmethod
+    def sense(self, now: float) -> Sensed:
+        """The state now."""
+
+    @abstractmethod
+    def joints(self, now: float) -> list[float]:
+        """The joints' part of it, for limits: cheap."""
+
+    @abstractmethod
+    def sensor_faults(self, now: float) -> list[str]:
+        """What is wrong with the state's topic."""

@@ -1,0 +1,119 @@
+"""A robot behind ROS 2 topics, as the bridge sees it."""
+
+from collections.abc import Callable, Sequence
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
+from lockstep.robot_bridge.robots.ros2.drives.arm_drive import ArmDrive
+from lockstep.robot_bridge.robots.ros2.drives.base_drive import BaseDrive
+from lockstep.robot_bridge.robots.ros2.drives.drive import Drive
+from lockstep.robot_bridge.robots.ros2.drives.watchdog_rest import REST_CALL, rest_arguments
+from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
+from lockstep.robot_bridge.robots.ros2.sensing.camera import CameraSource
+from lockstep.robot_bridge.robots.ros2.sensing.sensors import LockoutTopic, RangeSensor, WrenchTopic
+from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
+
+__all__ = ["Ros2Robot"]
+
+
+class Ros2Robot(Robot):
+    """Drives its parts, and gathers their measurements and those of the sensors."""
+
+    tick_seconds = 0.01
+    rests_from_thread = True
+
+    def __init__(self, settings: Ros2Settings, description: RobotDescription) -> None:
+        """Raises:
+        RobotUnavailable: ROS 2 is missing or does not start.
+        """
+        self._description = description
+        self._ros = RosSide(settings)
+        try:
+            self._drives: list[Drive] = []
+            if settings.base is not None:
+                base = BaseDrive(self._ros, settings.base, self.tick_seconds)
+                self._drives.append(base)
+                self.rest_call = REST_CALL
+                self.rest_arguments = rest_arguments(settings, settings.base, base.full_topic)
+            if settings.arm is not None:
+                self._drives.append(ArmDrive(self._ros, settings.arm, self.tick_seconds))
+            self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges)
+            self._wrench = None if settings.wrench is None else WrenchTopic(self._ros, settings.wrench)
+            self._lockout = None if settings.lockout is None else LockoutTopic(self._ros, settings.lockout)
+            self._cameras = [CameraSource(self._ros, camera) for camera in settings.cameras]
+            self._ros.start()
+            if self._lockout is not None:
+                self._lockout.wait()
+        except BaseException:
+            self._ros.close()
+            raise
+
+    def describe(self) -> RobotDescription:
+        return self._description
+
+    def apply(self, values: Sequence[float]) -> None:
+        start = 0
+        for drive in self._drives:
+            drive.step(values[start : start + drive.size], self.tick_seconds)
+            start += drive.size
+
+    def tick(self) -> None:
+        if self._ros.failure is not None:
+            raise self._ros.failure
+
+    def measure(self) -> Measurement:
+        now = clock.now()
+        sensed = [drive.sense(now) for drive in self._drives]
+        faults = [fault for drive in self._drives for fault in drive.faults(now)]
+        for sensor in (self._ranges, self._wrench, *self._cameras):
+            if sensor is not None:
+                faults += sensor.faults(now)
+        return Measurement(
+            axes=[value for part in sensed for value in part.axes],
+            joints=[value for part in sensed for value in part.joints],
+            wrench=[] if self._wrench is None else self._wrench.values(now),
+            ranges=[] if self._ranges is None else self._ranges.values(now),
+            at_rest=all(part.at_rest for part in sensed),
+            faults=faults,
+        )
+
+    def locked_out(self) -> str:
+        return "" if self._lockout is None else self._lockout.reason(clock.now())
+
+    def positions(self) -> Sequence[float]:
+        now = clock.now()
+        return [value for drive in self._drives for value in drive.joints(now)]
+
+    def rest_from_thread(self) -> None:
+        """rclpy publishes from any thread; a middleware that blocks all of them blocks this one too."""
+        call_all([drive.rest_from_thread for drive in self._drives])
+
+    def stop(self) -> None:
+        """Says zero to every part whose last word was another, and no motion until `reset`."""
+        call_all([drive.stop for drive in self._drives])
+
+    def reset(self) -> None:
+        for drive in self._drives:
+            drive.reset()
+
+    def sources(self) -> Sequence[MediaSource]:
+        return self._cameras
+
+    def close(self) -> None:
+        try:
+            call_all([drive.end for drive in self._drives])
+        finally:
+            self._ros.close()
+
+
+def call_all(calls: Sequence[Callable[[], None]]) -> None:
+    """Makes every call, also when one raises; raises the first exception."""
+    errors: list[Exception] = []
+    for call in calls:
+        try:
+            call()
+        except Exception as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]

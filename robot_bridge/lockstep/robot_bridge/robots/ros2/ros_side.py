@@ -1,0 +1,139 @@
+"""The only place that touches rclpy: one node in a context of its own, its callbacks in a thread of their own."""
+
+import logging
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from typing import Any
+
+from lockstep.robot_bridge.errors import RobotUnavailable
+from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
+
+__all__ = ["RosSide", "header_ns"]
+
+JOIN_SECONDS = 2.0
+FLUSH_SECONDS = 0.3  # for the last commands to be acknowledged before the node goes
+
+_logger = logging.getLogger(__name__)
+
+
+class RosSide:
+    """Publishes from any thread. Callbacks of subscriptions run in the node's thread and must not raise.
+
+    Attributes:
+        failure: what ended the node's thread; None while it runs
+    """
+
+    def __init__(self, settings: Ros2Settings) -> None:
+        """Raises:
+        RobotUnavailable: rclpy or a middleware is missing, or ROS cannot be initialised.
+        """
+        try:
+            rclpy = import_module("rclpy")
+            executors = import_module("rclpy.executors")
+            self._qos, self._duration = import_module("rclpy.qos"), import_module("rclpy.duration")
+            parameter = import_module("rclpy.parameter").Parameter
+        except ImportError as error:
+            raise RobotUnavailable(
+                f"ROS 2 is missing ({error}): source the setup file of your installation, or install the extra ros2"
+            ) from error
+        self.failure: Exception | None = None
+        self._closed = False
+        self._publishers: list[Any] = []
+        self._rclpy = rclpy
+        self._context = rclpy.Context()
+        try:
+            self._context.init(args=[], domain_id=settings.domain)
+            self._node = rclpy.create_node(
+                settings.node,
+                context=self._context,
+                namespace=settings.namespace or None,
+                use_global_arguments=False,
+                enable_rosout=False,
+                start_parameter_services=False,
+                parameter_overrides=[parameter("use_sim_time", value=settings.use_sim_time)],
+            )
+        except Exception as error:
+            with suppress(Exception):
+                self._context.shutdown()
+            raise RobotUnavailable(f"ROS 2 does not start: {error}") from error
+        self._executor = executors.SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
+
+    def start(self) -> None:
+        """After all subscriptions were made."""
+        self._thread.start()
+
+    def message(self, package: str, name: str) -> Any:
+        """A message class, imported when it is asked for.
+
+        Raises:
+            RobotUnavailable: it is not installed.
+        """
+        try:
+            return getattr(import_module(f"{package}.msg"), name)
+        except (ImportError, AttributeError) as error:
+            raise RobotUnavailable(f"ROS 2 messages {package}/{name} are missing: {error}") from error
+
+    def publisher(self, kind: Any, topic: str) -> Any:
+        """For commands: reliable, the newest only, nothing for those who come later."""
+        publisher = self._node.create_publisher(kind, topic, self._profile("RELIABLE"))
+        self._publishers.append(publisher)
+        return publisher
+
+    def subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None]) -> None:
+        """For sensors: the newest only, from reliable and best-effort publishers alike."""
+        self._node.create_subscription(kind, topic, callback, self._profile("BEST_EFFORT"))
+
+    def now_ns(self) -> int:
+        """The ROS clock, which header stamps are made with."""
+        return int(self._node.get_clock().now().nanoseconds)
+
+    def now_message(self) -> Any:
+        """The same as builtin_interfaces/Time."""
+        return self._node.get_clock().now().to_msg()
+
+    def span_message(self, seconds: float) -> Any:
+        """builtin_interfaces/Duration."""
+        return self._duration.Duration(seconds=seconds).to_msg()
+
+    def flush(self) -> None:
+        """Wait shortly until the subscribers have the published message."""
+        for publisher in self._publishers:
+            with suppress(Exception):
+                publisher.wait_for_all_acked(self._duration.Duration(seconds=FLUSH_SECONDS))
+
+    def close(self) -> None:
+        """Blocks shortly. May be called again."""
+        if self._closed:
+            return
+        self._closed = True
+        self.flush()
+        self._executor.shutdown(timeout_sec=JOIN_SECONDS)
+        if self._thread.is_alive():
+            self._thread.join(JOIN_SECONDS)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def _profile(self, reliability: str) -> Any:
+        return self._qos.QoSProfile(
+            depth=1,
+            reliability=self._qos.ReliabilityPolicy[reliability],
+            durability=self._qos.DurabilityPolicy.VOLATILE,
+            history=self._qos.HistoryPolicy.KEEP_LAST,
+        )
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except Exception as error:
+            if not self._closed:
+                _logger.error("the ROS node ended: %s", error, exc_info=error)
+                self.failure = error
+
+
+def header_ns(header: Any) -> int:
+    """A std_msgs/Header's stamp; 0 when it is unset."""
+    return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)

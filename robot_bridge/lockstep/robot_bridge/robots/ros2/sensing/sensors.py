@@ -1,0 +1,89 @@
+"""Sensors beside the robot's state: ranges and a wrench, which a console draws, and the lock-out."""
+
+import math
+import threading
+from typing import Any
+
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.ros2.ros_side import RosSide, header_ns
+from lockstep.robot_bridge.robots.ros2.sensing.laser_scan import BadScan, Sectors
+from lockstep.robot_bridge.robots.ros2.sensing.latest_message import Newest
+from lockstep.robot_bridge.robots.ros2.settings import Lockout, Ranges, Wrench
+
+__all__ = ["LockoutTopic", "RangeSensor", "WrenchTopic"]
+
+FIRST_WORD = 3.0  # s for the first message of a lock-out, while the nodes find each other
+
+
+class RangeSensor:
+    """sensor_msgs/LaserScan."""
+
+    def __init__(self, ros: RosSide, settings: Ranges) -> None:
+        self._sectors = Sectors(settings.count, settings.range_min, settings.range_max, settings.yaw)
+        self._scans: Newest[list[float]] = Newest(settings.topic, settings.timeout)
+        ros.subscribe(ros.message("sensor_msgs", "LaserScan"), settings.topic, self._take)
+
+    def values(self, now: float) -> list[float]:
+        """Empty when they are too old."""
+        arrived = self._scans.fresh(now)
+        return [] if arrived is None else arrived.value
+
+    def faults(self, now: float) -> list[str]:
+        return self._scans.faults(now)
+
+    def _take(self, message: Any) -> None:
+        now = clock.now()
+        try:
+            self._scans.put(self._sectors.gather(message), now, header_ns(message.header))
+        except BadScan as error:
+            self._scans.refuse(str(error), now)
+
+
+class WrenchTopic:
+    """geometry_msgs/WrenchStamped."""
+
+    def __init__(self, ros: RosSide, settings: Wrench) -> None:
+        self._wrenches: Newest[list[float]] = Newest(settings.topic, settings.timeout)
+        ros.subscribe(ros.message("geometry_msgs", "WrenchStamped"), settings.topic, self._take)
+
+    def values(self, now: float) -> list[float]:
+        """Empty when they are too old."""
+        arrived = self._wrenches.fresh(now)
+        return [] if arrived is None else arrived.value
+
+    def faults(self, now: float) -> list[str]:
+        return self._wrenches.faults(now)
+
+    def _take(self, message: Any) -> None:
+        now = clock.now()
+        force, torque = message.wrench.force, message.wrench.torque
+        values = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+        if all(map(math.isfinite, values)):
+            self._wrenches.put(values, now, header_ns(message.header))
+        else:
+            self._wrenches.refuse("wrench with a value that is not a number", now)
+
+
+class LockoutTopic:
+    """std_msgs/Bool, from a key switch or a teach pendant."""
+
+    def __init__(self, ros: RosSide, settings: Lockout) -> None:
+        self._topic = settings.topic
+        self._said: Newest[bool] = Newest(settings.topic, settings.timeout)
+        self._heard = threading.Event()
+        ros.subscribe(ros.message("std_msgs", "Bool"), settings.topic, self._take)
+
+    def wait(self) -> None:
+        """Blocks until something was heard, or for `FIRST_WORD`: a bridge that starts is not locked out for that."""
+        self._heard.wait(FIRST_WORD)
+
+    def reason(self, now: float) -> str:
+        """Why the robot is locked; "" while it is not. A silent switch may have locked it."""
+        said = self._said.fresh(now)
+        if said is None:
+            return f"nothing is heard of the lock-out ({self._topic})"
+        return f"locked at the robot ({self._topic})" if said.value else ""
+
+    def _take(self, message: Any) -> None:
+        self._said.put(bool(message.data), clock.now())
+        self._heard.set()

@@ -1,0 +1,162 @@
+"""What the YAML file of a ROS 2 robot may say. docs/ros2.md explains it to its users."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct, field
+
+from lockstep.protocol.description import Body, ControlLayer, Geofence
+
+__all__ = [
+    "Arm",
+    "ArmCommand",
+    "ArmJoint",
+    "Base",
+    "BaseAxis",
+    "CameraTopic",
+    "JointStates",
+    "Odometry",
+    "Ranges",
+    "Ros2Settings",
+    "TwistCommand",
+    "Wrench",
+]
+
+Name = Annotated[str, Meta(min_length=1, max_length=100)]
+Topic = Annotated[str, Meta(pattern=r"^[~/A-Za-z_][A-Za-z0-9_/]*$", max_length=200)]
+Positive = Annotated[float, Meta(gt=0, le=1e6)]
+NotNegative = Annotated[float, Meta(ge=0, le=1e6)]
+Timeout = Annotated[float, Meta(gt=0, le=10)]
+Rate = Annotated[float, Meta(ge=1, le=100)]
+
+
+class TwistCommand(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    topic: Topic = "/cmd_vel"
+    message: Literal["TwistStamped", "Twist"] = "TwistStamped"
+    frame: str = "base_link"  # frame_id of TwistStamped
+    rate: Rate = 50.0  # Hz, of repeats while a command is held
+
+
+class Odometry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    topic: Topic = "/odom"
+    timeout: Timeout = 0.5  # s without a new one until the base must not move
+    still: NotNegative = 0.01  # m/s and rad/s, below which the base counts as at rest
+
+
+class BaseAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    maximum: Positive  # m/s or rad/s
+    minimum: float | None = None  # None: -maximum
+    slew: Positive | None = None  # per second while driving; None: maximum in half a second
+    brake: Positive | None = None  # per second to rest; None: maximum in half of `hold`
+
+
+class Base(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A mobile base that takes twists and says where it is."""
+
+    forward: BaseAxis
+    left: BaseAxis | None = None
+    turn: BaseAxis | None = None
+    command: TwistCommand = field(default_factory=TwistCommand)
+    odometry: Odometry = field(default_factory=Odometry)
+    radius: NotNegative = 0.3  # m, of the circle that holds the robot: drawn, and kept out of geofences
+    margin: NotNegative = 0.05  # m kept from geofences besides
+    latency: Annotated[float, Meta(ge=0, le=1)] = 0.1  # s that odometry may be late
+
+
+class ArmCommand(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    topic: Topic = "/joint_trajectory_controller/joint_trajectory"
+    message: Literal["JointTrajectory", "JointState"] = "JointTrajectory"
+    rate: Rate = 25.0  # Hz
+    horizon: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # s ahead that each trajectory ends
+    lead: Annotated[float, Meta(gt=0, le=5)] = 0.5  # s at full speed that the setpoint may be ahead of the arm
+
+
+class JointStates(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    topic: Topic = "/joint_states"
+    timeout: Timeout = 0.5
+    still: NotNegative = 0.01  # rad/s or m/s
+
+
+class ArmJoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    name: Name  # as in JointState.name
+    label: str = ""  # "": the name
+    unit: Literal["rad", "m"] = "rad"
+    maximum: Positive  # rad/s or m/s
+    slew: Positive | None = None
+    brake: Positive | None = None
+    lower: float | None = None  # position limits that the bridge keeps, rad or m
+    upper: float | None = None
+    margin: NotNegative = 0.0
+    latency: Annotated[float, Meta(ge=0, le=1)] = 0.1
+
+
+class Arm(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An arm (or gripper, lift …) whose joints are driven by their velocities."""
+
+    joints: Annotated[tuple[ArmJoint, ...], Meta(min_length=1, max_length=64)]
+    command: ArmCommand = field(default_factory=ArmCommand)
+    states: JointStates = field(default_factory=JointStates)
+
+
+class Ranges(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A LaserScan, gathered into `count` sectors all around: each shows the nearest thing in it."""
+
+    topic: Topic = "/scan"
+    timeout: Timeout = 1.0
+    body: str | None = None  # it sits on; None: the base, or the world without one
+    yaw: float = 0.0  # rad, of the scanner's frame in the body's
+    count: Annotated[int, Meta(ge=3, le=720)] = 72
+    range_min: NotNegative = 0.05  # m
+    range_max: Positive = 10.0
+
+
+class Wrench(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    topic: Topic
+    timeout: Timeout = 0.5
+    body: str | None = None
+    threshold_force: NotNegative = 2.0  # N
+    full_scale_force: Positive = 50.0
+    full_scale_torque: Positive = 10.0  # N m
+
+
+class CameraTopic(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Pictures of one topic."""
+
+    name: Name
+    label: str = ""
+    topic: Topic
+    message: Literal["Image", "CompressedImage"] = "Image"
+    width: Annotated[int, Meta(ge=16, le=8192)]
+    height: Annotated[int, Meta(ge=16, le=8192)]
+    frame_rate: Annotated[float, Meta(ge=0.1, le=120)] = 15.0  # Hz; more than that is left out
+    captured: Literal["header", "arrival"] = "header"  # what tells the time of capture
+    latency: Annotated[float, Meta(ge=0, le=5)] = 0.0  # s, taken off that time besides
+    timeout: Timeout = 2.0
+
+
+class Lockout(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """std_msgs/Bool: true keeps everybody from driving. Silence for longer than `timeout` does too."""
+
+    topic: Topic
+    timeout: Timeout = 1.0
+
+
+class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    name: Name
+    label: str = ""
+    domain: Annotated[int, Meta(ge=0, le=232)] | None = None  # None: ROS_DOMAIN_ID
+    node: Annotated[str, Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] = "lockstep"
+    namespace: Annotated[str, Meta(pattern=r"^(/?[A-Za-z_][A-Za-z0-9_/]*)?$")] = ""
+    use_sim_time: bool = False
+    hold: Annotated[float, Meta(gt=0, le=5)] = 0.5  # s
+    watchdog: Annotated[float, Meta(gt=0, lt=5)] | None = None  # s, less than hold; None: 0.1, or half of hold
+    max_event_age: Annotated[float, Meta(gt=0, le=10)] = 2.0  # s
+    max_event_rate: Annotated[float, Meta(gt=0, le=100)] = 25.0  # Hz
+    base: Base | None = None
+    arm: Arm | None = None
+    ranges: Ranges | None = None
+    wrench: Wrench | None = None
+    lockout: Lockout | None = None
+    cameras: Annotated[tuple[CameraTopic, ...], Meta(max_length=8)] = ()
+    geofences: Annotated[tuple[Geofence, ...], Meta(max_length=32)] = ()
+    bodies: tuple[Body, ...] = ()  # more of the kinematic model than the base
+    layers: tuple[ControlLayer, ...] = ()  # instead of those that are made for the axes

@@ -1,0 +1,1 @@
+"""The latched stop and the lock-out, kept on the robot's disk."""

@@ -1,0 +1,1 @@
+"""What brings the robot to rest when the bridge hangs."""

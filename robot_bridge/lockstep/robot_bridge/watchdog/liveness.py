@@ -1,0 +1,106 @@
+"""Ends the process when its control ticks have stopped for good, so that its service manager starts it again.
+
+By then the watchdog has long brought the robot to rest (`watchdogs.py`). A thread ends the process with a message; the
+kernel's alarm does where that thread cannot run, because native code keeps the interpreter's lock, or cannot write.
+"""
+
+import faulthandler
+import logging
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+from lockstep.robot_bridge.service_manager import ServiceManager
+from lockstep.robot_bridge.thread_name import name_thread
+
+__all__ = ["EXIT_HUNG", "LIMIT", "Liveness"]
+
+EXIT_HUNG = 3
+LIMIT = 10.0  # s; a tick of an adapter that returns at all is shorter
+ALARM = 1.5  # of the limit
+BEAT = 1.0  # s between two signs of life, at most
+PER_LIMIT = 5  # signs of life in each limit, at least
+
+_logger = logging.getLogger(__name__)
+
+
+class Liveness:
+    """For a process that is the bridge's alone. `start` in the main thread, `ticked` at every tick, then `close`.
+
+    Without arguments it does nothing.
+    """
+
+    def __init__(self, limit: float | None = None, service: ServiceManager | None = None) -> None:
+        """`limit`: s without a tick after which the process ends; None: it never does. Suspended time is not counted.
+
+        `service`: told at every sign of life, so that it hears nothing while the ticks stand still.
+        """
+        self._limit = limit
+        self._service = service or ServiceManager({})
+        limits = (limit, self._service.watchdog_seconds)
+        self._beat = min([BEAT, *(each / PER_LIMIT for each in limits if each is not None)])
+        self._last = time.monotonic()
+        self._note: Callable[[str], None] = lambda reason: None
+        self._armed = False  # the alarm is set
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="liveness", daemon=True)
+
+    def start(self, note: Callable[[str], None]) -> None:
+        """The ticks begin. `note`: keeps the reason for the next start; called in another thread when they stop."""
+        self._last = time.monotonic()
+        self._note = note
+        if self._limit is not None:
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)  # which ends the process without a line of its code
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGALRM])
+            self._armed = True
+            self._wind_up()
+            self._thread.start()
+        self._service.ready()
+
+    def ticked(self) -> None:
+        """A tick has ended, or a step on the way out. Cheap."""
+        now = time.monotonic()
+        if now - self._last < self._beat:
+            return
+        self._last = now
+        self._wind_up()
+        self._service.alive()
+
+    def leaving(self) -> None:
+        """The process is about to end: it has the limit's time for that."""
+        self._service.stopping()
+        self._last = time.monotonic()
+        self._wind_up()
+
+    def close(self) -> None:
+        """The ticks have ended in order. The alarm stays: the rest of the process may hang too. Idempotent."""
+        self._closed.set()
+        if self._thread.is_alive():
+            self._thread.join(BEAT)
+        self._wind_up()
+        self._service.close()
+
+    def _wind_up(self) -> None:
+        if self._armed and self._limit is not None:
+            signal.setitimer(signal.ITIMER_REAL, ALARM * self._limit)
+
+    def _run(self) -> None:
+        assert self._limit is not None  # else it is not started
+        name_thread("liveness")
+        while (left := self._last + self._limit - time.monotonic()) > 0:
+            if self._closed.wait(left):
+                return
+        try:
+            self._end(f"The robot bridge hung: no control tick for {self._limit:g} s")
+        finally:
+            os._exit(EXIT_HUNG)
+
+    def _end(self, reason: str) -> None:
+        """Each of these may block or raise; the alarm ends the process then."""
+        with suppress(Exception):
+            self._note(reason)
+        _logger.critical("%s. It ends, so that it can be started again; every thread is at:", reason)
+        faulthandler.dump_traceback(all_threads=True)

@@ -1,0 +1,49 @@
+"""The owner of a datagram, where many agents share sockets: agents enter their users, transactions and paths here, and
+remove them again."""
+
+from typing import TYPE_CHECKING
+
+from lockstep.rtc.addresses import Path
+
+if TYPE_CHECKING:
+    from lockstep.rtc.ice.agent import Agent
+
+__all__ = ["Directory"]
+
+
+class Directory:
+    """Each entry belongs to one agent, which alone removes it.
+
+    A path is *claimed* when its far end has answered a check: an attacker with a forged source address never sees the
+    check that it would have to answer. A path is *hinted at* when an authenticated check came from there; a hint lets
+    data through that overtake the answer, and never takes a path from the agent that has claimed it.
+    """
+
+    def __init__(self) -> None:
+        self.ufrags: dict[str, Agent] = {}
+        self.transactions: dict[bytes, Agent] = {}
+        self.claims: dict[Path, Agent] = {}
+        self.hints: dict[Path, Agent] = {}
+
+    def owner(self, path: Path) -> "Agent | None":
+        """The agent that data from there are for."""
+        return self.claims.get(path) or self.hints.get(path)
+
+    def hint(self, path: Path, agent: "Agent") -> None:
+        if path not in self.claims:
+            self.hints[path] = agent
+
+    def claim(self, path: Path, agent: "Agent") -> None:
+        """The agent's peer is there now. A path that another agent had moves."""
+        self.claims[path] = agent
+        self.hints.pop(path, None)
+
+    def release(self, path: Path, agent: "Agent") -> None:
+        for entries in (self.claims, self.hints):
+            if entries.get(path) is agent:
+                del entries[path]
+
+    @property
+    def size(self) -> int:
+        """Entries of all kinds."""
+        return len(self.ufrags) + len(self.transactions) + len(self.claims) + len(self.hints)

@@ -1,0 +1,694 @@
+"""One WebRTC peer without I/O: ICE, DTLS, SRTP, SCTP with its channels, and RTP, put together for one BUNDLE.
+
+    way in:   receive_datagram → (lockstep.rtc.demux) → ICE | DTLS → SCTP → channels | SRTP → streams → events
+    way out:  send, send_frame → channels → SCTP → DTLS | streams → SRTP → datagrams_to_send, on the path of ICE
+
+Negotiate with `answer`, or with `offer` and then `accept`; then live as every core: `receive_datagram`, `handle_timer`;
+drain `datagrams_to_send` and `events` after each; `timer`.
+"""
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from random import Random, SystemRandom
+
+from OpenSSL import SSL
+
+from lockstep.rtc.addresses import Datagram, Path
+from lockstep.rtc.channels import DataChannels
+from lockstep.rtc.dcep import Reliability
+from lockstep.rtc.demux import DatagramKind, datagram_kind
+from lockstep.rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsFailed, DtlsSettings, DtlsState
+from lockstep.rtc.fingerprint import Fingerprint
+from lockstep.rtc.ice.agent import Agent
+from lockstep.rtc.ice.candidates import CandidateError, parse_candidate
+from lockstep.rtc.ice.check_list import LocalCandidate
+from lockstep.rtc.ice.credentials import Credentials
+from lockstep.rtc.ice.directory import Directory
+from lockstep.rtc.ice.events import Answered, Ended, PathChanged, Restarted, RestartFailed
+from lockstep.rtc.ice.settings import IceSettings
+from lockstep.rtc.peer_events import (
+    Connected,
+    MediaEvent,
+    PacketReceived,
+    PathFound,
+    PeerEnded,
+    PeerEvent,
+    PlainRtcp,
+    PlainRtp,
+)
+from lockstep.rtc.rtp.incoming import IncomingStream
+from lockstep.rtc.rtp.outgoing import OutgoingStream, PathShare
+from lockstep.rtc.rtp.stage import earliest
+from lockstep.rtc.rtp.streams import Identity, NegotiatedMedia, Streams
+from lockstep.rtc.sctp import SctpSettings
+from lockstep.rtc.sdp import (
+    Fragment,
+    FragmentCandidate,
+    LocalMedia,
+    MediaSection,
+    SdpError,
+    SessionDescription,
+    Setup,
+    Source,
+    SourceGroup,
+    Transport,
+    answer_to,
+    check_answer,
+    data_section,
+    media_section,
+    offer_of,
+    reverse,
+)
+from lockstep.rtc.srtp import SrtpPacketTooLong, SrtpReceiver, SrtpSender
+
+__all__ = ["OfferedMedia", "Peer", "PeerNotReady", "PeerSettings"]
+
+DATA_MID = "data"  # of the section for channels in our offers
+EXTENSION_IDS = (*range(1, 15), *range(16, 256))  # of header extensions; 15 is reserved (RFC 8285 4.2)
+
+
+class PeerNotReady(RuntimeError):
+    """The peer has no such stream or no channels: not negotiated, not yet, or not any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class PeerSettings:
+    """What an application may want otherwise."""
+
+    ice: IceSettings = field(default_factory=IceSettings)
+    dtls: DtlsSettings = field(default_factory=DtlsSettings)
+    sctp: SctpSettings = field(default_factory=SctpSettings)
+    # Whether an own answer opens DTLS, where the offer leaves the choice (RFC 8842 5.3). The peer knows first that
+    # ICE has found a path, when it is the one that asks for one.
+    setup: Setup = "passive"
+    epoch: float = 0.0  # s since 1970 at which the clock of `now` was 0; for sender reports
+    held: int = 32  # datagrams of DTLS that overtake the description they need; a handshake has fewer
+
+
+@dataclass(frozen=True, slots=True)
+class OfferedMedia:
+    """A section of an own offer."""
+
+    mid: str
+    kind: str  # "audio" or "video"
+    media: LocalMedia
+
+
+@dataclass(slots=True)
+class _Ssrcs:
+    stream: int
+    repair: int
+
+
+class Peer:
+    """One session with one peer. It ends with PeerEnded; another one is another object."""
+
+    def __init__(
+        self,
+        context: SSL.Context,
+        fingerprint: Fingerprint,
+        candidates: Iterable[LocalCandidate],
+        *,
+        controlling: bool,
+        settings: PeerSettings | None = None,
+        directory: Directory | None = None,
+        random: Random | None = None,
+    ) -> None:
+        """
+        Args:
+            context: from `lockstep.rtc.dtls.dtls_context`; `fingerprint` is of its certificate.
+            candidates: the addresses for the peer. controlling: whether this side decides on the path: the offerer
+            does, and a side that answers a lite agent (RFC 8445 6.1.1). directory: of the `ice.port.Port` whose
+            sockets it shares. random: must be unpredictable: a SystemRandom except in tests.
+        """
+        self.settings = settings or PeerSettings()
+        self.counts: Counter[str] = Counter()
+        self._random = random or SystemRandom()
+        self.ice = Agent(
+            candidates, controlling=controlling, settings=self.settings.ice, directory=directory, rng=self._random
+        )
+        self._context = context
+        self._fingerprint = fingerprint
+        self._identity = Identity.new(self._random)
+        self._session_id = self._random.getrandbits(62)  # RFC 8829 5.2.1
+        self._ssrcs: dict[str, _Ssrcs] = {}  # by mid
+        self._offer: SessionDescription | None = None  # the own offer, until it is answered
+        self._dtls: DtlsConnection | None = None  # None until both descriptions are known
+        self._held: deque[bytes] = deque(maxlen=self.settings.held)
+        self.channels: DataChannels | None = None  # None when there are none
+        self.streams: Streams | None = None  # None until both descriptions are known
+        self._protect: SrtpSender | None = None
+        self._unprotect: SrtpReceiver | None = None
+        self._plain_packets = False
+        self._tagged: MediaSection | None = None  # whose transport is that of the bundle; None until negotiated
+        # What streams have: most datagrams are about something else, and each stream is a chain of stages.
+        self._media_unsent = self._media_untold = self._media_untimed = False
+        self._media_due: float | None = None  # when their timer is, as far as that is known
+        self._out: list[Datagram] = []
+        self._events: list[PeerEvent] = []
+        self._now = 0.0
+        self._ended = False
+
+    # Negotiation
+
+    def answer(self, offer: SessionDescription, media: Mapping[str, LocalMedia], now: float) -> SessionDescription:
+        """Our answer to a peer's offer. `media`: what we can do, by the offer's mid.
+
+        Raises:
+            SdpError: it cannot be answered; nothing has changed.
+            RuntimeError: this session was negotiated before.
+        """
+        self._check_new()
+        answer = answer_to(
+            offer,
+            self._own_transport(),
+            {mid: self._with_sources(mid, own) for mid, own in media.items()},
+            max_message_size=self.settings.sctp.max_receive_message,
+            session_id=self._session_id,
+        )
+        self._negotiated(offer, answer, answer.sections, now)
+        return answer
+
+    def offer(self, media: Sequence[OfferedMedia], *, data: bool = True) -> SessionDescription:
+        """Our offer, with channels if `data`. The peer's answer goes to `accept`. Raises RuntimeError as `answer`."""
+        self._check_new()
+        uris = dict.fromkeys(uri for each in media for uri in each.media.extensions)
+        ids = dict(zip(uris, EXTENSION_IDS, strict=False))
+        sections = [media_section(x.mid, x.kind, self._with_sources(x.mid, x.media), ids) for x in media]
+        if data:
+            sections.append(data_section(DATA_MID, self.settings.sctp.max_receive_message))
+        self._offer = offer_of(sections, self._own_transport(), session_id=self._session_id)
+        return self._offer
+
+    def accept(self, answer: SessionDescription, now: float) -> None:
+        """The peer's answer to our offer. Raises SdpError; RuntimeError without an offer that waits for one."""
+        if self._offer is None:
+            raise RuntimeError("no offer waits for an answer")
+        check_answer(self._offer, answer)
+        ours = [replace(section, direction=reverse(section.direction)) for section in answer.sections]
+        self._offer = None
+        self._negotiated(answer, answer, ours, now)
+
+    def add_candidate(self, line: str) -> None:
+        """One more of the peer's, "candidate:…" (RFC 8838). An unknown candidate is counted and ignored."""
+        try:
+            self.ice.add_remote_candidate(parse_candidate(line))
+        except CandidateError:
+            self.counts["candidate_malformed"] += 1
+
+    # A restart of ICE: DTLS and SRTP stay, the path changes (RFC 8445 9, RFC 8842 5.1)
+
+    @property
+    def tagged(self) -> MediaSection:
+        """The section that candidates are for (RFC 9143 7.2.1). Raises PeerNotReady before both descriptions."""
+        if self._tagged is None:
+            raise PeerNotReady("not negotiated yet")
+        return self._tagged
+
+    def restart(self, now: float, candidates: Iterable[LocalCandidate] | None = None) -> Fragment:
+        """Look for another path, for the peer's fragment to go to `accept_restart`; `Restarted` or `RestartFailed`
+        follows. Until then the path is the one before, for as long as the peer consents.
+
+        `candidates`: where the peer may reach us now; None: where it could before. Raises PeerNotReady.
+        """
+        mid = self._check_alive().mid
+        credentials = self.ice.restart(now, candidates)
+        self._now = now
+        lines = (local.candidate.line() for local in self.ice.local_candidates)
+        found = tuple(FragmentCandidate(mid, line) for line in lines)
+        return Fragment(credentials.ufrag, credentials.password, found, end_of_candidates=True)
+
+    def accept_restart(self, fragment: Fragment, now: float) -> None:
+        """What the peer answers to the fragment of `restart`.
+
+        Raises:
+            SdpError: it has no credentials; the restart waits for a better one.
+            RuntimeError: no restart waits for it.
+        """
+        if not fragment.ufrag or not fragment.password:
+            raise SdpError("no ice-ufrag or no ice-pwd")
+        self._now = now
+        self.ice.set_remote(Credentials(fragment.ufrag, fragment.password), (), now)
+        for candidate in fragment.candidates:
+            self.add_candidate(candidate.line)
+        self._settle(now)
+
+    def answer_restart(
+        self, fragment: Fragment, now: float, candidates: Iterable[LocalCandidate] | None = None
+    ) -> Fragment:
+        """Our fragment for a restart that the peer has begun. Raises SdpError and PeerNotReady."""
+        if not fragment.ufrag or not fragment.password:
+            raise SdpError("no ice-ufrag or no ice-pwd")
+        answer = self.restart(now, candidates)
+        self.accept_restart(fragment, now)
+        return answer
+
+    def cancel_restart(self) -> None:
+        """The path before it stays. Nothing without one."""
+        self.ice.cancel_restart()
+
+    @property
+    def is_up(self) -> bool:
+        """Whether DTLS is connected and the session has not ended; a path may be missing during a restart."""
+        return not self._ended and self._dtls is not None and self._dtls.state is DtlsState.CONNECTED
+
+    def _check_alive(self) -> MediaSection:
+        if self._ended:
+            raise PeerNotReady("the session has ended")
+        return self.tagged
+
+    def _check_new(self) -> None:
+        if self._dtls is not None:
+            raise RuntimeError("this session is negotiated; another one is another peer")
+
+    def _own_transport(self) -> Transport:
+        credentials = self.ice.local_credentials
+        return Transport(
+            ufrag=credentials.ufrag,
+            password=credentials.password,
+            fingerprints=(self._fingerprint,),
+            setup=self.settings.setup,
+            candidates=tuple(local.candidate.line() for local in self.ice.local_candidates),
+            end_of_candidates=True,
+            ice_options=("trickle",),
+        )
+
+    def _with_sources(self, mid: str, own: LocalMedia) -> LocalMedia:
+        """With the SSRCs that we send under."""
+        ssrcs = self._ssrcs.setdefault(mid, _Ssrcs(self._random.getrandbits(32), self._random.getrandbits(32)))
+        names = {"cname": self._identity.cname} | ({"msid": own.msid} if own.msid else {})
+        if not any(codec.name.lower() == "rtx" for codec in own.codecs):
+            return replace(own, sources=(Source(ssrcs.stream, names),))
+        sources = (Source(ssrcs.stream, names), Source(ssrcs.repair, names))
+        return replace(own, sources=sources, source_groups=(SourceGroup("FID", (ssrcs.stream, ssrcs.repair)),))
+
+    def _negotiated(
+        self, remote: SessionDescription, answer: SessionDescription, ours: Sequence[MediaSection], now: float
+    ) -> None:
+        """`ours`: the answer's sections with the own direction."""
+        self._now = now
+        self._tagged = next(iter(answer.accepted), None)
+        media = [
+            NegotiatedMedia(
+                section,
+                own.direction,
+                self._ssrcs[section.mid].stream,
+                self._ssrcs[section.mid].repair,
+                frozenset(source.ssrc for source in (theirs.sources if theirs else ())),
+            )
+            for section, own in zip(answer.sections, ours, strict=True)
+            if section.is_media and not section.rejected
+            for theirs in (remote.section(section.mid),)
+        ]
+        self.streams = Streams(media, self._identity, PathShare(self.settings.epoch), self._random)
+        we_answer = remote is not answer
+        active = (answer.transport.setup == "active") is we_answer
+        self._dtls = DtlsConnection(
+            self._context, "client" if active else "server", remote.transport.fingerprints, self.settings.dtls
+        )
+        data = next((each for each in answer.accepted if each.sctp_port is not None), None)
+        theirs = remote.section(data.mid) if data is not None else None
+        if theirs is not None:
+            self.channels = DataChannels(
+                self.settings.sctp,
+                self._random.randbytes,
+                client=active,
+                peer_port=theirs.sctp_port,
+                peer_max_message=theirs.max_message_size,
+            )
+        self._begin_ice(remote.transport, now)
+
+    def _begin_ice(self, remote: Transport, now: float) -> None:
+        self.ice.set_remote(Credentials(remote.ufrag, remote.password), (), now)
+        for line in remote.candidates:
+            self.add_candidate(line)
+        if self.ice.path is not None:
+            self._start_dtls(now)
+
+    # Media without stages
+
+    def take_plain_packets(self) -> None:
+        """Hand out packets decrypted and unread, as PlainRtp and PlainRtcp, for a receiver that only counts. Then this
+        package sends no reports on them, and no requests for missing ones.
+        """
+        self._plain_packets = True
+
+    def receive_plain(self, data: bytes) -> bool:
+        """The short way of a media datagram on a path of this peer's, after `take_plain_packets`; drain
+        `plain_packets`. False: it is another, for `receive_datagram`. No timer and nothing to send comes of it.
+        """
+        if not self._plain_packets or self._unprotect is None or self._ended:
+            return False
+        if datagram_kind(data) is not DatagramKind.RTP:
+            return False
+        plain = self._unprotect.unprotect(data)
+        if plain is not None:
+            self._events.append(PlainRtp(plain))
+        return True
+
+    def plain_packets(self) -> list[PeerEvent]:
+        """As `events`, when nothing but `receive_plain` was called since."""
+        events, self._events = self._events, []
+        return events
+
+    def send_rtcp(self, packet: bytes) -> None:
+        """A compound packet of the application's own. Raises PeerNotReady before media are up, SrtpPacketTooLong."""
+        if self._protect is None or self._ended:
+            raise PeerNotReady("media are not up")
+        path = self.ice.path
+        protected = self._protect.protect_rtcp(packet)
+        if path is not None:
+            self._out.append(Datagram(protected, path))
+
+    def note_round_trip(self, seconds: float) -> None:
+        """The application has measured the path: lost packets are asked for accordingly."""
+        if self.streams is not None:
+            self.streams.share.round_trip.measure(seconds)
+
+    # What the application sends
+
+    def open_channel(
+        self, label: str, now: float, *, protocol: str = "", reliability: Reliability | None = None
+    ) -> int:
+        """As `DataChannels.open`. Raises PeerNotReady as well."""
+        self._now = now
+        return self._need_channels().open(label, now, protocol=protocol, reliability=reliability)
+
+    def send(self, channel: int, data: str | bytes, now: float) -> None:
+        """As `DataChannels.send`. Raises PeerNotReady as well."""
+        self._now = now
+        self._need_channels().send(channel, data, now)
+
+    def open_negotiated_channel(
+        self, channel: int, label: str, *, protocol: str = "", reliability: Reliability | None = None
+    ) -> None:
+        """As `DataChannels.open_negotiated`. Raises PeerNotReady as well."""
+        self._need_channels().open_negotiated(channel, label, protocol=protocol, reliability=reliability)
+
+    def has_waiting(self, channel: int) -> bool:
+        """As of `DataChannels`; False when there are none."""
+        return self.channels is not None and self.channels.has_waiting(channel)
+
+    def tell_when_empty(self, channel: int) -> None:
+        """As of `DataChannels`."""
+        if self.channels is not None:
+            self.channels.tell_when_empty(channel)
+
+    def close_channel(self, channel: int, now: float) -> None:
+        self._now = now
+        self._need_channels().close(channel, now)
+
+    def send_frame(
+        self,
+        mid: str,
+        payloads: Sequence[bytes],
+        media_time: int,
+        now: float,
+        *,
+        marker: bool = True,
+        values: Mapping[str, bytes] | None = None,
+        captured_at: float | None = None,
+    ) -> None:
+        """As `OutgoingStream.send`, in section `mid`. Raises PeerNotReady: it is not up, or we do not send there."""
+        self._now = now
+        self._need_outgoing(mid).send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
+        self._stir_media()
+
+    def frame_to_send(
+        self,
+        mid: str,
+        payloads: Sequence[bytes],
+        media_time: int,
+        now: float,
+        *,
+        marker: bool = True,
+        values: Mapping[str, bytes] | None = None,
+        captured_at: float | None = None,
+    ) -> list[Datagram]:
+        """As `send_frame`, and what is due because of it: nothing else has to be drained. `timer` may be earlier."""
+        stream = self._need_outgoing(mid)
+        self._now = now
+        stream.send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
+        self._media_due = earliest(self._media_due, stream.timer())
+        sent, path = self._drained(stream), self.ice.path
+        return [] if path is None else [Datagram(data, path) for data in sent]
+
+    @property
+    def media_timer(self) -> float | None:
+        """When `handle_timer` is due for the sake of what we send."""
+        return None if self._ended else self._media_due
+
+    def _drained(self, stream: OutgoingStream) -> list[bytes]:
+        if self._protect is None or self.streams is None:
+            return []
+        sent = list(self._protected(self._protect.protect, stream.packets_to_send()))
+        if controls := stream.controls_to_send():
+            sent += self._protected(self._protect.protect_rtcp, self.streams.compounds(controls))
+        return sent
+
+    def _need_outgoing(self, mid: str) -> OutgoingStream:
+        stream = self.streams.outgoing.get(mid) if self.streams is not None else None
+        if stream is None or self._protect is None or self._ended:
+            raise PeerNotReady(f"nothing can be sent in section {mid!r}")
+        return stream
+
+    def _stir_media(self) -> None:
+        """Streams may have something to send and to tell, and another timer."""
+        self._media_unsent = self._media_untold = self._media_untimed = True
+
+    def holds_back(self, mid: str) -> bool:
+        """Whether packets of the stream that we send in section `mid` wait for its pacer. `PacketsLeft` follows."""
+        stream = self.streams.outgoing.get(mid) if self.streams is not None else None
+        return stream is not None and stream.pacer is not None and stream.pacer.holds
+
+    def pace(self, bitrate: float | None) -> None:
+        """Spread pictures over a path that is believed to carry `bitrate` (bit/s). None: no limit was seen."""
+        if self.streams is not None:
+            self.streams.share.bucket.limit(bitrate)
+
+    def report_every(self, seconds: float) -> None:
+        """Send reports of what we send as often (RFC 3550 6.2). From the report after the next on."""
+        if self.streams is not None:
+            for stream in self.streams.outgoing.values():
+                stream.reports.interval = seconds
+
+    def request_keyframe(self, mid: str, now: float) -> None:
+        """Raises PeerNotReady: we do not receive in section `mid`."""
+        self._now = now
+        self._need_incoming(mid).request_keyframe(now)
+        self._stir_media()
+
+    def limit(self, mid: str, bitrate: int) -> None:
+        """Ask the peer to send at most so many bit/s in this section (REMB). Raises PeerNotReady likewise."""
+        self._need_incoming(mid).limit = bitrate
+
+    def _need_incoming(self, mid: str) -> IncomingStream:
+        stream = self.streams.incoming.get(mid) if self.streams is not None else None
+        if stream is None:
+            raise PeerNotReady(f"nothing is received in section {mid!r}")
+        return stream
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """What came and was not used, by reason; not what ICE passes over as a matter of course."""
+        dropped = self.counts - Counter(dtls_early=self.counts["dtls_early"])  # those were kept
+        if self.streams is not None:
+            dropped += self.streams.counts
+        if self._unprotect is not None:
+            dropped += Counter({f"srtp_{name}": count for name, count in self._unprotect.counts.items()})
+        return dropped
+
+    def close(self, now: float) -> None:
+        """Say goodbye in every protocol that has a word for it. Idempotent; drain `datagrams_to_send` once more."""
+        if self._ended:
+            return
+        self._now = now
+        if self.streams is not None:
+            self.streams.close(now)
+            self._stir_media()
+        if self.channels is not None:
+            self.channels.abort(now)
+        self._collect()
+        if self._dtls is not None:
+            self._dtls.close(now)
+        self._collect()
+        self._end("closed")
+
+    def _need_channels(self) -> DataChannels:
+        if self.channels is None or self._ended:
+            raise PeerNotReady("there are no data channels")
+        return self.channels
+
+    # What every core has
+
+    def receive_datagram(self, data: bytes, path: Path, now: float) -> None:
+        """A datagram from the peer, as far as `ice.port.Port` can say, of any kind."""
+        self._now = now
+        if self._ended:
+            self.counts["ended"] += 1
+            return
+        kind = datagram_kind(data)
+        if kind is DatagramKind.STUN:
+            self.ice.receive_datagram(data, path, now)
+        elif not self.ice.accepts(path):
+            self.counts["unknown_path"] += 1
+        elif kind is DatagramKind.DTLS:
+            self._receive_dtls(data, now)
+        elif kind in (DatagramKind.RTP, DatagramKind.RTCP):
+            self._receive_media(data, kind, now)
+        else:
+            self.counts["unknown_protocol"] += 1
+        self._settle(now)
+
+    def handle_timer(self, now: float) -> None:
+        self._now = now
+        if self._ended:
+            return
+        self.ice.handle_timer(now)
+        for core in (self._dtls, self.channels, self.streams):
+            due = core.timer() if core is not None else None
+            if core is not None and due is not None and now >= due:
+                core.handle_timer(now)
+        self._stir_media()
+        self._settle(now)
+
+    def timer(self) -> float | None:
+        if self._ended:
+            return None
+        if self._media_untimed and self.streams is not None:
+            self._media_due, self._media_untimed = self.streams.timer(), False
+        cores = (self.ice, self._dtls, self.channels)
+        return earliest(self._media_due, *(core.timer() for core in cores if core is not None))
+
+    def datagrams_to_send(self) -> list[Datagram]:
+        self._collect()
+        out, self._out = self._out, []
+        return out
+
+    @property
+    def has_events(self) -> bool:
+        """Whether sending has made some: `events` has more."""
+        return bool(self._events) or (self.channels is not None and self.channels.has_events)
+
+    def events(self) -> list[PeerEvent]:
+        self._settle(self._now)
+        events, self._events = self._events, []
+        return events
+
+    # Inside: the way in
+
+    def _receive_dtls(self, data: bytes, now: float) -> None:
+        if self._dtls is None or self._dtls.state is DtlsState.NEW:
+            self._held.append(data)  # the peer's answer, or our own look at the path, is on its way
+            self.counts["dtls_early"] += 1
+        else:
+            self._dtls.receive_datagram(data, now)
+
+    def _receive_media(self, data: bytes, kind: DatagramKind, now: float) -> None:
+        if self._unprotect is None or self.streams is None:
+            self.counts["media_early"] += 1
+        elif kind is DatagramKind.RTP:
+            plain = self._unprotect.unprotect(data)
+            if plain is not None and self._plain_packets:
+                self._events.append(PlainRtp(plain))
+            elif plain is not None:
+                self.streams.receive_rtp(plain, now)
+                self._stir_media()
+        else:
+            plain = self._unprotect.unprotect_rtcp(data)
+            if plain is not None and self._plain_packets:
+                self._events.append(PlainRtcp(plain))
+            elif plain is not None:
+                self.streams.receive_rtcp(plain, now)
+                self._stir_media()
+
+    def _settle(self, now: float) -> None:
+        """Pass the cores' events to one another, and to the application."""
+        for event in self.ice.events():
+            if isinstance(event, PathChanged):
+                self._events.append(PathFound(event.path))
+                self._start_dtls(now)
+            elif isinstance(event, Answered | Restarted | RestartFailed):
+                self._events.append(event)
+            elif isinstance(event, Ended):
+                self._end(event.reason)
+        if self._dtls is not None:
+            self._settle_dtls(self._dtls, now)
+        self._tell()
+
+    def _tell(self) -> None:
+        """What channels and streams have for the application; nothing after the end."""
+        if self._ended:
+            return
+        if self.channels is not None:
+            self._events += self.channels.events()
+        if self.streams is not None and self._media_untold:
+            self._media_untold = False
+            self._events += [PacketReceived(mid, packet) for mid, packet in self.streams.packets()]
+            self._events += [MediaEvent(mid, event) for mid, event in self.streams.events()]
+
+    def _start_dtls(self, now: float) -> None:
+        if self._dtls is not None and self._dtls.state is DtlsState.NEW and self.ice.path is not None:
+            self._dtls.start(now)
+            while self._held:
+                self._dtls.receive_datagram(self._held.popleft(), now)
+
+    def _settle_dtls(self, dtls: DtlsConnection, now: float) -> None:
+        for event in dtls.events():
+            if isinstance(event, DtlsConnected):
+                self._connected(event, now)
+            elif isinstance(event, DtlsData):
+                if self.channels is None:
+                    self.counts["data_without_channels"] += 1
+                else:
+                    self.channels.receive_packet(event.data, now)
+            elif isinstance(event, DtlsClosed):
+                self._end("peer_closed")
+            elif isinstance(event, DtlsFailed):
+                self._end(f"dtls_{event.reason}", event.detail)
+
+    def _connected(self, event: DtlsConnected, now: float) -> None:
+        if event.srtp is not None:
+            self._protect, self._unprotect = SrtpSender(event.srtp), SrtpReceiver(event.srtp)
+        self._events.append(Connected(event.srtp.profile.name if event.srtp is not None else None))
+        if self.channels is not None:
+            self.channels.start(now)
+
+    def _end(self, reason: str, detail: str = "") -> None:
+        if self._ended:
+            return
+        self._collect()  # an alert or a close_notify may still go out
+        self._tell()
+        self._ended = True
+        self.ice.close()
+        self._events.append(PeerEnded(reason, detail))
+
+    # Inside: the way out
+
+    def _collect(self) -> None:
+        """Take the due data from each core, the innermost first."""
+        if self._ended:
+            return
+        self._out += self.ice.datagrams_to_send()
+        dtls, path = self._dtls, self.ice.path
+        if dtls is None:
+            return
+        if self.channels is not None and dtls.state is DtlsState.CONNECTED:
+            for packet in self.channels.packets_to_send():
+                if dtls.state is DtlsState.CONNECTED:  # it may end with any of them
+                    dtls.send(packet, self._now)
+        sent = dtls.datagrams_to_send()
+        if self.streams is not None and self._protect is not None and self._media_unsent:
+            self._media_unsent = False
+            sent += self._protected(self._protect.protect_rtcp, self.streams.rtcp_to_send())
+            sent += self._protected(self._protect.protect, self.streams.rtp_to_send())
+        if path is not None:  # without a path every packet is as good as lost, and repeated as such
+            self._out += [Datagram(data, path) for data in sent]
+
+    def _protected(self, protect: Callable[[bytes], bytes], packets: Iterable[bytes]) -> Iterator[bytes]:
+        for packet in packets:
+            try:
+                yield protect(packet)
+            except SrtpPacketTooLong:  # header extensions of the application's, of hundreds of bytes
+                self.counts["packet_too_long"] += 1

@@ -1,0 +1,1 @@
+"""The audit: who drove, stopped and let in whom, on disk and in memory."""

@@ -1,0 +1,113 @@
+"""The audit's records: who drove when, and what else somebody may want to know afterwards. No I/O, no clock."""
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+import msgspec
+
+from lockstep.server.util.token_bucket import TokenBucket
+
+__all__ = ["CHATTER", "Actor", "AuditBudget", "AuditKind", "AuditMerger", "AuditRecord"]
+
+AuditKind = Literal[
+    "start",  # the console, not the robot
+    "joined",
+    "renamed",
+    "left",
+    "seat",  # another holder, or none
+    "claim",  # the claims on the seat changed
+    "stop",
+    "reset",
+    "silence",  # a supervisor silenced the stops of a link, or that ended
+    "refusal",  # merged: `count` of the same within a second
+    "invitation",
+    "revocation",
+    "note",
+    "link_up",
+    "link_down",
+    "epoch",
+    "recording",  # started, ended, downloaded, deleted
+    "reading",  # of a recording; merged
+    "publication",  # of a camera by WHIP: begun, ended
+    "audit",  # records were lost before this one
+]
+
+# What one link can cause as often as it likes. It is kept in a file of its own, which is full sooner.
+CHATTER: frozenset[AuditKind] = frozenset({"joined", "renamed", "left", "claim", "refusal", "note", "reading"})
+
+# What is written one by one only as often as its link's budget allows; the rest is counted together.
+# The others are either not caused by a link, or limited where they are asked for.
+LIMITED: frozenset[AuditKind] = frozenset(
+    {"joined", "renamed", "left", "seat", "claim", "invitation", "revocation", "recording", "reading", "publication"}
+)
+BURST = 30.0  # records of one kind and link at once
+RATE = 0.1  # Hz, afterwards
+MAX_BUDGETS = 1024  # links times kinds that are told apart; further ones share one
+
+MAX_PENDING = 256  # different keys within one interval; further ones are counted together
+
+
+class Actor(NamedTuple):
+    """Who did something."""
+
+    name: str = ""
+    role: str = ""
+    peer: str = ""  # the connection; "" over HTTP
+    link: str = ""  # id of the link that was used; never the token
+
+
+class AuditRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One line of the audit log. What is empty is left out."""
+
+    n: int  # counts up without gaps, over restarts too; a gap means lost records
+    time: float  # s since 1970, the console's clock: for people to read, never for a decision
+    kind: AuditKind
+    epoch: str = ""
+    event: int = 0  # reference at that moment; 0 before the robot was reached
+    who: str = ""
+    role: str = ""
+    peer: str = ""
+    link: str = ""
+    what: str = ""  # "granted", the refusal's reason, the channel of a stop
+    detail: str = ""
+    count: int = 1
+
+
+class AuditBudget:
+    """How often a link may have a kind of record written down one by one. `now` is monotonic seconds."""
+
+    def __init__(self) -> None:
+        self._buckets: dict[tuple[AuditKind, str], TokenBucket] = {}
+
+    def take(self, kind: AuditKind, link: str, now: float) -> bool:
+        """Whether it may be written now; then it counts."""
+        key = (kind, link)
+        if key not in self._buckets and len(self._buckets) >= MAX_BUDGETS:
+            key = (kind, "")
+        bucket = self._buckets.get(key)
+        if bucket is None:
+            bucket = self._buckets[key] = TokenBucket(RATE, BURST, now)
+        return bucket.take(now)
+
+    def forget_idle(self, now: float) -> None:
+        """Drop the budgets that nobody has drawn on for long enough."""
+        self._buckets = {key: bucket for key, bucket in self._buckets.items() if not bucket.is_full(now)}
+
+
+class AuditMerger:
+    """Counts what the same peer did again; a flood of it becomes one record an interval."""
+
+    def __init__(self) -> None:
+        self._counts: dict[tuple[AuditKind, Actor, str], int] = {}
+
+    def add(self, kind: AuditKind, actor: Actor, what: str, count: int = 1) -> None:
+        key = (kind, actor, what)
+        if key not in self._counts and len(self._counts) >= MAX_PENDING:
+            key = (kind, Actor(), "others")
+        self._counts[key] = self._counts.get(key, 0) + count
+
+    def take(self) -> Iterator[tuple[AuditKind, Actor, str, int]]:
+        """What came since the last time: who, what, how often."""
+        counts, self._counts = self._counts, {}
+        for (kind, actor, what), count in counts.items():
+            yield kind, actor, what, count

@@ -1,0 +1,388 @@
+"""The commands that run a console: `up`, with a simulated robot, and `serve`."""
+
+import logging
+import os
+import ssl
+import sys
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvloop
+from pydantic import SecretStr
+
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.robot_bridge.robots.registry import is_robot, robot_names, simulated_names
+from lockstep.server.cli.options import (
+    AllowedHosts,
+    Board,
+    Cameras,
+    Microphones,
+    ObserversDirect,
+    PublicUrl,
+    Record,
+    Relay,
+    Speaker,
+    SpeedCap,
+    StateDirOption,
+    Stun,
+    Tls,
+    TlsCert,
+    TlsKey,
+    Turn,
+    TurnSecret,
+    Whip,
+)
+from lockstep.server.cli.run_console import ConsoleFailed, run_console, say
+from lockstep.server.cli.settings_from_flags import make_settings
+from lockstep.server.cli.unknown_settings import unknown_settings
+from lockstep.server.federation import check_board
+from lockstep.server.federation.errors import BoardUnusable
+from lockstep.server.fleet.robots import robot_settings
+from lockstep.server.fleet.simulated import own_event_log, own_state_dir, simulated_robots
+from lockstep.server.http.transport.serve import PortTaken, bind
+from lockstep.server.robot.bridge_process import BridgeFailed, BridgeProcess
+from lockstep.server.robot.credentials import link_access
+from lockstep.server.settings import Settings
+from lockstep.server.state.persistent_state import open_state
+from lockstep.server.telemetry.logs import LogFormat, configure_logs
+from lockstep.server.util.file_limit import raise_file_limit
+from lockstep.server.util.glibc_malloc import share_arenas
+from lockstep.server.util.robot_names import BadFleet, is_named
+from lockstep.server.util.state_dir import StateDirUnusable, default_state_dir
+from lockstep.server.webrtc.media_addresses import MediaAddressUnusable, check_media_addresses
+
+__all__ = ["commands"]
+
+DEFAULT_ROBOT = "mobile-manipulator"
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_PORT_TAKEN = 3
+EXIT_BRIDGE = 4
+NO_NAMES = "a board needs robots with names that no other console has: --robot NAME=tcp://…"
+# A worker thread of ours (encoders, the 3D scene) may hold the interpreter this long while a command waits.
+SWITCH_INTERVAL = 0.0005  # s; Python's own is ten times that
+
+
+class Switch(StrEnum):
+    ON = "on"
+    OFF = "off"
+
+
+commands = typer.Typer()
+
+Host = Annotated[str | None, typer.Option(help="Address to listen on; 127.0.0.1 unless set.")]
+Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the console; 0 takes any free one.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the links as one JSON line, once ready.")]
+IceHosts = Annotated[
+    list[str] | None,
+    typer.Option("--ice-host", help="Address of this machine, offered to browsers for media; may be given again."),
+]
+Advertise = Annotated[
+    list[str] | None,
+    typer.Option(help="Outer address of this machine behind a one-to-one NAT, as in a cloud; may be given again."),
+]
+MediaPort = Annotated[
+    int | None,
+    typer.Option(
+        min=0, max=65535, help="UDP port for pictures, sound and commands of everybody; 0: any free one, as unless set."
+    ),
+]
+MediaTcp = Annotated[
+    bool | None,
+    typer.Option(
+        "--media-tcp/--no-media-tcp", help="Let browsers come to that port by TCP too, where a network lets no UDP out."
+    ),
+]
+Quality = Annotated[
+    Switch | None, typer.Option(help="Whether bitrate, rate and size of pictures follow the network; on unless set.")
+]
+LogFormatOption = Annotated[LogFormat | None, typer.Option("--log-format", help="Log lines as text or as JSON.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings.")]
+
+
+@commands.command()
+def up(
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class; "
+            f"{DEFAULT_ROBOT} unless set. Given again, or as NAME=robot: a fleet of several, docs/fleet.md."
+        ),
+    ] = None,
+    ros2: Annotated[
+        Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
+    ] = None,
+    mjcf: Annotated[Path | None, typer.Option(help="Instead: a MuJoCo model of your own, this MJCF file.")] = None,
+    robot_python: Annotated[
+        str | None,
+        typer.Option(
+            envvar="LOCKSTEP_ROBOT_PYTHON", help="Python that runs the bridge, as that of a ROS installation; or ours."
+        ),
+    ] = None,
+    robot_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the bridge, and of the first of several; 0: any free one.")
+    ] = 5600,
+    event_log: Annotated[Path | None, typer.Option(help="The bridge appends what happens to events here.")] = None,
+    event_strip: Annotated[
+        bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")
+    ] = False,
+    host: Host = None,
+    port: Port = None,
+    ice_host: IceHosts = None,
+    advertise: Advertise = None,
+    media_port: MediaPort = None,
+    media_tcp: MediaTcp = None,
+    camera: Cameras = None,
+    microphone: Microphones = None,
+    whip: Whip = None,
+    speaker: Speaker = None,
+    quality: Quality = None,
+    speed_cap: SpeedCap = None,
+    record: Record = None,
+    relay: Relay = None,
+    observers_direct: ObserversDirect = None,
+    public_url: PublicUrl = None,
+    allowed_host: AllowedHosts = None,
+    board: Board = None,
+    tls: Tls = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
+    stun: Stun = None,
+    turn: Turn = None,
+    turn_secret: TurnSecret = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    log_format: LogFormatOption = None,
+    state_dir: StateDirOption = None,
+) -> None:
+    """Run a simulated robot and the console, and print the links that open it."""
+    network = _network(public_url, allowed_host, board, tls, tls_cert, tls_key, stun, turn, turn_secret)
+    settings = make_settings(
+        host=host,
+        port=port,
+        ice_hosts=ice_host,
+        advertise=advertise,
+        media_port=media_port,
+        media_tcp=media_tcp,
+        media=_media(quality),
+        cameras=_words(camera),
+        microphones=_words(microphone),
+        whip=_words(whip),
+        speaker=speaker,
+        speed_cap=speed_cap,
+        recording=_recording(record),
+        relay=relay,
+        observers_direct=observers_direct,
+        log_format=log_format,
+        state_dir=state_dir,
+        **network,
+    )
+    file = ros2 or mjcf
+    options = [] if ros2 is None else ["--ros2", str(ros2)]
+    options += [] if mjcf is None else ["--mjcf", str(mjcf)]
+    options += ["--event-strip"] if event_strip else []
+    secret = link_access(settings).secret or LinkSecret.draw()
+    settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
+    bridges = {}
+    kinds = _simulated(robot)
+    if (ros2 or mjcf) and "" not in kinds:
+        raise _usage("--ros2 and --mjcf are for one robot; run the others by `lockstep robot` and use `lockstep serve`")
+    unknown = [] if ros2 or mjcf or robot_python else sorted(kind for kind in kinds.values() if not is_robot(kind))
+    if unknown:
+        raise _usage(f"no robot {unknown[0]!r}; there are {', '.join(robot_names())}")
+    for number, (name, kind) in enumerate(kinds.items()):
+        called = name or (kind if file is None else file.stem)
+        own = ["--state-dir", str(own_state_dir(settings.state_dir or default_state_dir(), called))]
+        own += [] if event_log is None else ["--event-log", str(own_event_log(event_log, name))]
+        port_of_bridge = robot_port + number if robot_port else 0
+        bridges[name] = BridgeProcess(
+            kind, "127.0.0.1", port_of_bridge, [*options, *own], secret.reveal(), say, robot_python
+        )
+    if "" not in bridges:  # where they will be, is known when they run
+        settings = settings.model_copy(update={"robots": tuple(f"{name}=tcp://127.0.0.1:1" for name in bridges)})
+    is_own = any(kind not in simulated_names() for kind in kinds.values())
+    _run(settings, bridges, as_json, quiet, is_own)
+
+
+@commands.command()
+def serve(
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Where the robot bridge is, tcp://host:port or tls://host:port. As NAME=tcp://…, which may be given "
+            "again: one robot of a fleet, docs/fleet.md.",
+        ),
+    ] = None,
+    fleet: Annotated[
+        Path | None, typer.Option(help="TOML file with a table for each robot of a fleet, docs/fleet.md.")
+    ] = None,
+    link_secret_file: Annotated[
+        Path | None, typer.Option(help="File with the secret that the bridge asks for; or LOCKSTEP_LINK_SECRET.")
+    ] = None,
+    link_tls_ca: Annotated[Path | None, typer.Option(help="What signed the bridge's certificate.")] = None,
+    link_tls_cert: Annotated[Path | None, typer.Option(help="Certificate to show to a bridge that asks.")] = None,
+    link_tls_key: Annotated[Path | None, typer.Option(help="Its key, if it stands in another file.")] = None,
+    host: Host = None,
+    port: Port = None,
+    ice_host: IceHosts = None,
+    advertise: Advertise = None,
+    media_port: MediaPort = None,
+    media_tcp: MediaTcp = None,
+    camera: Cameras = None,
+    microphone: Microphones = None,
+    whip: Whip = None,
+    speaker: Speaker = None,
+    quality: Quality = None,
+    speed_cap: SpeedCap = None,
+    record: Record = None,
+    relay: Relay = None,
+    observers_direct: ObserversDirect = None,
+    public_url: PublicUrl = None,
+    allowed_host: AllowedHosts = None,
+    board: Board = None,
+    tls: Tls = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
+    stun: Stun = None,
+    turn: Turn = None,
+    turn_secret: TurnSecret = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    log_format: LogFormatOption = None,
+    state_dir: StateDirOption = None,
+) -> None:
+    """Run the console for a robot bridge that runs elsewhere."""
+    network = _network(public_url, allowed_host, board, tls, tls_cert, tls_key, stun, turn, turn_secret)
+    settings = make_settings(
+        **_robots(robot),
+        fleet_file=fleet,
+        link_secret_file=link_secret_file,
+        link_tls_ca=link_tls_ca,
+        link_tls_cert=link_tls_cert,
+        link_tls_key=link_tls_key,
+        host=host,
+        port=port,
+        ice_hosts=ice_host,
+        advertise=advertise,
+        media_port=media_port,
+        media_tcp=media_tcp,
+        media=_media(quality),
+        cameras=_words(camera),
+        microphones=_words(microphone),
+        whip=_words(whip),
+        speaker=speaker,
+        speed_cap=speed_cap,
+        recording=_recording(record),
+        relay=relay,
+        observers_direct=observers_direct,
+        log_format=log_format,
+        state_dir=state_dir,
+        **network,
+    )
+    _run(settings, {}, as_json, quiet)
+
+
+def _robots(given: list[str] | None) -> dict[str, object]:
+    """One address alone is the only robot of a console; anything else is a fleet."""
+    if not given:
+        return {}
+    if len(given) == 1 and not is_named(given[0]):
+        return {"robot": given[0]}
+    return {"robots": tuple(given)}
+
+
+def _simulated(given: list[str] | None) -> dict[str, str]:
+    """Kinds of the robots to run, by name; "" is the only robot of a console."""
+    try:
+        return simulated_robots(given or [DEFAULT_ROBOT])
+    except BadFleet as error:
+        raise _usage(f"robot: {error}") from error
+
+
+def _media(quality: Switch | None) -> dict[str, bool] | None:
+    return None if quality is None else {"quality": quality is Switch.ON}
+
+
+def _words(texts: list[str] | None) -> tuple[str, ...] | None:
+    """As a setting that is given several times, and may hold any character."""
+    return tuple(texts) if texts else None
+
+
+def _recording(directory: Record) -> dict[str, object] | None:
+    return None if directory is None else {"directory": directory, "automatic": True}
+
+
+def _network(
+    public_url: PublicUrl,
+    allowed_hosts: AllowedHosts,
+    board: Board,
+    tls: Tls,
+    tls_cert: TlsCert,
+    tls_key: TlsKey,
+    stun: Stun,
+    turn: Turn,
+    turn_secret: TurnSecret,
+) -> dict[str, object]:
+    """The arguments by the names of their settings."""
+    return dict(locals())
+
+
+def _run(
+    settings: Settings,
+    bridges: Mapping[str, BridgeProcess],
+    as_json: bool,
+    quiet: bool,
+    own_robot: bool = False,
+) -> None:
+    """`own_robot`: one of them was named as somebody's own class, so that its bridge may say that there is none."""
+    configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
+    for each in unknown_settings(os.environ, Settings):
+        say(each)
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    share_arenas()
+    raise_file_limit()
+    try:
+        _check_files(settings)
+        check_media_addresses(settings)
+        check_board(settings, settings.public_url)
+        if settings.is_fleet:
+            robot_settings(settings)
+        elif settings.has_board:
+            raise BoardUnusable(NO_NAMES)
+        listener = bind(settings.host, settings.port)
+        state = open_state(settings, fall_back=True)
+        uvloop.run(run_console(settings, state, listener, bridges, as_json))
+    except PortTaken as error:
+        say(f"{error}; choose another with --port")
+        raise typer.Exit(EXIT_PORT_TAKEN) from error
+    except (StateDirUnusable, BadFleet, BoardUnusable, MediaAddressUnusable) as error:
+        raise _usage(str(error)) from error
+    except ssl.SSLError as error:
+        raise _usage(f"tls_cert and tls_key are no certificate chain and its key: {error}") from error
+    except BridgeFailed as error:
+        if own_robot and error.code == EXIT_USAGE:  # it has said itself what cannot be meant
+            raise typer.Exit(EXIT_USAGE) from error
+        say(str(error))
+        raise typer.Exit(EXIT_BRIDGE) from error
+    except ConsoleFailed as error:
+        say("the console has failed, as the log says, and ends; start it again")
+        raise typer.Exit(EXIT_FAILED) from error
+
+
+def _check_files(settings: Settings) -> None:
+    """Before anything runs."""
+    try:
+        for path in (settings.tls_cert, settings.tls_key):
+            if path is not None:
+                path.read_bytes()
+    except OSError as error:
+        say(f"{error.filename}: {error.strerror}")
+        raise typer.Exit(EXIT_USAGE) from error
+
+
+def _usage(text: str) -> typer.Exit:
+    say(text)
+    return typer.Exit(EXIT_USAGE)

@@ -1,0 +1,116 @@
+"""The command `lockstep`. What a command does is loaded when that command is asked for: few need all of it."""
+
+import faulthandler
+import gc
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from lockstep.server.cli.measurements import add_bench_commands
+
+__all__ = ["LOADERS", "app", "main"]
+
+
+def _console() -> typer.Typer:
+    from lockstep.server.cli.consoles import commands
+
+    return commands
+
+
+def _robot() -> typer.Typer:
+    from lockstep.robot_bridge.cli import robot_app
+
+    commands = typer.Typer()
+    commands.add_typer(robot_app, name="robot", help="Run a robot and its bridge until interrupted.")
+    return commands
+
+
+def _check() -> typer.Typer:
+    from lockstep.robot_bridge.conformance.cli import check
+
+    commands = typer.Typer()
+    commands.command()(check)
+    return commands
+
+
+def _access() -> typer.Typer:
+    from lockstep.server.cli.access import add_access_commands
+    from lockstep.server.cli.settings_from_flags import make_settings
+
+    commands = typer.Typer()
+    add_access_commands(commands, make_settings)
+    return commands
+
+
+def _recordings() -> typer.Typer:
+    from lockstep.server.cli.recordings import add_recording_commands
+    from lockstep.server.cli.settings_from_flags import make_settings
+
+    commands = typer.Typer()
+    add_recording_commands(commands, make_settings)
+    return commands
+
+
+# In the order of `lockstep --help`; what each returns has these commands and no others.
+LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
+    _console: ("up", "serve"),
+    _robot: ("robot",),
+    _check: ("check",),
+    _access: ("invite", "invitations", "revoke", "audit"),
+    _recordings: ("record", "recordings", "replay", "verify", "export"),
+}
+
+
+@cache
+def _group(load: Callable[[], typer.Typer]) -> TyperGroup:
+    gc.disable()  # as in server/lockstep/server/cli/entry.py
+    try:
+        return typer.main.get_group(load())
+    finally:
+        gc.enable()
+
+
+class LazyGroup(TyperGroup):
+    """Knows the names of all commands, and loads one of them when it is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return [*(name for names in LOADERS.values() for name in names), *super().list_commands(ctx)]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        for load, names in LOADERS.items():
+            if cmd_name in names:
+                return _group(load).get_command(ctx, cmd_name)
+        return super().get_command(ctx, cmd_name)
+
+
+app = typer.Typer(
+    cls=LazyGroup,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Drive a robot from a browser. `lockstep up` runs a simulated robot and the console.",
+)
+add_bench_commands(app)
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"lockstep {version('lockstep-console')}")
+        raise typer.Exit
+
+
+@app.callback()
+def lockstep(
+    _version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_say_version, is_eager=True)
+    ] = False,
+) -> None:
+    """The options of all commands."""
+
+
+def main() -> None:
+    faulthandler.enable()  # a crash in a library's native code says where every thread was
+    app()

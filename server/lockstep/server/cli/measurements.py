@@ -1,0 +1,62 @@
+"""Commands that measure or draw. They live in `bench/`, which nothing here imports: loaded when one is asked for.
+
+Where `bench/` is not installed, as in the images, there are no such commands.
+"""
+
+from importlib.util import find_spec
+from typing import Any
+
+import typer
+
+from lockstep.server.cli.extras import load_extra
+
+__all__ = ["add_bench_commands"]
+
+# name → function that typer can run, and what `lockstep --help` says of it
+COMMANDS = {
+    "experiment": (
+        "lockstep.bench.experiment.cli",
+        "experiment_command",
+        "Repeat the thesis' experiments on emulated networks.",
+    ),
+    "fleet-soak": (
+        "lockstep.bench.fleet_soak.cli",
+        "fleet_soak_command",
+        "Drive several robots while their bridges die in turn.",
+    ),
+    "network": (
+        "lockstep.bench.emulator.cli",
+        "network_command",
+        "Put a bad network between a console and whoever uses it.",
+    ),
+    "hostile": ("lockstep.bench.hostile.cli", "hostile_command", "Drive among peers that misbehave in every way."),
+    "report": (
+        "lockstep.bench.session_report.cli",
+        "report_command",
+        "Draw the thesis' figures from a recorded session.",
+    ),
+    "soak": ("lockstep.bench.soak.cli", "soak_command", "Drive for a long time while everything fails now and then."),
+}
+
+
+def add_bench_commands(app: typer.Typer) -> None:
+    if find_spec("lockstep.bench") is None:
+        return
+    for name in COMMANDS:
+        _add(app, name)
+
+
+def _add(app: typer.Typer, name: str) -> None:
+    module, function, about = COMMANDS[name]
+
+    def run(context: typer.Context) -> None:
+        command: Any = getattr(load_extra(module, "dev"), function)
+        measuring = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        measuring.command()(command)
+        measuring(context.args, prog_name=f"lockstep {name}")
+
+    # Its own parser sees everything, --help included.
+    everything = {"ignore_unknown_options": True, "allow_extra_args": True}
+    app.command(
+        name, help=about, add_help_option=False, context_settings=everything, rich_help_panel="Measure and try"
+    )(run)

@@ -1,0 +1,255 @@
+"""The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`."""
+
+import os
+import sys
+from collections.abc import Callable
+from datetime import datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+from lockstep.server.cli.access import MakeSettings
+from lockstep.server.cli.console_address import read_address
+from lockstep.server.cli.extras import load_extra
+from lockstep.server.cli.options import RobotOption, StateDirOption
+from lockstep.server.evidence.anchors import parse_anchor
+from lockstep.server.evidence.signer import is_public_key
+from lockstep.server.http.robot_paths import ROBOTS
+from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.recording_store import RecordingEntry, RecordingStore
+from lockstep.server.recording.settings import recordings_directory
+from lockstep.server.recording.verify.verifier import Verdict
+from lockstep.server.recording.verify.verify_file import verify_file
+from lockstep.server.recording.verify.verify_signature import SignatureReport
+from lockstep.server.settings import Settings
+from lockstep.server.state.persistent_state import ConsoleState, open_state, robot_directory
+from lockstep.server.util.display_names import escaped, printable
+from lockstep.server.util.state_dir import StateDirUnusable
+
+__all__ = ["DirectoryOption", "File", "add_recording_commands", "recording_file"]
+
+EXIT_BROKEN = 1  # a promise is not kept
+EXIT_USAGE = 2
+HTTP_SECONDS = 30.0
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+File = Annotated[Path, typer.Argument(help="A recording, or its id in the recordings' directory.")]
+DirectoryOption = Annotated[
+    Path | None, typer.Option("--dir", help="The recordings' directory; unset: that of the console's settings.")
+]
+
+
+class ExportFormat(StrEnum):
+    MP4 = "mp4"
+    CSV = "csv"
+    PARQUET = "parquet"
+    LEROBOT = "lerobot"
+
+
+def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
+    """`make_settings` turns flags into settings, as for the other commands."""
+    record = typer.Typer(no_args_is_help=True, help="Start and end the recording of a running console.")
+    app.add_typer(record, name="record")
+
+    @record.command("start")
+    def record_start(
+        name: Annotated[str, typer.Option(help="What it is called in the list.")] = "",
+        robot: RobotOption = "",
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Start to record."""
+        _say_state(_ask(make_settings(state_dir=state_dir), robot, "POST", "/api/recordings", {"name": name}), as_json)
+
+    @record.command("stop")
+    def record_stop(robot: RobotOption = "", state_dir: StateDirOption = None, as_json: Json = False) -> None:
+        """End the recording; returns when the file is closed."""
+        _say_state(_ask(make_settings(state_dir=state_dir), robot, "POST", "/api/recordings/stop"), as_json)
+
+    @record.command("status")
+    def record_status(robot: RobotOption = "", state_dir: StateDirOption = None, as_json: Json = False) -> None:
+        """Say whether the session is recorded."""
+        _say_state(_ask(make_settings(state_dir=state_dir), robot, "GET", "/api/recordings")["state"], as_json)
+
+    @app.command()
+    def recordings(
+        directory: DirectoryOption = None,
+        robot: RobotOption = "",
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """List the recordings that are complete."""
+        found = _shelf(make_settings(state_dir=state_dir), robot, directory).entries()
+        if as_json:
+            sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
+            return
+        for entry in found:
+            sys.stdout.write(_line(entry) + "\n")
+
+    @app.command()
+    def replay(
+        file: File,
+        host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+        port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes any free one.")] = 0,
+        directory: DirectoryOption = None,
+        robot: RobotOption = "",
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Serve the player for one recording, without a robot, and print its link."""
+        from lockstep.server.cli.replay import serve_replay
+
+        serve_replay(recording_file(file, make_settings(state_dir=state_dir), robot, directory), host, port, as_json)
+
+    @app.command()
+    def verify(
+        file: File,
+        key: Annotated[str, typer.Option(help="Public key that has to have signed it; unset: any, or none.")] = "",
+        directory: DirectoryOption = None,
+        robot: RobotOption = "",
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Check what is promised against a recording. Exit code 1: it is not kept; 2: it cannot be read."""
+        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
+        if key and not is_public_key(key):
+            raise _usage("a public key has 64 hexadecimal digits")
+        verdict = _or_usage(lambda: verify_file(path, key))
+        if as_json:
+            told = os.fsencode(path).decode(errors="replace")
+            sys.stdout.write(msgspec.json.encode({"file": told, **msgspec.to_builtins(verdict)}).decode() + "\n")
+        else:
+            sys.stdout.write(_in_words(verdict))
+        if not verdict.ok:
+            raise typer.Exit(EXIT_BROKEN)
+
+    @app.command()
+    def export(
+        file: File,
+        to: Annotated[ExportFormat, typer.Option(help="mp4: pictures and sound; csv, parquet: tables; lerobot: v3.")],
+        out: Annotated[
+            Path | None, typer.Option(help="File or directory to write; unset: beside the recording.")
+        ] = None,
+        task: Annotated[str, typer.Option(help="lerobot: what was done, in words.")] = "",
+        directory: DirectoryOption = None,
+        robot: RobotOption = "",
+        state_dir: StateDirOption = None,
+    ) -> None:
+        """Write a recording in another form."""
+        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
+        # Loaded only here: parquet and lerobot need pyarrow, the extra "export".
+        exporter: Any = load_extra(f"lockstep.server.recording.export_{to.value}", "export")
+        written = _or_usage(lambda: exporter.export(path, out, task))
+        for each in written:
+            sys.stdout.write(f"{escaped(each)}\n")
+
+
+def _ask(settings: Settings, robot: str, method: str, path: str, body: dict[str, str] | None = None) -> dict[str, Any]:
+    """What the console of this state directory answers."""
+    import httpx
+
+    state = _state(settings)
+    url = settings.public_url or read_address(state.directory)
+    if not url:
+        raise _usage("no console has run with this state directory")
+    headers = {"Authorization": f"Bearer {state.access.issue('supervisor', 'command line')}"}
+    try:
+        # Its certificate may be its own; whoever can write the state directory can name any address there anyway.
+        with httpx.Client(verify=not settings.tls, trust_env=False, timeout=HTTP_SECONDS) as http:
+            answer = http.request(
+                method, f"{url}{ROBOTS}/{robot}{path}" if robot else f"{url}{path}", headers=headers, json=body
+            )
+    except httpx.HTTPError as error:
+        raise _usage(f"the console at {url} does not answer: {error}") from error
+    found: dict[str, Any] = answer.json()
+    if answer.is_error:
+        raise _usage(f"{found.get('error')}: {found.get('detail')}")
+    return found
+
+
+def _say_state(state: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        sys.stdout.write(msgspec.json.encode(state).decode() + "\n")
+        return
+    words = {"off": "not recording", "failed": f"failed: {state['detail']}"}
+    running = f"recording {state['recording']}, {state['bytes'] / 1e6:.1f} MB"
+    sys.stdout.write(words.get(state["state"], running) + "\n")
+
+
+def _state(settings: Settings) -> ConsoleState:
+    try:
+        return open_state(settings)
+    except StateDirUnusable as error:
+        raise _usage(str(error)) from error
+
+
+def _shelf(settings: Settings, robot: str, directory: Path | None) -> RecordingStore:
+    own = recordings_directory(settings.recording, robot_directory(settings, robot))
+    if robot and settings.recording.directory is not None:
+        own /= robot  # as the console does
+    return RecordingStore(directory or own, settings.recording)
+
+
+def recording_file(file: Path, settings: Settings, robot: str, directory: Path | None) -> Path:
+    """`file` itself, or the recording of that id."""
+    if file.is_file():
+        return file
+    found = _shelf(settings, robot, directory).path(file.name)
+    if found is None:
+        raise _usage(f"there is no recording {file}")
+    return found
+
+
+def _or_usage(work: Callable[[], Any]) -> Any:
+    try:
+        return work()
+    except (RecordingError, OSError, ImportError) as error:
+        raise _usage(str(error)) from error
+
+
+def _line(entry: RecordingEntry) -> str:
+    began = datetime.fromtimestamp(entry.started / 1e6).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    seconds = (entry.ended - entry.started) / 1e6
+    events = f"s={entry.first_event}–{entry.last_event}"
+    interrupted = "  interrupted" if entry.interrupted else ""
+    size = f"{entry.bytes / 1e6:.1f} MB"
+    return (
+        f"{printable(entry.id):28}  {began}  {seconds:7.1f} s  {events:18}  {size:>10}"
+        f"  {printable(entry.robot)}  {printable(entry.name)}{interrupted}"
+    )
+
+
+def _in_words(verdict: Verdict) -> str:
+    """Names and topics in it are from the file: printed as they stand, they could write a verdict of their own."""
+    lines = [f"{verdict.commands} commands, {verdict.events} events, {verdict.pictures_and_sounds} pictures and sounds"]
+    for name, check in verdict.checks.items():
+        looked = f" ({check.looked} looked at)" if check.looked else ""
+        lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name}{looked}{'' if check.ok else f': {check.count} times'}")
+        lines += [f"        s={each.event}: {printable(each.text)}" for each in check.violations[:5]]
+    return "\n".join([*lines, *_signature_words(verdict.signature)]) + "\n"
+
+
+def _signature_words(report: SignatureReport) -> list[str]:
+    if report.state == "unsigned":
+        return ["unsigned: whoever can write the file can write another story that fits"]
+    until = datetime.fromtimestamp(report.until_time / 1e6).astimezone().isoformat(timespec="milliseconds")
+    lines = [f"{report.state}: {report.signatures} signatures, the last one up to s={report.until_event}, {until}"]
+    if report.signer:
+        lines.append(f"        by {printable(report.signer)}")
+    anchor = parse_anchor(report.audit)
+    if anchor is not None:
+        log, head = printable(anchor.log), printable(anchor.head)
+        lines.append(f"        with a signed head of the audit {log}: record {anchor.n}, {head}")
+    return lines
+
+
+def _usage(text: str) -> typer.Exit:
+    _say(text)
+    return typer.Exit(EXIT_USAGE)
+
+
+def _say(text: str) -> None:
+    typer.echo(f"lockstep: {escaped(text)}", err=True)

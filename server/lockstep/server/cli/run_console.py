@@ -1,0 +1,185 @@
+"""A console from its first step to its last: bridges of its own first, then HTTP, then the links."""
+
+import asyncio
+import datetime
+import gc
+import json
+import socket
+import sys
+from collections.abc import Coroutine, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+import typer
+from fastapi import FastAPI
+
+from lockstep.rtc.interfaces import own_addresses
+from lockstep.server.cli.console_address import write_address
+from lockstep.server.composition.robot_app import create_app
+from lockstep.server.fleet.fleet import Fleet
+from lockstep.server.fleet.fleet_app import create_fleet_app
+from lockstep.server.fleet.robots import robot_settings
+from lockstep.server.http.transport.serve import running, wait_for_signal
+from lockstep.server.http.transport.tls import Certificate, ends_at, fingerprint, own_names, self_signed
+from lockstep.server.http.transport.uvicorn_http_limits import guarded_by
+from lockstep.server.robot.bridge_process import BridgeProcess
+from lockstep.server.robot.robot_connection import RobotConnection
+from lockstep.server.settings import Settings
+from lockstep.server.state.console_links import ConsoleLinks, console_links, listening_url
+from lockstep.server.state.persistent_state import ConsoleState
+from lockstep.server.util.state_dir import StateDirUnusable
+
+__all__ = ["ConsoleFailed", "run_console", "say"]
+
+PATIENCE = 2.0  # s until somebody who waits for a robot is told so
+GC_THRESHOLDS = (5_000, 20, 10)  # allocations, young collections, middle collections
+
+
+class ConsoleFailed(Exception):
+    """What the console runs has failed. Whoever started it should start it anew: it would answer nobody any more."""
+
+
+async def run_console(
+    settings: Settings,
+    state: ConsoleState,
+    listener: socket.socket,
+    bridges: Mapping[str, BridgeProcess],
+    as_json: bool,
+) -> None:
+    """Until a signal: the bridges first, then the console; the console ends first.
+
+    Args:
+        bridges: of our own, by the robots' names; "" is the only robot of a console
+
+    Raises:
+        ConsoleFailed: the log says why.
+    """
+    certificate = _certificate(settings, state.directory.path)
+    stopping = asyncio.get_running_loop().create_task(wait_for_signal())
+    try:
+        addresses = await _unless(stopping, _start(bridges))
+        if addresses is None:
+            return
+        settings = _with_addresses(settings, addresses)
+        application = _application(settings, state)
+        http = guarded_by(settings, application)
+        async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
+            if certificate is not None:
+                application.state.house.metrics.certificate_end.set(ends_at(certificate))
+            _calm_garbage_collection()
+            background = [tasks.create_task(bridge.watch()) for bridge in bridges.values()]
+            url = listening_url(settings, listener)
+            links = console_links(settings, url, state)
+            with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
+                write_address(state.directory, url)
+            background.append(tasks.create_task(_announce(application, links, as_json)))
+            failed = tasks.create_task(application.state.failed.wait())
+            await asyncio.wait((stopping, failed), return_when=asyncio.FIRST_COMPLETED)
+            for task in (*background, failed):
+                task.cancel()
+        if not stopping.done():
+            raise ConsoleFailed
+    finally:
+        listener.close()
+        stopping.cancel()
+        with suppress(asyncio.CancelledError):
+            await stopping
+        await asyncio.gather(*(bridge.close() for bridge in bridges.values()))
+
+
+def say(text: str) -> None:
+    typer.echo(f"lockstep: {text}", err=True)
+
+
+async def _start(bridges: Mapping[str, BridgeProcess]) -> dict[str, str]:
+    """Their addresses. One that does not start ends all: whoever asked for them wants them all."""
+    starting = [asyncio.ensure_future(bridge.start()) for bridge in bridges.values()]
+    try:
+        return dict(zip(bridges, await asyncio.gather(*starting), strict=True))
+    finally:
+        for each in starting:
+            each.cancel()
+        await asyncio.gather(*starting, return_exceptions=True)
+
+
+def _with_addresses(settings: Settings, addresses: Mapping[str, str]) -> Settings:
+    if not addresses:
+        return settings
+    if "" in addresses:
+        return settings.model_copy(update={"robot": addresses[""]})
+    return settings.model_copy(update={"robots": tuple(f"{name}={address}" for name, address in addresses.items())})
+
+
+def _application(settings: Settings, state: ConsoleState) -> FastAPI:
+    if settings.is_fleet:
+        return create_fleet_app(settings, robot_settings(settings), state)
+    return create_app(settings, state)
+
+
+def _calm_garbage_collection() -> None:
+    """A full collection over all modules stalls the loop by 100 ms and more with a hundred peers.
+
+    What lives now lives until the end, so it is taken out of the collector's sight; the rest is looked at less often.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*GC_THRESHOLDS)
+
+
+def _certificate(settings: Settings, directory: Path) -> Certificate | None:
+    """What to encrypt HTTP with; None: not at all. Raises StateDirUnusable."""
+    if settings.tls_cert is not None and settings.tls_key is not None:
+        return Certificate(settings.tls_cert, settings.tls_key)
+    if not settings.tls:
+        return None
+    names = own_names(settings.host) | set(settings.tls_names) | set(settings.own_names) | set(own_addresses())
+    names |= set(settings.advertise)
+    try:
+        certificate = self_signed(directory, names - {"*"}, datetime.datetime.now(datetime.UTC))
+    except OSError as error:
+        raise StateDirUnusable(directory, f"{error.filename}: {error.strerror}") from error
+    say(f"the certificate is our own; its SHA-256 fingerprint is {fingerprint(certificate)}")
+    return certificate
+
+
+async def _unless(
+    stopping: asyncio.Task[None], starting: Coroutine[None, None, dict[str, str]]
+) -> dict[str, str] | None:
+    """What `starting` returns; None when we are asked to stop first."""
+    task = asyncio.get_running_loop().create_task(starting)
+    await asyncio.wait((task, stopping), return_when=asyncio.FIRST_COMPLETED)
+    if task.done():
+        return task.result()
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
+    return None
+
+
+async def _announce(application: FastAPI, links: ConsoleLinks, as_json: bool) -> None:
+    """The links, once they lead to a robot. For people at once when the robot is not there yet.
+
+    In a fleet no robot holds up the others: who is not there after a while is named, and the links come.
+    """
+    fleet = getattr(application.state, "fleet", None)
+    if isinstance(fleet, Fleet):
+        robots = {name: each.services.console.robot for name, each in fleet.sessions.items() if each.services}
+        links = links._replace(robot="", robots={name: each.settings.robot for name, each in fleet.sessions.items()})
+    else:
+        robots = {"": application.state.services.console.robot}
+    if not as_json or links.robots:
+        await _wait_for_all(robots)
+        for name, robot in robots.items():
+            if not robot.up:
+                say(f"waiting for the robot{f' {name}' if name else ''} at {links.address(name)}: {robot.detail}")
+    if not links.robots:
+        await robots[""].reached.wait()
+    sys.stdout.write(json.dumps(links.fields()) + "\n" if as_json else links.for_people())
+    sys.stdout.flush()
+
+
+async def _wait_for_all(robots: Mapping[str, RobotConnection]) -> None:
+    with suppress(TimeoutError):
+        async with asyncio.timeout(PATIENCE):
+            for robot in robots.values():
+                await robot.reached.wait()

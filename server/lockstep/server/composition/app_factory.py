@@ -1,0 +1,147 @@
+"""What every app of a console begins and ends with, for one robot or several: house, errors, front door."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import structlog
+from fastapi import Depends, FastAPI
+from starlette.datastructures import Headers
+from starlette.middleware.cors import CORSMiddleware
+from starlette.requests import HTTPConnection
+from starlette.types import Lifespan, Scope
+
+from lockstep.server.auth.known_tokens import KnownTokens
+from lockstep.server.auth.tokens import bearer_token
+from lockstep.server.errors import AccessError
+from lockstep.server.http.request_rate_limits import RequestRateLimits
+from lockstep.server.http.security_headers import SAFE_METHODS, SecurityHeaders, check_origin
+from lockstep.server.http.transport.connection_places import ConnectionPlaces
+from lockstep.server.http.trusted_host import HostNames, TrustedHost
+from lockstep.server.routes.error_responses import answer_errors, count_refused
+from lockstep.server.settings import Settings
+from lockstep.server.state.console_context import ConsoleContext, ContextMetrics
+from lockstep.server.state.persistent_state import ConsoleState, open_state
+from lockstep.server.util.rate_limits import RateLimits
+from lockstep.server.webrtc.media_endpoint import MediaEndpoint
+
+__all__ = ["bare_app", "guard_app", "open_house"]
+
+log = structlog.get_logger(__name__)
+
+
+def bare_app(title: str, settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
+    """Without a route. It needs `app.state.house` before the first request.
+
+    `app.state.failed` is set when what its lifespan runs has failed: then it serves nobody any more.
+    """
+    app = FastAPI(
+        title=title,
+        lifespan=None if lifespan is None else _noticed(lifespan),
+        dependencies=[Depends(_same_origin)],
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+    )
+    app.state.settings = settings
+    answer_errors(app)
+    return app
+
+
+def _noticed(lifespan: Lifespan[FastAPI]) -> Lifespan[FastAPI]:
+    @asynccontextmanager
+    async def noticed(app: FastAPI) -> AsyncIterator[None]:
+        app.state.failed = asyncio.Event()
+        try:
+            async with lifespan(app):
+                yield
+        except BaseException:
+            app.state.failed.set()
+            raise
+
+    return noticed
+
+
+def open_house(
+    app: FastAPI,
+    settings: Settings,
+    state: ConsoleState | None,
+    metrics: ContextMetrics,
+    max_peers: int | None = None,
+    reserved: int = 0,
+) -> ConsoleContext:
+    """To be called when the lifespan of `app` begins; `state` stands in for what the settings name."""
+    asyncio.get_running_loop().set_exception_handler(metrics.faults.uncaught)
+    opened = state or open_state(settings)
+    endpoint = MediaEndpoint(settings)
+    if settings.media_port:  # which somebody else might take meanwhile
+        endpoint.open()
+    house = ConsoleContext(opened, RequestRateLimits(settings), metrics, endpoint, max_peers, reserved)
+    app.state.house = house
+    log.info("audit and recordings are signed", public_key=opened.signer.public_key)
+    return house
+
+
+def guard_app(app: FastAPI, settings: Settings) -> None:
+    """What every request passes before any route."""
+    if settings.allowed_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=list(settings.allowed_origins),
+            allow_methods=["GET", "POST", "PATCH", "DELETE"],
+            allow_headers=["Authorization", "Content-Type", "If-Match"],
+            expose_headers=["Location", "ETag", "Link"],
+        )
+    places = ConnectionPlaces.within(settings, lambda name: count_refused({"app": app}, name))
+    known = KnownTokens()
+    app.state.connection_places, app.state.known_tokens = places, known
+    app.add_middleware(
+        TrustedHost,
+        hosts=HostNames((settings.host, *settings.own_names)),
+        requests=RateLimits(settings.max_request_rate, settings.max_request_burst),
+        health=RateLimits(settings.max_request_rate, settings.max_request_burst),
+        count=count_refused,
+        link_of=lambda scope: _link_of(scope, known),
+        is_silenced=_is_silenced,
+        places=places,
+        caught=_caught,
+    )
+    app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None, relays=settings.relay_origins)
+
+
+def _link_of(scope: Scope, known: KnownTokens) -> str:
+    """The link whose good token a request brings; "" without one. What it opens is each route's to say."""
+    token = bearer_token(Headers(scope=scope).get("authorization"))
+    house = getattr(scope["app"].state, "house", None)
+    if not token or not isinstance(house, ConsoleContext):
+        return ""
+    try:
+        # Enough to stop the robot with, so also while nobody knows which links are revoked.
+        link = house.state.access.at(None).bearer_to_stop(f"Bearer {token}").token_id
+    except AccessError:
+        known.forget(token)
+        return ""
+    known.add(token)
+    return link
+
+
+def _is_silenced(scope: Scope, link: str) -> bool:
+    house = getattr(scope["app"].state, "house", None)
+    return isinstance(house, ConsoleContext) and house.is_silenced(link)
+
+
+def _caught(scope: Scope, error: Exception) -> None:
+    house = scope["app"].state.house
+    if isinstance(house, ConsoleContext):
+        house.metrics.faults.caught("http", error, method=scope.get("method", ""), route=_route(scope))
+
+
+def _route(scope: Scope) -> str:
+    """Not the path: one may hold a ticket."""
+    return str(getattr(scope.get("route"), "path", ""))
+
+
+async def _same_origin(connection: HTTPConnection) -> None:
+    """A dependency of all routes. WebSockets check for themselves: a refusal is another thing there."""
+    if connection.scope["type"] == "http" and connection.scope["method"] not in SAFE_METHODS:
+        check_origin(connection.headers, connection.app.state.settings.allowed_origins)

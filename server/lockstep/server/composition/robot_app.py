@@ -1,0 +1,91 @@
+"""The console's app for one robot, put together in one place: routes, middleware, error map, lifespan."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, closing
+from functools import cache
+
+import msgspec
+from fastapi import FastAPI, Response
+from starlette.types import Lifespan
+
+from lockstep.server.composition.app_factory import bare_app, guard_app, open_house
+from lockstep.server.composition.robot_session import run_on, running_session
+from lockstep.server.http.json_response import json_answer
+from lockstep.server.http.static_files import page_router
+from lockstep.server.routes import access, ice, observer_websocket, recordings, session, sfu, whep, whip
+from lockstep.server.routes import scene_proxy as proxy
+from lockstep.server.routes.openapi import openapi_document
+from lockstep.server.settings import Settings
+from lockstep.server.state.dependencies import Dependencies
+from lockstep.server.state.persistent_state import ConsoleState
+from lockstep.server.telemetry.log_context import LogContext
+from lockstep.server.telemetry.metrics import Metrics
+from lockstep.server.util.gc_scheduler import sweep_forever
+
+__all__ = ["attach_session", "create_app", "session_app"]
+
+
+def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI:
+    """The app. It connects to the robot while its lifespan runs; `state` stands in for what the settings name."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        metrics = Metrics()
+        with closing(open_house(app, settings, state, metrics)) as house:
+            async with running_session(settings, house, metrics, house.state.directory) as made:
+                attach_session(app, made)
+                peers, clock = made.console.peers, made.console.clock
+                async with asyncio.TaskGroup() as tasks:
+                    running = [
+                        tasks.create_task(house.run(), name="links"),
+                        tasks.create_task(
+                            run_on(
+                                "sweeper",
+                                lambda: sweep_forever(lambda: peers.ended, lambda: clock.moving),
+                                metrics.faults,
+                            ),
+                            name="sweeper",
+                        ),
+                    ]
+                    yield
+                    for task in running:
+                        task.cancel()
+
+    app = session_app(settings, lifespan)
+    app.add_api_route("/openapi.json", _describe, include_in_schema=False)
+    app.include_router(page_router())
+    guard_app(app, settings)
+    return app
+
+
+def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
+    """The routes of one robot but for its pages. They need `app.state.house`, and answer by `attach_session`."""
+    app = bare_app("Lockstep", settings, lifespan)
+    app.include_router(whep.router)
+    app.include_router(whip.router)
+    app.include_router(session.router)
+    app.include_router(access.router)
+    app.include_router(ice.router)
+    app.include_router(recordings.router)
+    app.include_router(sfu.router)
+    app.include_router(proxy.router)
+    app.include_router(observer_websocket.router)
+    app.add_middleware(LogContext)
+    return app
+
+
+def attach_session(app: FastAPI, session: Dependencies | None) -> None:
+    """From now on the routes speak for that session; None: it has failed, and they say so."""
+    app.state.services = session
+    app.state.recordings = None if session is None else session.recordings
+
+
+@cache
+def _description() -> msgspec.Raw:
+    """Made once: it is large, and anybody may ask for it."""
+    return msgspec.Raw(msgspec.json.encode(openapi_document()))
+
+
+async def _describe() -> Response:
+    return json_answer(_description())

@@ -1,0 +1,245 @@
+"""The command desk: what may pass to the robot. No I/O, no clock.
+
+Every verb returns what to do; the shell does it. The desk never lets a second command pass while one is in flight
+on the robot link: a repeat of it is absorbed, and a repeat of the event already executed is answered from the
+feedback at hand. So the link's TCP never holds more than one command, and nothing is replayed after a stall.
+
+What happens to a command, in this order:
+
+| condition | outcome |
+|---|---|
+| the sender does not hold the seat | refused `no_seat` |
+| the robot link is down, or no feedback has come yet | refused `link_down` |
+| not one value per axis | refused `wrong_size` |
+| a value is NaN or infinite | refused `not_a_number` |
+| stopped, or a stop is on its way to the bridge | refused `stopped` |
+| its event is the current one, and was the sender's own | answered with the current feedback |
+| its event is the one in flight, and is the sender's own | absorbed |
+| not the next event, or something is in flight | refused `out_of_order` |
+| the issue that it answers is none that the console knows | refused `late` |
+| its nonce is not that of this issue | refused `unseen` |
+| it moves, and no neutral command of the sender was executed since that was last needed | refused `not_neutral` |
+| else | clamped to the axes' ranges and the speed cap, forwarded |
+
+A neutral command is needed of a new holder of the seat, and of every holder after a stop, a reset, a new link or
+epoch, and whatever else the robot says so after (`Feedback.neutral_needed`). It counts once it was executed.
+
+A repeat of somebody else's event is not answered: after a hand-over the new holder would take the old one's
+execution for its own.
+"""
+
+import math
+from typing import NamedTuple
+
+import msgspec
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopTaken
+from lockstep.protocol.serial import event_after, is_newer
+from lockstep.server.control.seat import ControlSeat
+from lockstep.server.control.speed_cap import SpeedCap, within_share
+from lockstep.server.event_clock import EventClock
+from lockstep.server.stop.stop_presses import StopPresses
+
+__all__ = ["Absorbed", "Answer", "CommandArbiter", "CommandOutcome", "Forward", "ForwardRest", "Refuse", "RestOutcome"]
+
+KNOWN_ISSUES = 64  # of the current event; at two a second the oldest was issued long before any `max_event_age`
+
+
+class Forward(NamedTuple):
+    """Send the command to the robot, now."""
+
+    command: Command
+
+
+class ForwardRest(NamedTuple):
+    """Send the rest to the robot, now."""
+
+    rest: Rest
+
+
+class Answer(NamedTuple):
+    """Send to the peer that asked."""
+
+    feedback: Feedback
+
+
+class Refuse(NamedTuple):
+    """Tell the peer that asked."""
+
+    refusal: Refusal
+
+
+class Absorbed(NamedTuple):
+    """Nothing to do: the same is already on its way."""
+
+
+CommandOutcome = Forward | Answer | Refuse | Absorbed
+RestOutcome = ForwardRest | Refuse | Absorbed
+
+
+class CommandArbiter:
+    """Call `link_up` before anything is forwarded, `link_down` when the link ends, and show it all the bridge says.
+
+    `presses`: those of STOP; while one has no answer no command passes.
+    """
+
+    def __init__(
+        self,
+        clock: EventClock,
+        seat: ControlSeat,
+        presses: StopPresses | None = None,
+        speed_cap: SpeedCap | None = None,
+    ) -> None:
+        self._clock = clock
+        self._seat = seat
+        self._presses = presses or StopPresses()
+        self._speed_cap = speed_cap or SpeedCap("off")
+        self._description: RobotDescription | None = None
+        self._link_is_up = False
+        self._in_flight: Command | None = None
+        self._sender = ""  # peer whose command was forwarded last
+        self._sent_event = 0  # of that command; 0 before the first of this epoch
+        self._abandoned = False  # its sender has given up the seat since
+        self._resting: Rest | None = None  # forwarded and not yet followed by a feedback
+        self._nonces: dict[int, int] = {}  # issue of the current event -> its nonce, oldest first
+        self._issued_event = 0  # that they belong to; 0 before the first feedback
+        self._shown_stop = 0  # number of the newest stop that a feedback has shown
+        self._newest_stop = 0  # and of the newest that the bridge has told of
+
+    @property
+    def in_flight(self) -> Command | None:
+        return self._in_flight
+
+    def link_up(self, description: RobotDescription) -> None:
+        self._description = description
+        self._link_is_up = True
+        self._forget()
+
+    def link_down(self) -> None:
+        self._link_is_up = False
+        self._forget()
+
+    def epoch_ends(self) -> None:
+        """Call before the clock begins another epoch: nothing that is known of this one holds in the next."""
+        self._sent_event = self._shown_stop = self._newest_stop = 0
+        self._nonces.clear()
+        self._forget()
+
+    def command(self, peer: str, command: Command, now: float = math.inf) -> CommandOutcome:
+        """Without `now` nothing that was measured counts any more, and a speed cap in force is at its lowest."""
+        description, feedback = self._description, self._clock.feedback
+        if not self._seat.holds(peer):
+            return self._refuse(command, "no_seat")
+        if not self._link_is_up or description is None or feedback is None:
+            return self._refuse(command, "link_down")
+        if len(command.values) != len(description.axes):
+            return self._refuse(command, "wrong_size", f"{len(description.axes)} values are needed")
+        if not all(map(math.isfinite, command.values)):
+            return self._refuse(command, "not_a_number")
+        if self._stop_is_coming or feedback.stop.stopped:
+            return self._refuse(command, "stopped")
+        is_repeat = self._sender == peer and self._sent_event == command.event
+        if is_repeat and command.event == feedback.event:
+            return Answer(feedback)
+        if is_repeat and self._in_flight is not None:
+            return Absorbed()
+        if self._in_flight is not None or command.event != event_after(feedback.event):
+            return self._refuse(command, "out_of_order")
+        return self._next(peer, command, description, feedback.event, now)
+
+    def _next(
+        self, peer: str, command: Command, description: RobotDescription, event: int, now: float
+    ) -> CommandOutcome:
+        nonce = self._nonces.get(command.issue)
+        if nonce is None:
+            return self._refuse(command, "late")
+        if nonce != command.nonce:
+            return self._refuse(command, "unseen", "its nonce is not that of the feedback that it answers")
+        self._speed_cap.answered(peer, event, command, now)
+        if self.moves(command) and not self._seat.may_move(peer):
+            return self._refuse(command, "not_neutral", "send a neutral command first")
+        self._in_flight = self._clamped(command, description, self._speed_cap.share(now))
+        self._sender, self._sent_event, self._abandoned = peer, command.event, False
+        self._resting = None  # a rest of before does not void this one
+        return Forward(self._in_flight)
+
+    @property
+    def _stop_is_coming(self) -> bool:
+        """A stop is on its way to the bridge, or has arrived and no feedback has shown it."""
+        return bool(self._presses.pending) or self._newest_stop > self._shown_stop
+
+    def moves(self, command: Command) -> bool:
+        """Whether `command` is an intention to move; a light or horn that warns before motion is none."""
+        description = self._description
+        if description is None:
+            return False
+        signal = "" if description.start_warning is None else description.start_warning.axis
+        axes = zip(command.values, description.axes, strict=False)
+        return any(value != axis.rest and axis.name != signal for value, axis in axes)
+
+    def rest(self, peer: str, rest: Rest) -> RestOutcome:
+        """A rest of the holder always passes. One that names an event that is far ahead names the next instead."""
+        if not self._seat.holds(peer):
+            return self._refuse(rest, "no_seat")
+        latest = event_after(self._clock.event)
+        return self._forward_rest(Rest(event=latest) if is_newer(rest.event, latest) else rest)
+
+    def abandon(self) -> RestOutcome:
+        """The holder is gone or gave up the seat: what it has under way is void too."""
+        self._abandoned = True
+        return self._forward_rest(Rest(event=event_after(self._clock.event)))
+
+    def stop_taken(self, taken: StopTaken) -> None:
+        """The bridge has latched a stop."""
+        self._newest_stop = max(self._newest_stop, taken.number)
+
+    def feedback(self, feedback: Feedback) -> None:
+        """A feedback that the event clock accepted."""
+        if feedback.event != self._issued_event:
+            self._nonces.clear()
+        self._issued_event = feedback.event
+        self._nonces[feedback.issue] = feedback.nonce
+        if len(self._nonces) > KNOWN_ISSUES:
+            del self._nonces[next(iter(self._nonces))]
+        answered = self._in_flight
+        if answered is not None and not is_newer(answered.event, feedback.event):
+            self._in_flight = None
+        else:
+            answered = None
+        self._resting = None
+        if feedback.stop.stopped or feedback.neutral_needed or feedback.stop.number > self._shown_stop:
+            self._seat.neutral_needed()
+        elif answered is not None and not self.moves(answered) and not self._abandoned:
+            self._seat.neutral(self._sender)
+        self._shown_stop = max(self._shown_stop, feedback.stop.number)
+
+    def refused(self, refusal: Refusal) -> str:
+        """The bridge refused something; returns the peer to tell, or "" for none."""
+        if self._in_flight is not None and refusal.event in (0, self._in_flight.event):
+            self._in_flight = None
+            return self._sender
+        return self._seat.holder
+
+    def _forget(self) -> None:
+        self._in_flight = None
+        self._resting = None
+        self._seat.neutral_needed()
+
+    def _forward_rest(self, rest: Rest) -> RestOutcome:
+        if not self._link_is_up:
+            return self._refuse(rest, "link_down")
+        if rest == self._resting:
+            return Absorbed()
+        self._resting = rest
+        return ForwardRest(rest)
+
+    def _clamped(self, command: Command, description: RobotDescription, share: float) -> Command:
+        values = [
+            within_share(axis, value, share) for value, axis in zip(command.values, description.axes, strict=True)
+        ]
+        return msgspec.structs.replace(command, values=values)
+
+    def _refuse(self, message: Command | Rest, reason: RefusalReason, detail: str = "") -> Refuse:
+        refusal = Refusal(event=message.event, reason=reason, current=self._clock.event, detail=detail)
+        return Refuse(refusal)

@@ -1,0 +1,94 @@
+"""The people on the console: who is here, what they are called, and what they write to each other."""
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from lockstep.protocol.console import Participants, SharedNote
+from lockstep.protocol.messages import RefusalReason
+from lockstep.server.audit.audit_trail import AuditTrail
+from lockstep.server.control.notes import NoteBoard
+from lockstep.server.event_clock import EventClock
+from lockstep.server.peers.peer import Peer
+from lockstep.server.peers.peer_registry import PeerRegistry
+
+__all__ = ["ParticipantList"]
+
+CROWD = 10  # peers; the list of participants goes out at most once a second, ten times more rarely to 100
+
+
+class ParticipantList:
+    """Run `share` as a task. All else is called on the loop and returns at once.
+
+    Args:
+        renamed: called with those whose name is another one now
+        refuse: tells a peer that something was refused
+    """
+
+    def __init__(
+        self,
+        peers: PeerRegistry,
+        clock: EventClock,
+        audit: AuditTrail,
+        renamed: Callable[[list[Peer]], None],
+        refuse: Callable[[Peer, RefusalReason, str], None],
+    ) -> None:
+        self._peers = peers
+        self._clock = clock
+        self._audit = audit
+        self._renamed = renamed
+        self._refuse = refuse
+        self._board = NoteBoard(time.monotonic())
+
+    def joined(self, peer: Peer) -> None:
+        if peer.thumbnail:
+            peer.name = peer.wanted_name  # nobody sees it, but a stop says whose it is
+            return
+        self._board.joined(time.monotonic())
+        self._audit.record("joined", peer.actor, ", ".join(sorted({stream.carrier for stream in peer.streams})))
+
+    def left(self, peer: Peer) -> None:
+        if not peer.thumbnail:
+            self._audit.record("left", peer.actor, peer.ended)
+            if all(each.thumbnail or each.ended for each in self._peers):  # one that closes is there no more
+                self._board.left_empty(time.monotonic())
+
+    def welcome(self, peer: Peer) -> None:
+        """Tell a newcomer who is here and what was written."""
+        peer.send("session", self._peers.participants())
+        for note in self._board:
+            peer.send("session", note)
+
+    def rename(self, peer: Peer, name: str) -> None:
+        before = peer.name
+        peer.rename(name)
+        self.settle_names()
+        if peer.name != before:
+            self._audit.record("renamed", peer.actor, detail=f"was {before}")
+
+    def settle_names(self) -> None:
+        """No two are called the same; who leaves makes room."""
+        changed = self._peers.settle_names()
+        if changed:
+            self._renamed(changed)
+
+    def write(self, peer: Peer, text: str) -> None:
+        """A note to everyone."""
+        link, epoch, event = peer.identity.token_id, self._clock.epoch, self._clock.event
+        note = self._board.write(link, peer.id, peer.name, peer.role, text, epoch, event, time.monotonic(), time.time())
+        if isinstance(note, SharedNote):
+            self._audit.record("note", peer.actor, detail=note.text)
+            self._peers.tell("session", note)
+        else:
+            self._refuse(peer, note, "note")
+
+    async def share(self) -> None:
+        """Until cancelled: the list of participants, when it changed."""
+        shown = Participants(participants=[])
+        while True:
+            await asyncio.sleep(max(1.0, len(self._peers) / CROWD))
+            self.settle_names()
+            current = self._peers.participants()
+            if current != shown:
+                shown = current
+                self._peers.tell("session", current)

@@ -1,0 +1,125 @@
+"""Keeps the control seat: asks its rules, and acts on what follows. The rest leaves before anyone is told."""
+
+import asyncio
+import time
+from typing import Protocol
+
+from lockstep.protocol.console import Seat, SeatClaim, SeatDecline, SeatGrant, SeatRelease, SeatRequest, SeatTake
+from lockstep.server.audit.audit_trail import AuditTrail
+from lockstep.server.audit.records import Actor
+from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatRefusal, SeatTimes, Standing
+from lockstep.server.peers.peer import Peer
+from lockstep.server.peers.peer_registry import PeerRegistry
+
+__all__ = ["SeatHost", "SeatKeeper", "SeatMessage"]
+
+CHECKS = 12  # within one heartbeat timeout
+LINK_CLAIMS = 2  # of the connections of one link at once: all together have a few, and others want to ask too
+
+SeatMessage = SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease
+
+
+class SeatHost(Protocol):
+    """What the keeper needs of the console."""
+
+    def rest_robot(self, why: str) -> None: ...
+    def refuse(self, peer: Peer, refusal: SeatRefusal) -> None: ...
+
+
+class SeatKeeper:
+    """Run `watch` as a task. All else is called on the loop and returns at once."""
+
+    def __init__(self, times: SeatTimes, peers: PeerRegistry, host: SeatHost, audit: AuditTrail) -> None:
+        self.rules = ControlSeat(times)
+        self._times = times
+        self._peers = peers
+        self._host = host
+        self._audit = audit
+
+    def message(self) -> Seat:
+        """What everyone is told."""
+        now = time.monotonic()
+        return Seat(
+            holder=self.rules.holder,
+            name=self._name(self.rules.holder),
+            why=self.rules.why,
+            claims=[
+                SeatClaim(peer=peer, name=self._name(peer), seconds_left=round(left, 1))
+                for peer, left in self.rules.claims(now).items()
+            ],
+            idle_seconds_left=_rounded(self.rules.idle_seconds_left(now)),
+        )
+
+    def handle(self, peer: Peer, message: SeatMessage) -> None:
+        """What `peer` asks for."""
+        now = time.monotonic()
+        match message:
+            case SeatRequest(only_if_free=False) if self._asks_too_much(peer, now):
+                self._host.refuse(peer, SeatRefusal(peer.id, "seat_taken", "your link asks for the seat already"))
+            case SeatRequest(only_if_free=only_if_free):
+                self._act(self.rules.request(peer.id, peer.role, now, only_if_free=only_if_free), peer)
+            case SeatTake():
+                self._act(self.rules.take(peer.id, peer.role, now), peer)
+            case SeatGrant(peer=claimant):
+                self._act(self.rules.answer(peer.id, claimant, now, grant=True), peer)
+            case SeatDecline(peer=claimant):
+                self._act(self.rules.answer(peer.id, claimant, now, grant=False), peer)
+            case SeatRelease():
+                self._act(self.rules.release(peer.id, now), peer)
+
+    def _asks_too_much(self, peer: Peer, now: float) -> bool:
+        """Whether it would be one claim too many of its link."""
+        if self.rules.standing(peer.id) is not Standing.OTHER:
+            return False
+        asking = [self._peers.by_id(each) for each in self.rules.claims(now)]
+        link = peer.identity.token_id
+        return sum(each is not None and each.identity.token_id == link for each in asking) >= LINK_CLAIMS
+
+    def heard(self, peer: Peer) -> None:
+        self.rules.heard(peer.id, time.monotonic(), peer.round_trip)
+
+    def moved(self, peer: Peer) -> None:
+        """A moving command of `peer` passed."""
+        self._act(self.rules.moved(peer.id, time.monotonic()), peer)
+
+    def gone(self, peer: Peer) -> None:
+        self._act(self.rules.gone(peer.id, time.monotonic()), peer)
+
+    def renamed(self, peers: list[Peer]) -> None:
+        """Tell everyone, if the seat's message names one of `peers`."""
+        if any(self.rules.standing(peer.id) in (Standing.HOLDER, Standing.CLAIMANT) for peer in peers):
+            self._peers.tell("session", self.message())
+
+    async def watch(self) -> None:
+        """Until cancelled."""
+        while True:
+            await asyncio.sleep(min(self._times.heartbeat / CHECKS, 1.0))
+            for outcome in self.rules.expire(time.monotonic()):
+                self._act(outcome, None)
+
+    def _act(self, outcome: SeatOutcome, actor: Peer | None) -> None:
+        if outcome.rest:
+            self._host.rest_robot(self.rules.why)
+        if outcome.changed:
+            seat = self.message()
+            holder = self._peers.by_id(seat.holder)
+            self._audit.seat(seat, _actor(holder), _actor(actor))
+            self._peers.tell("session", seat)
+            for peer in self._peers:
+                peer.drives(peer.id == seat.holder)
+        if outcome.refusal is not None:
+            refused = self._peers.by_id(outcome.refusal.peer)
+            if refused is not None:
+                self._host.refuse(refused, outcome.refusal)
+
+    def _name(self, peer_id: str) -> str:
+        peer = self._peers.by_id(peer_id) if peer_id else None
+        return "" if peer is None else peer.name
+
+
+def _rounded(seconds: float | None) -> float | None:
+    return None if seconds is None else round(seconds, 1)
+
+
+def _actor(peer: Peer | None) -> Actor:
+    return Actor() if peer is None else peer.actor

@@ -1,0 +1,125 @@
+"""The speed cap: no faster than the delay of what the operator sees permits. No I/O, no clock.
+
+v <= v_max * min(1, 0.2 s / delay), the rule of the German ordinance on remote driving (StVFernLV). The delay is the
+longer of what the seat's holder reports (command to picture, on its own clock) and what this side sees for itself: how
+long after a feedback left the command came that answers it. Nobody can answer before the feedback was there, because
+a command names its nonce, so neither a report nor a guess can make the path look shorter than it is.
+
+Doubt is slow: a holder that reports no delay, or has not reported for a while, counts as `UNKNOWN_DELAY` late.
+
+| mode | the cap holds |
+|---|---|
+| on | always |
+| operator | while the holder's reports ask for it |
+| off | never |
+"""
+
+from collections import deque
+from typing import Literal, NamedTuple
+
+from lockstep.protocol.console import Report, SpeedCapMode, SpeedCapState
+from lockstep.protocol.description import Axis
+from lockstep.protocol.messages import Command, Feedback
+
+__all__ = ["SpeedCap", "within_share"]
+
+FREE_DELAY = 0.2  # s, up to which nothing is capped
+UNKNOWN_DELAY = 1.0  # s that an unknown delay counts as
+STALE = 2.0  # s after which a report no longer counts; clients report twice a second
+WINDOW = 2.0  # s in which the shortest answer is looked for: an operator at rest answers late
+REMEMBERED = 256  # feedback whose leaving is known
+TOLD_STEP = 0.05  # a smaller change of the share is not told
+
+Why = Literal["", "delay", "unknown"]
+
+
+class Answer(NamedTuple):
+    at: float  # s
+    delay: float  # s after the feedback left
+
+
+class SpeedCap:
+    """Feed it with `fed_back`, `reported` and `answered`; then `share` is how much of an axis' speed may be used."""
+
+    def __init__(self, mode: SpeedCapMode) -> None:
+        self._mode: SpeedCapMode = mode
+        self._left_at: dict[tuple[int, int, int], float] = {}  # (event, issue, nonce) -> s
+        self._holder = ""  # peer that the following is about
+        self._report = Report()
+        self._reported_at = float("-inf")
+        self._answers: deque[Answer] = deque(maxlen=REMEMBERED)
+        self._told = SpeedCapState(mode=mode)
+
+    def forget(self) -> None:
+        """Another epoch: its events have nothing to do with those before."""
+        self._left_at.clear()
+
+    def fed_back(self, feedback: Feedback, now: float) -> None:
+        """A feedback leaves for the operators."""
+        self._left_at[feedback.event, feedback.issue, feedback.nonce] = now
+        if len(self._left_at) > REMEMBERED:
+            del self._left_at[next(iter(self._left_at))]
+
+    def reported(self, holder: str, report: Report, now: float) -> None:
+        """The seat's holder reports."""
+        self._about(holder)
+        self._report, self._reported_at = report, now
+
+    def answered(self, holder: str, event: int, command: Command, now: float) -> None:
+        """A command of the seat's holder came, as the answer to feedback `event`."""
+        self._about(holder)
+        left_at = self._left_at.get((event, command.issue, command.nonce))
+        if left_at is not None:
+            self._answers.append(Answer(now, now - left_at))
+
+    def holds(self) -> bool:
+        """Whether the cap is in force."""
+        return self._mode == "on" or (self._mode == "operator" and self._report.speed_cap)
+
+    def delay(self, now: float) -> float | None:
+        """s; None when it is not known."""
+        reported = self._report.picture_delay_ms
+        if reported is None or not reported >= 0 or now - self._reported_at > STALE:
+            return None
+        answers = [answer.delay for answer in self._answers if now - answer.at <= WINDOW]
+        return max(reported / 1000, min(answers, default=0.0))
+
+    def share(self, now: float) -> float:
+        """0 to 1."""
+        return self._share(self.delay(now)) if self.holds() else 1.0
+
+    def state(self, now: float) -> SpeedCapState:
+        """What to tell everyone. Before the holder arms there is no delay to speak of."""
+        if not self.holds() or not self._report.armed:
+            return SpeedCapState(mode=self._mode, holds=self.holds())
+        delay = self.delay(now)
+        share = self._share(delay)
+        why: Why = "unknown" if delay is None else "delay" if share < 1.0 else ""
+        delay_ms = None if delay is None else round(delay * 1000)
+        return SpeedCapState(mode=self._mode, holds=True, share=round(share, 2), delay_ms=delay_ms, why=why)
+
+    def news(self, now: float) -> SpeedCapState | None:
+        """The state, when it is worth telling again."""
+        state, told = self.state(now), self._told
+        same = (state.holds, state.why) == (told.holds, told.why) and abs(state.share - told.share) < TOLD_STEP
+        if same:
+            return None
+        self._told = state
+        return state
+
+    def _share(self, delay: float | None) -> float:
+        return min(1.0, FREE_DELAY / max(UNKNOWN_DELAY if delay is None else delay, 1e-9))
+
+    def _about(self, holder: str) -> None:
+        """Nothing that one holder said counts for the next."""
+        if holder != self._holder:
+            self._holder = holder
+            self._report, self._reported_at = Report(), float("-inf")
+            self._answers.clear()
+
+
+def within_share(axis: Axis, value: float, share: float) -> float:
+    """`value` clamped to `share` of what the axis may do on its side of rest."""
+    most = axis.rest + share * (axis.maximum - axis.rest)
+    least = axis.rest - share * (axis.rest - axis.minimum)
+    return min(max(value, least), most)

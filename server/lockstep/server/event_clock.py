@@ -1,0 +1,71 @@
+"""The event clock: which event reference holds, by what the bridge says. No I/O."""
+
+from collections import deque
+from typing import NamedTuple
+
+from lockstep.protocol.messages import EventReference, Feedback, StopState
+from lockstep.protocol.serial import FIRST_EVENT, event_gap
+
+__all__ = ["EventClock"]
+
+HISTORY = 1024  # changes remembered; at 25 events/s that is 40 s, longer than any medium takes to come
+
+
+class Change(NamedTuple):
+    """From `time` on, `event` held."""
+
+    time: float
+    event: EventReference
+
+
+class EventClock:
+    """Follows the feedback of one epoch at a time. Within an epoch the reference never goes back."""
+
+    def __init__(self) -> None:
+        self.epoch = ""
+        self.feedback: Feedback | None = None  # newest of this epoch; None before the first
+        self.heard_at = 0.0  # when it came
+        self._changes: deque[Change] = deque(maxlen=HISTORY)
+
+    @property
+    def event(self) -> EventReference:
+        return FIRST_EVENT if self.feedback is None else self.feedback.event
+
+    @property
+    def stop(self) -> StopState:
+        return StopState() if self.feedback is None else self.feedback.stop
+
+    @property
+    def moving(self) -> bool:
+        """Whether the robot was not at rest when it was last measured."""
+        return self.feedback is not None and not self.feedback.at_rest
+
+    def begin(self, epoch: str) -> bool:
+        """The bridge said which epoch it lives in. True when it is another one: everything starts anew."""
+        if epoch == self.epoch:
+            return False
+        self.epoch = epoch
+        self.feedback = None
+        self._changes.clear()
+        return True
+
+    def observe(self, feedback: Feedback, now: float) -> bool:
+        """Take a feedback. False when it is older than what is known, and then nothing changes."""
+        if self.feedback is not None:
+            gap = event_gap(feedback.event, self.feedback.event)
+            if gap < 0 or (gap == 0 and feedback.issue <= self.feedback.issue):
+                return False
+        if self.feedback is None or feedback.event != self.feedback.event:
+            self._changes.append(Change(now, feedback.event))
+        self.feedback, self.heard_at = feedback, now
+        return True
+
+    def reference_at(self, time: float) -> EventReference | None:
+        """The reference that held at `time`: the stamp for a medium captured here. None when too long ago.
+
+        A change counts from when its feedback came, which is later than it happened: never newer than the truth.
+        """
+        for change in reversed(self._changes):
+            if change.time <= time:
+                return change.event
+        return None

@@ -1,0 +1,230 @@
+"""Redis as consoles use it: what each shows, news between them, the shared audit and revoked links. A thin shell.
+
+| key | |
+|---|---|
+| `lockstep:consoles` | sorted set: ids of consoles, by when they last showed something |
+| `lockstep:console:ID` | what one console shows; expires |
+| `lockstep:audit` | capped stream: audit records |
+| `lockstep:revoked` | sorted set: links that were revoked, by when they would have expired |
+| `lockstep:news` | the channel |
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
+from typing import Any
+from urllib.parse import urlsplit
+
+from redis.asyncio import Redis
+from redis.asyncio.client import Pipeline, PubSub
+from redis.asyncio.retry import Retry
+from redis.backoff import NoBackoff
+from redis.exceptions import (
+    AuthenticationError,
+    AuthorizationError,
+    NoPermissionError,
+    OutOfMemoryError,
+    ReadOnlyError,
+    RedisError,
+    ResponseError,
+)
+from redis.exceptions import TimeoutError as RedisTimeout
+
+from lockstep.server.federation.envelope import SIZE
+from lockstep.server.federation.errors import (
+    BoardError,
+    BoardFull,
+    BoardRefused,
+    BoardSilent,
+    BoardTrouble,
+    BoardUnreachable,
+    BoardWrongType,
+    InputTooLarge,
+)
+from lockstep.server.federation.messages import MAX_PUBLISHED
+from lockstep.server.federation.other_consoles import MAX_CONSOLES
+from lockstep.server.federation.redis_private import AnswerTooLarge, BoundedParser
+
+__all__ = ["RedisStore"]
+
+PREFIX = "lockstep:"
+CONSOLES = PREFIX + "consoles"
+AUDIT = PREFIX + "audit"
+REVOKED = PREFIX + "revoked"
+NEWS = PREFIX + "news"
+
+EXPIRES_MS = 5000  # what a console shows, after its last sign of life
+REMEMBERED = 3600.0  # s that an id stays in the list of consoles
+AUDIT_KEPT = 10_000  # records, about
+MAX_REVOKED = 5000
+TIMEOUT = 2.0  # s for one exchange
+HEARTBEAT = 3.0  # s without news until the connection for it is tried
+CONNECTIONS = 8
+MAX_ID = 64  # bytes; longer ones are not ours
+
+
+class RedisStore:
+    """Enter it to use it. Everything raises BoardTrouble in bounded time, or InputTooLarge."""
+
+    def __init__(self, url: str, timeout: float = TIMEOUT) -> None:
+        self._timeout = timeout
+        self._password = urlsplit(url).password or ""
+        self._redis = Redis.from_url(
+            url,
+            protocol=2,
+            parser_class=BoundedParser,
+            # The bounds are ours. With one of redis-py's its writes pass through asyncio.wait_for, which swallows a
+            # cancellation in Python 3.11.
+            socket_timeout=None,
+            socket_connect_timeout=timeout,
+            retry=Retry(NoBackoff(), 0),
+            max_connections=CONNECTIONS,
+            health_check_interval=0,
+        )
+
+    async def __aenter__(self) -> "RedisStore":
+        return self
+
+    async def __aexit__(self, *error: object) -> None:
+        await self._redis.aclose()
+
+    async def show(self, console: str, sealed: bytes, news: bytes | None, now: float) -> None:
+        """What a console shows from now on; `news` tells the others to look. `now` is seconds since 1970."""
+        async with self._pipeline() as commands:
+            commands.set(f"{PREFIX}console:{console}", sealed, px=EXPIRES_MS)
+            commands.zadd(CONSOLES, {console: now})
+            commands.zremrangebyscore(CONSOLES, "-inf", now - REMEMBERED)
+            commands.zremrangebyrank(CONSOLES, 0, -(MAX_CONSOLES * 4))
+            if news is not None:
+                commands.publish(NEWS, news)
+
+    async def shown(self, own: str, refused: Callable[[BoardError], None]) -> AsyncIterator[bytes]:
+        """What the other living consoles show; what is wrong with a single one is `refused`."""
+        with self._named():
+            async with asyncio.timeout(self._timeout):
+                ids = await self._redis.zrevrange(CONSOLES, 0, MAX_CONSOLES)
+        others = [each for each in ids if isinstance(each, bytes) and each != own.encode() and len(each) <= MAX_ID]
+        # GETRANGE, so that a value of any size costs no more than ours may have
+        async with self._pipeline() as commands:
+            for each in others:
+                commands.getrange(f"{PREFIX}console:".encode() + each, 0, MAX_PUBLISHED + SIZE)
+            found = await self._execute(commands)
+        for each in found:
+            try:
+                with self._named():
+                    if isinstance(each, RedisError):
+                        raise each
+            except BoardError as error:
+                refused(error)
+            if isinstance(each, bytes) and each:  # empty: it has expired
+                yield each
+
+    async def farewell(self, console: str, news: bytes) -> None:
+        async with self._pipeline() as commands:
+            commands.delete(f"{PREFIX}console:{console}")
+            commands.zrem(CONSOLES, console)
+            commands.publish(NEWS, news)
+
+    async def append(self, records: Sequence[dict[bytes, bytes]]) -> None:
+        async with self._pipeline() as commands:
+            for fields in records:
+                entry: dict[Any, Any] = {**fields}
+                commands.xadd(AUDIT, entry, maxlen=AUDIT_KEPT, approximate=True)
+
+    async def newest(self, limit: int) -> list[dict[bytes, bytes]]:
+        """Records, newest first."""
+        with self._named():
+            async with asyncio.timeout(self._timeout):
+                entries: list[Any] = await self._redis.xrevrange(AUDIT, count=limit) or []
+        return [fields for _, fields in entries if fields]
+
+    async def revoke(self, links: Sequence[tuple[bytes, float]], news: bytes, now: float) -> None:
+        """Sealed ids and when they would have expired."""
+        async with self._pipeline() as commands:
+            for sealed, expires in links:
+                commands.zadd(REVOKED, {sealed: expires})
+            commands.zremrangebyscore(REVOKED, "-inf", now)
+            commands.publish(NEWS, news)
+
+    async def revoked(self) -> list[bytes]:
+        with self._named():
+            async with asyncio.timeout(self._timeout):
+                found = await self._redis.zrevrange(REVOKED, 0, MAX_REVOKED - 1)
+        return [each for each in found if isinstance(each, bytes)]
+
+    async def tell(self, news: bytes) -> None:
+        with self._named():
+            async with asyncio.timeout(self._timeout):
+                await self._redis.publish(NEWS, news)
+
+    @asynccontextmanager
+    async def news(self) -> AsyncIterator[AsyncIterator[bytes]]:
+        """From now on, without an end."""
+        async with self._redis.pubsub() as channel:
+            with self._named():
+                async with asyncio.timeout(self._timeout):
+                    await channel.subscribe(NEWS)
+                    await channel.get_message(timeout=self._timeout)  # the answer to that
+            yield self._messages(channel)
+
+    async def _messages(self, channel: PubSub) -> AsyncIterator[bytes]:
+        asked = False  # whether a sign of life is owed to us
+        while True:
+            with self._named():
+                message = await channel.get_message(timeout=HEARTBEAT)
+                if message is None:
+                    if asked:
+                        raise BoardSilent("no news connection")
+                    async with asyncio.timeout(self._timeout):
+                        await channel.ping()
+            asked = message is None
+            if message is not None and message["type"] == "message" and isinstance(message["data"], bytes):
+                yield message["data"]
+
+    @asynccontextmanager
+    async def _pipeline(self) -> AsyncIterator[Pipeline]:
+        """Commands that go together and whose answers nobody needs; the first error is raised when leaving."""
+        with self._named():
+            async with self._redis.pipeline(transaction=False) as commands:
+                yield commands
+                for each in await self._execute(commands):
+                    if isinstance(each, RedisError):
+                        raise each
+
+    async def _execute(self, commands: Pipeline) -> list[Any]:
+        """The answers; those that are errors too."""
+        if not len(commands):
+            return []
+        async with asyncio.timeout(self._timeout):
+            answers: list[Any] = await commands.execute(raise_on_error=False)
+        return answers
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Turns what redis-py raises into our names."""
+        try:
+            yield
+        except (TimeoutError, RedisTimeout) as error:
+            raise BoardSilent(f"Redis did not answer within {self._timeout:g} s") from error
+        except AnswerTooLarge as error:
+            raise InputTooLarge(str(error)) from error
+        except (AuthenticationError, AuthorizationError, NoPermissionError) as error:
+            raise BoardRefused(self._words(error)) from error
+        except (OutOfMemoryError, ReadOnlyError) as error:
+            raise BoardFull(self._words(error)) from error
+        except ResponseError as error:
+            raise self._refusal(str(error)) from error
+        except (RedisError, OSError) as error:
+            raise BoardUnreachable(self._words(error)) from error
+
+    def _refusal(self, text: str) -> BoardTrouble:
+        kind = text.split(" ", 1)[0]
+        if kind == "WRONGTYPE":
+            return BoardWrongType("another kind of value is kept at a key of ours")
+        if kind in ("OOM", "MISCONF", "READONLY"):
+            return BoardFull(self._words(text))
+        return BoardRefused(self._words(text))
+
+    def _words(self, error: object) -> str:
+        text = str(error)[:200]
+        return text.replace(self._password, "…") if self._password else text

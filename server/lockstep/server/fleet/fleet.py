@@ -1,0 +1,235 @@
+"""All robots of one console: their sessions, who may see which, STOP for all, and the board of other consoles."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import structlog
+from starlette.requests import HTTPConnection, Request
+
+from lockstep.server.audit.records import Actor, AuditRecord
+from lockstep.server.auth.invitations import Invitation
+from lockstep.server.auth.tokens import Access, Identity, Right
+from lockstep.server.control.stop_service import SILENCED
+from lockstep.server.errors import Silenced
+from lockstep.server.federation.board import Board, StopAnswer
+from lockstep.server.federation.memory_board import MemoryBoard
+from lockstep.server.federation.robot_summary import Tile
+from lockstep.server.fleet.metrics import FleetMetrics
+from lockstep.server.fleet.session import FleetSession
+from lockstep.server.fleet.summaries import UNREADABLE, absent_tile, tile_of
+from lockstep.server.settings import Settings
+from lockstep.server.state.console_context import ConsoleContext
+from lockstep.server.state.persistent_state import robot_place
+from lockstep.server.stop.stop_presses import Press
+from lockstep.server.util.gc_scheduler import sweep_forever
+from lockstep.server.util.uncancelled import attempt
+
+__all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
+
+log = structlog.get_logger(__name__)
+
+LOOK_SECONDS = 1.0  # between two looks at every robot
+START_SECONDS = 20.0  # that the console waits for its sessions before it answers
+RESTART_AFTER = 1.0  # s until a background task that failed runs again
+ELSEWHERE = Actor("another console")
+
+
+class Stopped(NamedTuple):
+    """What became of a STOP at one robot."""
+
+    name: str
+    delivered: bool
+    event: int
+    detail: str  # why it was not delivered; "" when it was
+    number: int = 0  # of the stop at that robot; 0 when it was not delivered
+    console: str = ""  # that has the robot; "" is this one
+    kept: bool = False  # on that robot's disk
+
+
+class Fleet:
+    """Enter `running` once. Everything else is called on the same loop and returns at once, but for `stop_all`.
+
+    Attributes:
+        sessions: by the robots' names
+        board: where other consoles are; it never decides anything about a robot of ours
+    """
+
+    def __init__(self, robots: Mapping[str, Settings]) -> None:
+        self.metrics = FleetMetrics()
+        self.sessions = {name: FleetSession(name, settings) for name, settings in robots.items()}
+        self.board: Board = MemoryBoard()
+        self.metrics.robots.set(len(self.sessions))
+        self._house: ConsoleContext | None = None
+        self._door: Access | None = None
+
+    @asynccontextmanager
+    async def running(self, house: ConsoleContext, board: Board) -> AsyncIterator[None]:
+        """While entered, all sessions run. On entering it waits for their starts, but not long for one that hangs."""
+        self._house, self._door, self.board = house, house.state.access.at(None), board
+        directory = house.state.directory.path
+        async with asyncio.TaskGroup() as tasks:
+            running = [
+                tasks.create_task(self._run_session(each, house, directory), name=f"robot {name}")
+                for name, each in self.sessions.items()
+            ]
+            running += [
+                tasks.create_task(house.run(), name="links"),
+                tasks.create_task(self._guard("fleet", self._look), name="fleet"),
+                tasks.create_task(self._guard("board", board.run), name="board"),
+                tasks.create_task(
+                    self._guard("sweeper", lambda: sweep_forever(self._ended, self._moving)), name="sweeper"
+                ),
+            ]
+            settled = [tasks.create_task(each.settled.wait()) for each in self.sessions.values()]
+            await asyncio.wait(settled, timeout=START_SECONDS)
+            yield
+            for task in (*running, *settled):
+                task.cancel()
+
+    # who may
+
+    def caller(self, connection: HTTPConnection) -> Right:
+        """The right that a request brings. Raises AccessError, StateUnavailable; to stop, the first only."""
+        if self._door is None:
+            raise TypeError("the fleet is not running")
+        bearer = self._door.bearer_to_stop if connection.scope["path"].endswith("/stop") else self._door.bearer
+        return bearer(connection.headers.get("authorization"))
+
+    @property
+    def lets_in(self) -> bool:
+        """False while nobody knows which links are revoked."""
+        return self._house is None or not self._house.state.invitations.trouble
+
+    def may(self, identity: Identity, name: str) -> bool:
+        """Whether that link is good for that robot."""
+        return identity.may_see(name)
+
+    # what there is to see
+
+    def own_tiles(self) -> list[Tile]:
+        now = time.monotonic()
+        return [self._tile(session, now) for session in self.sessions.values()]
+
+    def tiles(self, identity: Identity) -> list[Tile]:
+        """Of all robots, other consoles' too, that this link may see; by name."""
+        found = [tile for tile in (*self.own_tiles(), *self.board.others()) if identity.may_see(tile.name)]
+        return sorted(found, key=lambda tile: (tile.name, tile.console))
+
+    def _tile(self, session: FleetSession, now: float) -> Tile:
+        """A fault with one robot must not hide the others."""
+        here = session.services
+        if here is None:
+            return absent_tile(session.name)
+        try:
+            return tile_of(here, session.pulse, now)
+        except Exception as error:
+            here.metrics.faults.caught("tile", error, robot=session.name)
+            return absent_tile(session.name, UNREADABLE)
+
+    # STOP
+
+    async def stop_all(self, identity: Identity, press: Press) -> list[Stopped]:
+        """Every robot that this link may see, all at once: our own, and those of other consoles."""
+        self.metrics.stops.inc()
+        elsewhere = {tile.name: tile.console for tile in self.board.others() if identity.may_see(tile.name)}
+        stopping = [self._stop(session, press) for name, session in self.sessions.items() if identity.may_see(name)]
+        own, others = await asyncio.gather(asyncio.gather(*stopping), self._stop_elsewhere(elsewhere, press))
+        self.board.publish(self.own_tiles())
+        return sorted([*own, *others])
+
+    async def _stop_elsewhere(self, robots: Mapping[str, str], press: Press) -> list[Stopped]:
+        """`robots`: with the consoles that have them."""
+        if not robots:
+            return []
+        if self._house is not None and self._house.is_silenced(press.by.link):
+            return [Stopped(name, False, 0, SILENCED, 0, console) for name, console in robots.items()]
+        answers = await self.board.stop(robots.keys(), press)
+        return [
+            Stopped(name, answer.delivered, answer.event, answer.detail, answer.number, robots[name], answer.kept)
+            for name, answer in answers.items()
+        ]
+
+    async def _stop(self, session: FleetSession, press: Press) -> Stopped:
+        """A fault with one robot must not keep the stop from the others."""
+        try:
+            answer = await session.stop(press)
+        except Silenced as error:
+            return Stopped(session.name, False, 0, error.detail)
+        except Exception as error:
+            self.metrics.faults.caught("stop", error, robot=session.name)
+            return Stopped(session.name, False, 0, UNREADABLE)
+        outcome = answer.outcome
+        return Stopped(session.name, outcome.delivered, answer.event, outcome.detail, outcome.number, kept=outcome.kept)
+
+    # BoardHost
+
+    async def stop_robot(self, name: str, press: Press) -> StopAnswer:
+        """Somebody stops it at another console."""
+        session = self.sessions.get(name)
+        if session is None:
+            return StopAnswer(True, False, 0, "that console does not have this robot")
+        stopped = await self._stop(session, press)
+        return StopAnswer(True, stopped.delivered, stopped.event, stopped.detail, stopped.number, stopped.kept)
+
+    def silences(self) -> dict[str, float]:
+        return {} if self._house is None else self._house.silences()
+
+    def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
+        if self._house is not None:
+            self._house.silenced_elsewhere(console, links)
+
+    def links_revoked(self, ended: list[Invitation]) -> None:
+        if self._house is not None:
+            self._house.enforce(ended, ELSEWHERE)
+
+    # background tasks
+
+    async def _run_session(self, session: FleetSession, house: ConsoleContext, directory: Path) -> None:
+        """Each has a directory of its own for recordings and audit."""
+        await session.run(house, robot_place(directory, session.name), self.metrics, self._recorded)
+
+    def _recorded(self, robot: str, record: AuditRecord) -> None:
+        try:
+            self.board.record(robot, record)
+        except Exception as error:
+            self.metrics.faults.caught("board", error, robot=robot)
+
+    async def _look(self) -> None:
+        while True:
+            now = time.monotonic()
+            for session in self.sessions.values():
+                session.look(now)
+            self.board.publish(self.own_tiles())
+            await asyncio.sleep(LOOK_SECONDS)
+
+    def _ended(self) -> int:
+        return sum(session.ended for session in self.sessions.values())
+
+    def _moving(self) -> bool:
+        return any(session.moving for session in self.sessions.values())
+
+    async def _guard(self, name: str, task: Callable[[], Awaitable[None]]) -> None:
+        """Runs `task` again when it fails."""
+        while True:
+            try:
+                await attempt(task())
+            except Exception as error:
+                self.metrics.faults.caught(name, error, what="a background task, which runs again")
+            await asyncio.sleep(RESTART_AFTER)
+
+
+def fleet_of(connection: HTTPConnection) -> Fleet:
+    """The fleet that a request came to."""
+    found = connection.app.state.fleet
+    if not isinstance(found, Fleet):
+        raise TypeError("the app has no fleet")
+    return found
+
+
+async def fleet_caller(connection: Request) -> Right:
+    """Who asks the fleet. Raises AccessError."""
+    return fleet_of(connection).caller(connection)

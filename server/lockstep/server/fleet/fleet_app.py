@@ -1,0 +1,72 @@
+"""The app of a console with several robots: the overview in front, and each robot's routes below /robots/NAME/."""
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager, closing
+from functools import cache
+
+import msgspec
+from fastapi import FastAPI, Request, Response
+from starlette.routing import Mount
+
+from lockstep.server.composition.app_factory import bare_app, guard_app, open_house
+from lockstep.server.errors import NotFound
+from lockstep.server.federation import make_board
+from lockstep.server.fleet import audit_routes, fleet_routes
+from lockstep.server.fleet.fleet import Fleet, fleet_of
+from lockstep.server.fleet.openapi import fleet_openapi
+from lockstep.server.http.json_response import json_answer
+from lockstep.server.http.robot_paths import ROBOTS
+from lockstep.server.http.static_files import page_router
+from lockstep.server.settings import Settings
+from lockstep.server.state.persistent_state import ConsoleState
+
+__all__ = ["create_fleet_app"]
+
+
+def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: ConsoleState | None = None) -> FastAPI:
+    """The app. It connects to the robots while its lifespan runs; `robots` are their settings by name."""
+    fleet = Fleet(robots)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        opened = open_house(app, settings, state, fleet.metrics, settings.max_total_peers, settings.reserved_places)
+        with closing(opened) as house:
+            board = make_board(
+                settings,
+                house.state.signing_key(settings),
+                fleet,
+                house.state.invitations,
+                settings.public_url,
+                fleet.metrics.registry,
+            )
+            async with fleet.running(house, board):
+                yield
+
+    app = bare_app("Lockstep fleet", settings, lifespan)
+    app.state.fleet = fleet
+    app.include_router(fleet_routes.router)
+    app.include_router(audit_routes.router)
+    app.add_api_route("/openapi.json", _describe, include_in_schema=False)
+    for name, session in fleet.sessions.items():
+        app.router.routes.append(Mount(f"{ROBOTS}/{name}", app=session.app))
+    app.add_api_route(f"{ROBOTS}/{{name}}", _with_slash, include_in_schema=False)
+    app.include_router(page_router(first="fleet.html", of_robot=False))
+    guard_app(app, settings)
+    return app
+
+
+async def _with_slash(request: Request, name: str) -> Response:
+    """Pages find everything by their own address, which ends with a slash. A browser keeps the fragment."""
+    if name not in fleet_of(request).sessions:
+        raise NotFound("no such robot")
+    return Response(status_code=308, headers={"Location": f"{name}/"})
+
+
+@cache
+def _description() -> msgspec.Raw:
+    """Made once: it is large, and anybody may ask for it."""
+    return msgspec.Raw(msgspec.json.encode(fleet_openapi()))
+
+
+async def _describe() -> Response:
+    return json_answer(_description())

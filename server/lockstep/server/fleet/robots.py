@@ -1,0 +1,72 @@
+"""Settings of each robot of a fleet: the console's, and what the fleet's file says of that robot alone."""
+
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from lockstep.server.settings import Settings
+from lockstep.server.util.robot_names import BadFleet, check_names, parse_robots
+
+__all__ = ["OWN", "robot_settings"]
+
+# What one robot may have otherwise than the others. All else concerns the whole console.
+OWN = frozenset(
+    {
+        *("robot", "link_secret", "link_secret_file", "link_tls_cert", "link_tls_key", "link_tls_ca"),
+        *("cameras", "microphones", "whip", "speaker", "relay", "relay_public", "relay_codec", "observers_direct"),
+        *("speed_cap", "seat_timeout", "seat_idle_seconds", "seat_claim_seconds", "observer_feedback_hz"),
+        *("max_peers", "max_relayed", "max_thumbnails", "reserved_places", "scene", "scene_hz", "media", "recording"),
+    }
+)
+# A camera hangs at one robot: given to the whole console, it would show every robot the same.
+NEVER_SHARED = ("cameras", "microphones", "whip", "speaker", "relay")
+
+
+def robot_settings(settings: Settings) -> dict[str, Settings]:
+    """By name, in the order in which they were named; first those of the flag.
+
+    Raises:
+        BadFleet: a name, the file or what it says of a robot is no good.
+    """
+    shared = [name for name in NEVER_SHARED if getattr(settings, name)]
+    if shared:
+        raise BadFleet("setting_of_one_robot", f"{', '.join(shared)}: say in the fleet's file at which robot")
+    named = [(each.name, {"robot": each.address}) for each in parse_robots(settings.robots)]
+    tables = [*named, *_tables(settings).items()]
+    check_names(name for name, _ in tables)
+    if not tables:
+        raise BadFleet("no_robots", f"{settings.fleet_file}: there is no [robots.NAME] in it")
+    common = {name: getattr(settings, name) for name in settings.model_fields_set - {"robots", "fleet_file"}}
+    return {name: _settings(name, common, table) for name, table in tables}
+
+
+def _settings(name: str, common: Mapping[str, Any], table: Mapping[str, Any]) -> Settings:
+    foreign = sorted(set(table) - OWN)
+    if foreign:
+        raise BadFleet("setting_of_the_console", f"robot {name}: {', '.join(foreign)} cannot be set for one robot")
+    if "robot" not in table:
+        raise BadFleet("robot_without_address", f'robot {name}: it needs robot = "tcp://host:port"')
+    try:
+        made = Settings(**{**common, "robots": (), "fleet_file": None, **table})
+    except ValidationError as error:
+        where = ".".join(map(str, error.errors()[0]["loc"])) or "robot"
+        raise BadFleet("bad_setting", f"robot {name}: {where}: {error.errors()[0]['msg']}") from error
+    if made.recording.directory is not None and "recording" not in table:
+        own = made.recording.model_copy(update={"directory": made.recording.directory / name})
+        made = made.model_copy(update={"recording": own})
+    return made
+
+
+def _tables(settings: Settings) -> dict[str, Mapping[str, Any]]:
+    if settings.fleet_file is None:
+        return {}
+    try:
+        content = tomllib.loads(settings.fleet_file.read_text())
+    except (OSError, UnicodeError, tomllib.TOMLDecodeError) as error:
+        raise BadFleet("fleet_unreadable", f"{settings.fleet_file}: {error}") from error
+    tables = content.pop("robots", {})
+    if content or not isinstance(tables, dict) or not all(isinstance(each, dict) for each in tables.values()):
+        raise BadFleet("fleet_unreadable", f"{settings.fleet_file}: a table [robots.NAME] for each robot, nothing else")
+    return tables

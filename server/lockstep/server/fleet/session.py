@@ -1,0 +1,169 @@
+"""One robot of a fleet: its routes, and its session, which is started again when it fails. No other one notices."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+import structlog
+
+from lockstep.server.audit.records import AuditRecord
+from lockstep.server.auth.tokens import Access
+from lockstep.server.composition.robot_app import attach_session, session_app
+from lockstep.server.composition.robot_session import running_session
+from lockstep.server.control.stop_service import SILENCED, StopAnswer, StopOutcome
+from lockstep.server.errors import Silenced
+from lockstep.server.fleet.event_rate import Pulse
+from lockstep.server.fleet.metrics import FleetMetrics
+from lockstep.server.http.static_files import page_router
+from lockstep.server.settings import Settings
+from lockstep.server.state.console_context import ConsoleContext
+from lockstep.server.state.dependencies import Dependencies
+from lockstep.server.stop.stop_keeper import StopKeeper
+from lockstep.server.stop.stop_presses import NewPress, Press
+from lockstep.server.telemetry.log_context import name_robot
+from lockstep.server.telemetry.metrics import Metrics
+from lockstep.server.util.backoff import Backoff
+from lockstep.server.util.state_dir import StateDir
+from lockstep.server.util.uncancelled import attempt
+
+__all__ = ["FleetSession"]
+
+log = structlog.get_logger(__name__)
+
+HEALTHY_AFTER = 30.0  # s that a session lives, then its next failure is answered soon again
+FIRST_WAIT, LONGEST_WAIT = 0.5, 10.0  # s before a session that failed is started again
+
+
+class FleetSession:
+    """Run `run` as a task. The routes answer from the beginning on, by name while there is no session.
+
+    Attributes:
+        app: the robot's routes, to be mounted
+        settled: set when the session was started for the first time, or has failed to
+    """
+
+    def __init__(self, name: str, settings: Settings) -> None:
+        self.name = name
+        self.settings = settings
+        self.pulse = Pulse()
+        self.settled = asyncio.Event()
+        self.app = session_app(settings)
+        self.app.include_router(page_router())
+        attach_session(self.app, None)
+        self._backoff = Backoff(FIRST_WAIT, LONGEST_WAIT)
+        self._stops: StopKeeper | None = None  # None before `run`
+        self._access: Access | None = None
+        self._house: ConsoleContext | None = None
+        self._ended_before = 0  # connections of earlier sessions
+
+    @property
+    def services(self) -> Dependencies | None:
+        """None while the session has failed."""
+        found: Dependencies | None = self.app.state.services
+        return found
+
+    @property
+    def ended(self) -> int:
+        """Connections, ever."""
+        here = self.services
+        return self._ended_before + (0 if here is None else here.console.peers.ended)
+
+    @property
+    def moving(self) -> bool:
+        here = self.services
+        return here is not None and here.console.clock.moving
+
+    @property
+    def access(self) -> Access:
+        """Who may come to this robot; known as long as it runs."""
+        if self._access is None:
+            raise TypeError("the fleet is not running")
+        return self._access
+
+    async def stop(self, press: Press) -> StopAnswer:
+        """What became of it. Without a session the stop is the first that the next one does. Raises Silenced."""
+        here = self.services
+        if here is not None:
+            return await here.stop(press)
+        stops = self._stops
+        if stops is None or self._house is None:
+            raise TypeError("the fleet is not running")
+        if press.by.link and self._house.is_silenced(press.by.link):
+            raise Silenced(SILENCED)
+        stops.presses.forget(press.id)  # nobody knows here whether what it became still holds: the robot says it
+        pressed = stops.presses.press(press)
+        log.warning("stop kept", by=press.by.name, where=press.where, reason=press.reason, robot=self.name)
+        if isinstance(pressed, NewPress) and pressed.replaced is not None:
+            stops.settled(pressed.replaced.id)
+        stops.keep(press)
+        detail = f"the session of this robot has failed; {await stops.kept_words(press.id)}"
+        return StopAnswer(StopOutcome(press.id, None, detail), 0, up=False)
+
+    async def run(
+        self, house: ConsoleContext, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
+    ) -> None:
+        """Until cancelled. `told` hears every record of its audit."""
+        self.app.state.house = self._house = house
+        self._access = house.state.access.at(self.name)
+        stops = self._stops = StopKeeper(directory, self.settings.robot, lasts=house.state.lasts)
+        self.app.state.stop_keeper = self
+        name_robot(self.name)
+        await stops.load()
+        async with asyncio.TaskGroup() as tasks:
+            keeping = tasks.create_task(stops.run(), name=f"kept stops {self.name}")
+            try:
+                await self._live_on(house, directory, metrics, told, stops)
+            finally:
+                keeping.cancel()
+
+    async def _live_on(
+        self,
+        house: ConsoleContext,
+        directory: Path,
+        metrics: FleetMetrics,
+        told: Callable[[str, AuditRecord], None],
+        stops: StopKeeper,
+    ) -> None:
+        """Sessions, one after the other."""
+        loop = asyncio.get_running_loop()
+        while True:
+            since = loop.time()
+            try:
+                await attempt(self._live(house, directory, metrics, told, stops))
+            except Exception:
+                metrics.session_failures.labels(self.name).inc()
+                log.exception("the session of this robot has failed")
+            self.settled.set()
+            if loop.time() - since > HEALTHY_AFTER:
+                self._backoff.healthy()
+            await asyncio.sleep(self._backoff.next())
+
+    async def _live(
+        self,
+        house: ConsoleContext,
+        directory: Path,
+        metrics: FleetMetrics,
+        told: Callable[[str, AuditRecord], None],
+        stops: StopKeeper,
+    ) -> None:
+        own = Metrics(process=False)
+        async with running_session(self.settings, house, own, StateDir(directory), self.name, stops) as made:
+            made.audit.on_record = lambda record: told(self.name, record)
+            attach_session(self.app, made)
+            metrics.watch(self.name, made)
+            self.settled.set()
+            try:
+                await asyncio.Event().wait()
+            finally:
+                self._ended_before = self.ended
+                attach_session(self.app, None)
+                metrics.forget(self.name)
+
+    def look(self, now: float) -> None:
+        """Once a second: how it does."""
+        here = self.services
+        if here is None:
+            self.pulse.look(now, up=False, epoch="", event=1)
+        else:
+            clock = here.console.clock
+            self.pulse.look(now, up=here.console.robot.up, epoch=clock.epoch, event=clock.event)

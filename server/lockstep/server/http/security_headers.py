@@ -1,0 +1,118 @@
+"""Security headers, and the check where a request comes from."""
+
+import re
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from lockstep.server.errors import OriginRefused
+from lockstep.server.http.robot_paths import below_robot
+
+__all__ = ["FILE_POLICY", "PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "check_origin", "scene_policy"]
+
+SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
+
+# The page loads only its own files; its workers may also come from blobs. Styles may be set on elements. A page with a
+# script in it says which: by its hash, in a policy that has this directive alone (`static_files.script_policy`).
+PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; worker-src 'self' blob:; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; media-src 'self' blob:; font-src 'self' data:; connect-src 'self'; "
+    "frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+# What is no document, a script or an answer of the API, loads nothing: a policy of the page's length in front of each
+# would be a twentieth of what a page's opening takes. SVG and what somebody opens by its address keep to it as well.
+FILE_POLICY = "default-src 'none'; frame-ancestors 'none'"
+
+# viser's client is one HTML file: inline script, script made from text, WebAssembly, workers and fonts from data and
+# blob URLs. So it is in an origin of its own that has no storage, no token and no rights (`sandbox` without
+# allow-same-origin), and speaks with its stream alone.
+SCENE_POLICY = (
+    "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; "
+    "worker-src blob: data:; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
+    "connect-src {stream}; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+
+SCRIPTS = "script-src 'self'"
+HASHED_SCRIPTS = re.compile(rf"{SCRIPTS}( 'sha256-[A-Za-z0-9+/]{{43}}=')+")
+HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)  # what may stand in a policy
+
+HEADERS = {
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "SAMEORIGIN",  # for browsers that do not know frame-ancestors
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "X-Permitted-Cross-Domain-Policies": "none",
+}
+# For documents alone (Permissions Policy, 4.1).
+PERMISSIONS = (
+    "gamepad=(self), fullscreen=(self), screen-wake-lock=(self), clipboard-write=(self), autoplay=(self), "
+    "microphone=(self), camera=(), geolocation=(), usb=(), serial=(), hid=(), midi=(), payment=(), "
+    "display-capture=(), browsing-topics=()"
+)
+DOCUMENTS = ("text/html", "application/xhtml+xml")
+HSTS = "max-age=31536000"  # RFC 6797; no sub-domains: they are not ours to decide for
+
+
+class SecurityHeaders:
+    """Adds the headers to every HTTP answer."""
+
+    def __init__(self, app: ASGIApp, lasting_tls: bool = False, relays: tuple[str, ...] = ()) -> None:
+        """`lasting_tls`: a certificate that browsers trust, so that they may insist on TLS from now on.
+
+        `relays`: WebSocket origins that the page connects to besides its own.
+        """
+        self._app = app
+        self._page_policy = PAGE_POLICY.replace("connect-src 'self'", " ".join(("connect-src 'self'", *relays)))
+        self._headers = HEADERS | ({"Strict-Transport-Security": HSTS} if lasting_tls else {})
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        of_scene = below_robot(scope["path"]).startswith("/scene/")
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                own = headers.get("Content-Security-Policy", "")
+                is_document = headers.get("content-type", "").startswith(DOCUMENTS)
+                policy = self._policy_with(own) if is_document else FILE_POLICY
+                headers["Content-Security-Policy"] = scene_policy(scope) if of_scene else policy
+                if is_document:
+                    headers["Permissions-Policy"] = PERMISSIONS
+                for name, value in self._headers.items():
+                    headers[name] = value
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
+
+    def _policy_with(self, scripts: str) -> str:
+        """The page's policy, with the hashes of the scripts that stand in it."""
+        return self._page_policy.replace(SCRIPTS, scripts) if HASHED_SCRIPTS.fullmatch(scripts) else self._page_policy
+
+
+def scene_policy(scope: Scope) -> str:
+    """That of the 3D scene; its stream is where its page came from."""
+    host = Headers(scope=scope).get("host", "")
+    scheme = "wss" if scope["scheme"] == "https" else "ws"
+    return SCENE_POLICY.format(stream=f"{scheme}://{host}" if HOST.fullmatch(host) else "'none'")
+
+
+def check_origin(headers: Headers, allowed: tuple[str, ...]) -> None:
+    """A browser says which page a request comes from; only our own pages and the allowed ones may change anything.
+
+    Raises:
+        OriginRefused: another site's page.
+    """
+    origin = headers.get("origin")
+    if origin is None or origin in allowed:
+        return  # not a browser, or a friend
+    try:
+        site = urlsplit(origin).netloc
+    except ValueError as error:  # "http://["
+        raise OriginRefused("the Origin header is not valid") from error
+    if site != headers.get("host"):
+        raise OriginRefused("requests from pages of other sites are refused")

@@ -1,0 +1,134 @@
+"""Takes connections off a listening socket: each is counted before anything is spent on it, TLS or a request."""
+
+import asyncio
+import errno
+import socket
+import ssl
+from collections.abc import Callable
+
+from lockstep.server.http.transport.client_address import counted_address
+from lockstep.server.http.transport.connection_places import ConnectionPlaces, Place
+from lockstep.server.util.fair_queue import FairQueue
+
+__all__ = ["PROXIES", "Acceptor", "PlacedProtocol"]
+
+# Whose X-Forwarded-For is believed: uvicorn's default, and how IPv4 looks to a socket of both families.
+PROXIES = frozenset({"127.0.0.1", "::1", "::ffff:127.0.0.1"})
+HANDSHAKE_SECONDS = 5.0  # for TLS
+PAUSE = 0.1  # s, when there is no descriptor left
+LOOK_AGAIN = 0.02  # s, when all places are taken by who has just come
+
+
+class PlacedProtocol(asyncio.Protocol):
+    """A connection's protocol that knows its place."""
+
+    place: Place
+
+
+class Acceptor:
+    """Run `run` as a task."""
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        places: ConnectionPlaces,
+        turns: FairQueue,
+        make_protocol: Callable[[], PlacedProtocol],
+        tls: ssl.SSLContext | None,
+    ) -> None:
+        """`turns`: in which connections begin; what they send has its turns too."""
+        self._listener = listener
+        self._places = places
+        self._turns = turns
+        self._make_protocol = make_protocol
+        self._tls = tls
+
+    async def run(self) -> None:
+        """Until cancelled; connections that have begun by then go on.
+
+        Each has its turn before the next one is accepted: the others wait in the kernel, where they cost nothing and
+        where the newest cannot push out one that has not begun, or has had no time to speak. However many strangers'
+        requests wait, it has its turn: somebody who comes to say STOP is a stranger until the connection has begun.
+        """
+        loop = asyncio.get_running_loop()
+        async with asyncio.TaskGroup() as tasks:
+            while True:
+                try:
+                    connection, address = await loop.sock_accept(self._listener)
+                except OSError as error:
+                    if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM):
+                        self._places.on_refused("no_descriptors")
+                        await asyncio.sleep(PAUSE)
+                    else:
+                        await asyncio.sleep(0)  # it was gone before it was accepted
+                    continue
+                try:
+                    await self._turns.begin()
+                    await self._until_there_is_room()
+                except BaseException:
+                    connection.close()
+                    raise
+                _Beginning(self, connection, str(address[0]), tasks)
+
+    async def _until_there_is_room(self) -> None:
+        """Or until whoever has to go has had the time to speak."""
+        loop = asyncio.get_running_loop()
+        while True:
+            wait = self._places.wait(loop.time())
+            if wait <= 0:
+                return
+            await asyncio.sleep(min(wait, LOOK_AGAIN))
+
+    def protocol_at(self, place: Place) -> PlacedProtocol:
+        protocol = self._make_protocol()
+        protocol.place = place
+        return protocol
+
+    async def connect(self, connection: socket.socket, protocol: PlacedProtocol) -> None:
+        """Through the handshake, if there is one; asyncio closes what ends there. Raises OSError or TimeoutError."""
+        await asyncio.get_running_loop().connect_accepted_socket(
+            lambda: protocol,
+            connection,
+            ssl=self._tls,
+            ssl_handshake_timeout=None if self._tls is None else HANDSHAKE_SECONDS,
+        )
+
+    @property
+    def places(self) -> ConnectionPlaces:
+        return self._places
+
+
+class _Beginning:
+    """A connection that has no protocol yet: it can be closed all the same."""
+
+    def __init__(self, acceptor: Acceptor, connection: socket.socket, address: str, tasks: asyncio.TaskGroup) -> None:
+        self._acceptor = acceptor
+        self._connection = connection
+        now, proxy = asyncio.get_running_loop().time(), address in PROXIES
+        self._place = acceptor.places.enter(counted_address(address), self._close, now, proxy=proxy)
+        self._task: asyncio.Task[None] | None = None
+        if self._place.group is None:
+            connection.close()
+        else:
+            self._task = tasks.create_task(self._begin(), name="connection")
+
+    def _close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+
+    async def _begin(self) -> None:
+        loop, connected, handed_over = asyncio.get_running_loop(), False, False
+        try:
+            protocol = self._acceptor.protocol_at(self._place)
+            handed_over = True
+            await self._acceptor.connect(self._connection, protocol)
+            connected = True
+        except (OSError, TimeoutError):
+            self._acceptor.places.on_refused("no_handshake")
+        except Exception as error:
+            loop.call_exception_handler({"message": "a connection could not begin", "exception": error})
+        finally:
+            if not handed_over:
+                self._connection.close()
+            if not connected:
+                self._acceptor.places.leave(self._place)

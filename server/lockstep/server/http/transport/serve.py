@@ -1,0 +1,162 @@
+"""Runs the app on uvicorn, and says when it is ready."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from typing import Any, cast
+
+import uvicorn
+from starlette.applications import Starlette
+
+from lockstep.server.http.transport.acceptor import PROXIES, Acceptor, PlacedProtocol
+from lockstep.server.http.transport.tls import Certificate
+from lockstep.server.http.transport.uvicorn_http_limits import GuardedConnections
+from lockstep.server.http.transport.uvicorn_websocket_limits import GuardedWebSocket
+
+__all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
+
+BACKLOG = 1024  # connections that wait to be accepted, a flood of them before somebody's STOP
+SHUTDOWN_TIMEOUT = 3  # s for HTTP requests under way
+MAX_HEAD = 16 * 1024  # bytes of a request's head
+MAX_WEBSOCKET_MESSAGE = 64 * 1024  # bytes from a viewer of the scene, or from a watcher
+
+
+class PortTaken(Exception):
+    def __init__(self, host: str, port: int, reason: str) -> None:
+        super().__init__(host, port, reason)
+        self.host = host
+        self.port = port
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"cannot listen on {self.host}:{self.port}: {self.reason}"
+
+
+def bind(host: str, port: int) -> socket.socket:
+    """A listening socket; port 0 takes any free one.
+
+    Raises:
+        PortTaken: somebody else has it, or the address is not ours.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise PortTaken(host, port, error.strerror or str(error)) from error
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(BACKLOG)
+        listener.setblocking(False)
+    except OSError as error:
+        listener.close()
+        raise PortTaken(host, port, error.strerror or str(error)) from error
+    return listener
+
+
+class _Server(uvicorn.Server):
+    """Says when it is ready, and leaves the signals to its caller."""
+
+    def __init__(self, config: uvicorn.Config, guarded: GuardedConnections | None, listener: socket.socket) -> None:
+        super().__init__(config)
+        self.settled = asyncio.Event()  # it answers, or it has failed
+        self._guarded = guarded
+        self._listener = listener
+        self._accepting: asyncio.Task[None] | None = None
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        try:
+            await super().startup(sockets if self._guarded is None else [])
+            if self._guarded is not None and not self.should_exit:
+                self._accept(self._guarded)
+        finally:
+            self.settled.set()
+
+    def _accept(self, guarded: GuardedConnections) -> None:
+        """Uvicorn's own way takes any number of connections, and does a TLS handshake before it tells anybody."""
+        loop = asyncio.get_running_loop()
+
+        def make_protocol() -> PlacedProtocol:
+            config: Any = self.config
+            return cast(
+                PlacedProtocol,
+                config.http_protocol_class(
+                    config=config, server_state=self.server_state, app_state=self.lifespan.state, _loop=loop
+                ),
+            )
+
+        acceptor = Acceptor(self._listener, guarded.places, guarded.turns, make_protocol, self.config.ssl)
+        self._accepting = loop.create_task(acceptor.run(), name="accept")
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        if self._accepting is not None:
+            self._accepting.cancel()
+            await asyncio.gather(self._accepting, return_exceptions=True)
+        await super().shutdown(sockets)
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+@asynccontextmanager
+async def running(
+    app: Starlette,
+    listener: socket.socket,
+    *,
+    http: GuardedConnections | None = None,
+    tls: Certificate | None = None,
+) -> AsyncIterator[None]:
+    """While entered, `app` answers on `listener`; on leaving it shuts down gracefully.
+
+    Args:
+        http: its connections, within bounds; None: uvicorn's own, without
+        tls: what it encrypts with; None: nothing is encrypted
+    """
+    config = uvicorn.Config(
+        app,
+        access_log=False,  # a path can hold a ticket
+        log_level="error",  # uvicorn warns of every request that is not HTTP; we count them
+        lifespan="on",
+        ws=GuardedWebSocket,
+        ws_max_size=MAX_WEBSOCKET_MESSAGE,
+        forwarded_allow_ips=os.environ.get("FORWARDED_ALLOW_IPS") or sorted(PROXIES),
+        timeout_graceful_shutdown=SHUTDOWN_TIMEOUT,
+        server_header=False,
+        http="h11" if http is None else http.protocol,
+        h11_max_incomplete_event_size=MAX_HEAD,
+        ssl_certfile=None if tls is None else tls.chain,
+        ssl_keyfile=None if tls is None else tls.key,
+    )
+    server = _Server(config, http, listener)
+    serving = asyncio.get_running_loop().create_task(server.serve([listener]), name="http")
+    try:
+        settled = asyncio.get_running_loop().create_task(server.settled.wait())
+        await asyncio.wait((serving, settled), return_when=asyncio.FIRST_COMPLETED)
+        settled.cancel()
+        if not server.started:
+            await serving
+            raise RuntimeError("the console did not start")
+        yield
+    finally:
+        server.should_exit = True
+        await serving
+
+
+async def wait_for_signal() -> None:
+    """Until SIGINT, SIGTERM, or the end of the terminal unless that is ignored (`nohup`)."""
+    loop, asked = asyncio.get_running_loop(), asyncio.Event()
+    signals = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signals.append(signal.SIGHUP)
+    for number in signals:
+        loop.add_signal_handler(number, asked.set)
+    try:
+        await asked.wait()
+    finally:
+        for number in signals:
+            loop.remove_signal_handler(number)

@@ -1,0 +1,174 @@
+"""HTTP connections with bounds: what each sends has its turn, and one deadline holds for all of an exchange.
+
+uvicorn bounds the size of a head and the time between two requests. It waits for ever for the rest of a request that
+has begun and for a client that does not read its answer, and handles whatever has come at once.
+"""
+
+import asyncio
+import re
+from typing import NamedTuple
+
+import h11
+from starlette.applications import Starlette
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from lockstep.server.auth.known_tokens import KnownTokens
+from lockstep.server.http.limit_settings import LimitSettings
+from lockstep.server.http.transport.acceptor import PlacedProtocol
+from lockstep.server.http.transport.connection_places import ConnectionPlaces, Place
+from lockstep.server.util.fair_queue import FairQueue
+from lockstep.server.util.rate_limits import RateLimits
+from lockstep.server.util.token_bucket import TokenBucket
+
+__all__ = ["DEADLINE", "PLACE", "GuardedConnections", "guarded_by", "guarded_http"]
+
+DEADLINE, PLACE = "request_deadline", "place"  # keys of a request's `state`
+GRACE = 1.0  # s after the deadline, in which the answer that says so may leave
+LEAST_READ = 16 * 1024  # bytes of an answer that a client reads within the time of a request
+LINK_RATE, LINK_BURST = 50.0, 300  # Hz, of what one link sends before all others; a page that loads takes some thirty
+STOP_RATE, STOP_BURST = 50.0, 100  # the same for its stops, apart
+STOP = re.compile(rb"POST [!-~]{0,500}/api/(?:fleet/)?stop[ ?]")
+BEARER = re.compile(rb"\r\nauthorization:[ \t]*bearer[ \t]+([!-~]{1,4096})[ \t]*\r\n", re.IGNORECASE)
+
+
+class GuardedConnections(NamedTuple):
+    """What `lockstep.server.http.transport.serve.running` needs to take connections within bounds."""
+
+    protocol: type[PlacedProtocol]
+    places: ConnectionPlaces
+    turns: FairQueue
+
+
+def guarded_http(
+    places: ConnectionPlaces, turns: FairQueue, tokens: KnownTokens, seconds: float
+) -> type[PlacedProtocol]:
+    """uvicorn's protocol within bounds. `seconds`: for a whole request, and for each part of its answer."""
+    budgets = {True: RateLimits(STOP_RATE, STOP_BURST), False: RateLimits(LINK_RATE, LINK_BURST)}  # whether of stops
+
+    class GuardedHttp(H11Protocol, PlacedProtocol):
+        place: Place
+        _timer: asyncio.TimerHandle | None = None
+        _asked = False  # for a turn
+        _read = True  # whether the client has read something of its answer since it was looked at
+        _unread = 0  # bytes, when it was looked at
+        _upgraded = False
+        _awaited = True  # a whole request, or the rest of one
+        _is_stop = False  # the request that is coming
+
+        def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+            super().connection_made(transport)
+            self._arrived = bytearray()
+            self.app_state = {**self.app_state, PLACE: self.place}
+            self.place.close = transport.abort
+            if self.place.group is None:  # it was taken away in the handshake
+                transport.abort()
+                return
+            self._begin()
+
+        def data_received(self, data: bytes) -> None:
+            self._arrived += data
+            if not self._asked:
+                self._asked = True
+                self.transport.pause_reading()
+                known = self._known()
+                first = bool(known) and budgets[self._is_stop].spend(known, self.loop.time())
+                turns.ask(known or self.place.address, self._take, first=first)
+
+        def _known(self) -> str:
+            """The good token, or the link, that brings what has come; "": a stranger does."""
+            if self.conn.their_state is not h11.IDLE:
+                return self.place.link
+            self._is_stop = STOP.match(self._arrived) is not None
+            found = BEARER.search(self._arrived)
+            token = "" if found is None else found[1].decode("ascii")
+            return token if token in tokens else ""
+
+        def _take(self) -> None:
+            """In its turn: what has come so far."""
+            self._asked = False
+            if self.transport.is_closing():
+                return
+            data, self._arrived = bytes(self._arrived), bytearray()
+            if not self._awaited and self.conn.their_state is h11.IDLE:
+                self._begin()
+            try:
+                super().data_received(data)
+            except BaseException:
+                self.transport.abort()
+                raise
+            if self._upgraded or not self.flow.read_paused:
+                self.transport.resume_reading()
+
+        def send_400_response(self, msg: str) -> None:
+            places.on_refused("bad_request")
+            if self.cycle is not None and not self.cycle.response_complete:
+                self.cycle.disconnected = True  # what the app still answers goes nowhere; a stop is one all the same
+                self.cycle.message_event.set()
+            if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+                super().send_400_response(msg)
+            else:  # it has been answered already
+                self.transport.abort()
+
+        def resume_writing(self) -> None:
+            self._read = True
+            super().resume_writing()
+
+        def connection_lost(self, exc: Exception | None) -> None:
+            self._leave()
+            super().connection_lost(exc)
+
+        def handle_websocket_upgrade(self, event: h11.Request) -> None:
+            self._leave()  # from here on another protocol has the connection; viewers are bounded by themselves
+            self._upgraded = True
+            self.app_state = {key: value for key, value in self.app_state.items() if key != PLACE}
+            super().handle_websocket_upgrade(event)
+
+        def on_response_complete(self) -> None:
+            super().on_response_complete()
+            self._awaited = self.conn.their_state is h11.SEND_BODY  # else uvicorn's own timer runs, until the next one
+            if self._awaited and self.loop.time() >= self.app_state[DEADLINE]:
+                self.transport.close()  # the answer was given without the rest of the body, and says or counts so
+
+        def _begin(self) -> None:
+            """An exchange: from its first byte, or from the connection on."""
+            self._awaited = True
+            self.app_state[DEADLINE] = self.loop.time() + seconds
+            if self._timer is not None:
+                self._timer.cancel()
+            self._look_again(seconds)
+
+        def _look_again(self, after: float) -> None:
+            self._timer = self.loop.call_later(after, self._look)
+
+        def _look(self) -> None:
+            self._timer = None
+            now, unread = self.loop.time(), self.transport.get_write_buffer_size()
+            if self.conn.their_state is h11.SEND_BODY and now < self.app_state[DEADLINE] + GRACE:
+                self._look_again(GRACE)  # whoever waits for the body says by name that it did not come
+            elif self._awaited and self.conn.their_state in (h11.IDLE, h11.SEND_BODY):
+                self._end("too_slow")
+            elif unread and not self._read and unread > self._unread - LEAST_READ:
+                self._end("does_not_read")
+            else:
+                self._read, self._unread = False, unread
+                self._look_again(seconds)
+
+        def _end(self, why: str) -> None:
+            places.on_refused(why)
+            self.transport.abort()
+
+        def _leave(self) -> None:
+            if self._timer is not None:
+                self._timer.cancel()
+                self._timer = None
+            places.leave(self.place)
+
+    return GuardedHttp
+
+
+def guarded_by(settings: LimitSettings, app: Starlette) -> GuardedConnections:
+    """Connections within the settings' bounds to an app that `guard_app` has seen."""
+    places: ConnectionPlaces = app.state.connection_places
+    turns = FairQueue(lambda now: TokenBucket(settings.max_stranger_rate, settings.max_stranger_burst, now))
+    protocol = guarded_http(places, turns, app.state.known_tokens, settings.request_timeout)
+    return GuardedConnections(protocol, places, turns)

@@ -1,0 +1,102 @@
+"""WebSocket connections with bounds that uvicorn does not have: control frames, fragments, and how long an end takes.
+
+Whoever sends pings and reads no answers would fill the write buffer; whoever sends empty fragments, the list of them;
+whoever reads nothing would keep a connection that has ended.
+"""
+
+import asyncio
+import socket
+
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import Frame
+from websockets.http11 import Request
+
+from lockstep.server.http.robot_paths import below_robot
+from lockstep.server.util.token_bucket import TokenBucket
+
+__all__ = ["LINES", "TOO_MANY_FRAMES", "GuardedWebSocket"]
+
+LINES = "/watch/"  # paths of observers' lines (server/lockstep/server/routes/observer_websocket.py)
+LINE_BUFFER = 64 * 1024  # bytes that the kernel keeps for one that does not read; Linux doubles it
+CONTROL_RATE, CONTROL_BURST = 5.0, 50.0  # Hz, of pings and pongs
+MAX_FRAGMENTS = 64  # of one message
+GOODBYE_SECONDS = 3.0  # from our end of a connection to its loss
+TOO_MANY_FRAMES = 1008  # RFC 6455 7.4.1
+NOT_UTF8 = 1007
+
+
+class GuardedWebSocket(WebSocketsSansIOProtocol):
+    _goodbye: asyncio.TimerHandle | None = None
+    _control: TokenBucket | None = None
+
+    def handle_connect(self, event: Request) -> None:
+        if below_robot(event.path).startswith(LINES):
+            # Short messages now and then: a compressor for each would cost more than it saves.
+            self.conn.available_extensions = []
+            connected = self.transport.get_extra_info("socket")
+            if connected is not None:
+                connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, LINE_BUFFER)
+        super().handle_connect(event)
+
+    def handle_ping(self) -> None:
+        if self._too_many_control_frames():
+            self._refuse(TOO_MANY_FRAMES, "too many frames")
+        else:
+            super().handle_ping()
+
+    def handle_pong(self, event: Frame) -> None:
+        if self._too_many_control_frames():
+            self._refuse(TOO_MANY_FRAMES, "too many frames")
+        else:
+            super().handle_pong(event)
+
+    def handle_cont(self, event: Frame) -> None:
+        if len(self.frames) >= MAX_FRAGMENTS:
+            self._refuse(TOO_MANY_FRAMES, "too many fragments")
+        else:
+            super().handle_cont(event)
+
+    def send_receive_event_to_app(self) -> None:
+        if self.curr_msg_data_type == "text" and not _is_utf8(b"".join(self.frames)):
+            self._refuse(NOT_UTF8, "not UTF-8")
+        else:
+            super().send_receive_event_to_app()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self._goodbye is not None:
+            self._goodbye.cancel()
+        super().connection_lost(exc)
+
+    async def run_asgi(self) -> None:
+        try:
+            await super().run_asgi()
+        finally:
+            if not self.disconnected:
+                self._drop_soon()
+
+    def _too_many_control_frames(self) -> bool:
+        now = self.loop.time()
+        if self._control is None:
+            self._control = TokenBucket(CONTROL_RATE, CONTROL_BURST, now)
+        return not self._control.take(now)
+
+    def _refuse(self, code: int, reason: str) -> None:
+        """What came with it already is not looked at."""
+        if not self.close_sent and not self.transport.is_closing():
+            self.frames = []
+            self.conn.fail(code, reason)
+            self.handle_parser_exception()
+            self._drop_soon()
+
+    def _drop_soon(self) -> None:
+        """Who does not read keeps nothing."""
+        if self._goodbye is None:
+            self._goodbye = self.loop.call_later(GOODBYE_SECONDS, self.transport.abort)
+
+
+def _is_utf8(data: bytes) -> bool:
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return False
+    return True

@@ -1,0 +1,1 @@
+"""Encoders, and what their output looks like on the wire."""

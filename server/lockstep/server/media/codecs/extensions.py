@@ -1,0 +1,32 @@
+"""RTP header extensions of what the console sends (RFC 8285): which of an offer's are answered."""
+
+from collections.abc import Collection
+
+from lockstep.protocol.carriers import CAPTURE_TIME_URI, EVENT_REFERENCE_URI, PLAYOUT_DELAY_URI, Carrier
+from lockstep.rtc.rtp.extensions import ABS_SEND_TIME_URI
+from lockstep.rtc.sdp import MID_URI
+
+__all__ = ["choose_carrier", "wanted_uris"]
+
+
+def choose_carrier(offered: Collection[str], trailer: bool) -> Carrier:
+    """How the stamp travels to a peer that offers the extensions `offered` (URIs)."""
+    if trailer:
+        return "trailer"
+    if EVENT_REFERENCE_URI in offered:
+        return "native"
+    if CAPTURE_TIME_URI in offered:
+        return "capture-time"
+    return "none"
+
+
+def wanted_uris(kind: str, carrier: Carrier) -> tuple[str, ...]:
+    """Extensions that are answered if they are offered; all others are declined."""
+    uris = [MID_URI]
+    if kind == "video":
+        uris += [PLAYOUT_DELAY_URI, ABS_SEND_TIME_URI]
+    if carrier == "native":
+        uris.append(EVENT_REFERENCE_URI)
+    elif carrier == "capture-time":
+        uris.append(CAPTURE_TIME_URI)
+    return tuple(uris)

@@ -1,0 +1,262 @@
+"""One camera or microphone: what is common to both."""
+
+import asyncio
+import logging
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Generic, Literal, TypeVar
+
+from lockstep.protocol.messages import Media
+from lockstep.protocol.serial import event_gap
+from lockstep.robot_bridge.thread_name import name_thread
+from lockstep.server.media.errors import MediaError
+from lockstep.server.media.metrics import MediaMetrics
+from lockstep.server.media.pipeline.encoding_layer import EncodingLayer
+from lockstep.server.media.pipeline.fanout import FanOut
+from lockstep.server.media.pipeline.frame import EncodedFrame
+from lockstep.server.media.pipeline.keyframes import KeyframeScheduler
+from lockstep.server.media.pipeline.recorded_layer import RecordedLayer
+from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
+from lockstep.server.media.settings import MediaSettings
+from lockstep.server.media.subscription import Subscription
+from lockstep.server.util.cooperative_scheduler import CooperativeScheduler, turns_of_loop
+from lockstep.server.util.token_bucket import TokenBucket
+
+__all__ = ["Encoded", "Stream"]
+
+logger = logging.getLogger(__name__)
+
+MAX_RATE = 240.0  # Hz, of media of one stream; what is made of each costs the loop that all robots share
+MAX_AT_ONCE = 240.0  # of them, after a network that has held them back
+
+Job = TypeVar("Job")
+
+
+class Encoded:
+    """What the worker made for one output."""
+
+    __slots__ = ("error", "frames", "output", "seconds", "whole")
+
+    def __init__(
+        self,
+        output: EncodingLayer,
+        frames: Sequence[EncodedFrame],
+        seconds: float,
+        error: MediaError | None = None,
+        *,
+        whole: bool = True,
+    ) -> None:
+        self.output = output
+        self.frames = frames
+        self.seconds = seconds
+        self.error = error
+        self.whole = whole  # False: the worker keeps some of what it took for the next frame
+
+
+class Stream(ABC, Generic[Job]):
+    """Feeds one worker thread and hands what it encodes to the fan-out.
+
+    `feed` and everything but `_work` run on the event loop; `_work` alone touches decoders and encoders.
+    """
+
+    kind: Literal["video", "audio"]
+    codecs: tuple[str, ...]
+
+    def __init__(self, name: str, label: str, settings: MediaSettings, fan_out: FanOut, metrics: MediaMetrics) -> None:
+        self.name = name
+        self.label = label
+        self._settings = settings
+        self._fan_out = fan_out
+        self._metrics = metrics
+        self._last_stamp: int | None = None
+        self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE, 0.0)
+        self._reported = False  # that the worker failed
+        self._works = False  # the worker
+        self._turns: CooperativeScheduler | None = None  # None: not running
+        self._thread = ThreadPoolExecutor(
+            1, thread_name_prefix=f"media-{name}", initializer=name_thread, initargs=(f"media-{name}",)
+        )
+        self._peers = metrics.peers.labels(name)
+        self._frames_in = metrics.frames_in.labels(name)
+        self._outputs: dict[tuple[str, PictureTier], EncodingLayer] = {}
+        self._members: dict[Subscription, None] = {}  # an ordered set
+        self._recorded: RecordedLayer | None = None  # None: nothing is recorded
+
+    @property
+    def full_plan(self) -> EncodingTarget:
+        """The best that a tier can get."""
+        return EncodingTarget(self._settings.video_bitrate_bps, 1.0)
+
+    @property
+    def outputs(self) -> Mapping[tuple[str, PictureTier], EncodingLayer]:
+        """By codec and tier, as far as they exist."""
+        return self._outputs
+
+    @property
+    def passed(self) -> EncodingLayer | None:
+        """What goes on as its source encoded it, while it gives something that can; None for most."""
+        return None
+
+    def record(self, recorded: RecordedLayer | None) -> None:
+        """Hand what `recorded` chooses to it from now on; None: no more."""
+        if self._recorded is not None:
+            self._recorded.close()
+        self._recorded = recorded
+
+    def record_keyframe(self) -> None:
+        """The recording begins a new file."""
+        if self._recorded is not None:
+            self._recorded.request_keyframe()
+
+    def output(self, codec: str, tier: PictureTier) -> EncodingLayer:
+        """Made when it is first asked for; it costs nothing while nobody is in it."""
+        found = self._outputs.get((codec, tier))
+        if found is None:
+            settings = self._settings
+            keyframes = KeyframeScheduler(settings.keyframe_interval_seconds, settings.keyframe_spacing_seconds)
+            found = EncodingLayer(self.name, codec, tier, self.full_plan, keyframes, self._metrics)
+            self._outputs[codec, tier] = found
+        return found
+
+    def codec_in_use(self, wanted: str = "") -> str:
+        """`wanted` if it can be had; else one that is encoded already for peers, the best one if there is none."""
+        if wanted in self.codecs:
+            return wanted
+        return next((output.codec for output in self._outputs.values() if output.targets), self.codecs[0])
+
+    def outputs_of(self, tier: PictureTier) -> list[EncodingLayer]:
+        """Of all codecs, as far as they exist."""
+        return [output for output in self._outputs.values() if output.tier == tier]
+
+    def join(self, codec: str, target: Subscription, tier: PictureTier = "operator") -> None:
+        self.output(codec, tier).join(target)
+        self._members[target] = None
+        self._peers.inc()
+
+    def move(self, codec: str, target: Subscription, tier: PictureTier) -> None:
+        """Give `target` another tier, from that one's next keyframe on. Nothing for who is not here, or there already.
+
+        One that changes its mind on the way stays where it is.
+        """
+        if target not in self._members:
+            return
+        source = next((each for each in self._outputs.values() if target in each.targets), None)
+        for each in self._outputs.values():
+            each.arriving.pop(target, None)
+        if source is not None and source.tier != tier:
+            self.output(codec, tier).expect(target, source)
+
+    def request_keyframe(self, codec: str, target: Subscription, cause: str) -> None:
+        """For `target`; see `EncodingLayer.request_keyframe`."""
+        for output in self._outputs.values():
+            if target in output.targets:
+                output.request_keyframe(cause)
+
+    def leave(self, target: Subscription) -> None:
+        """Idempotent."""
+        if target in self._members:
+            del self._members[target]
+            self._peers.dec()
+        for output in self._outputs.values():
+            output.leave(target)
+        self._fan_out.forget(target)
+
+    def feed(self, media: Media, now: float, capture_time: float) -> None:
+        """Take a medium. `capture_time` is in s since 1970."""
+        self._frames_in.inc()
+        if not self._rate.take(now):
+            self._drop("too_often")
+            return
+        # Without one, none that builds on it could be decoded; an older stamp than the last is no lie.
+        in_order = media.codec == "h264" or self._last_stamp is None
+        if not in_order and event_gap(media.stamp, self._last_stamp or media.stamp) < 0:
+            self._drop("stale_stamp")
+            return
+        self._last_stamp = media.stamp
+        if self._recorded is not None:
+            self._recorded.choose(self)
+        if self._members or self._recorded is not None or media.codec == "h264":  # the next keyframe may be far
+            self._enqueue(media, now, capture_time)
+
+    def _drop(self, stage: str, count: int = 1) -> None:
+        self._metrics.dropped.labels(self.name, stage).inc(count)
+
+    def _publish(self, output: EncodingLayer, frame: EncodedFrame) -> None:
+        output.count(frame)
+        self._admit(output, frame)
+        self._fan_out.publish(frame, output.targets)
+        if self._recorded is not None:
+            self._recorded.published(self.name, output, frame)
+
+    def _admit(self, output: EncodingLayer, frame: EncodedFrame) -> None:
+        """Let those who come from another tier begin with this frame, if they can."""
+        if frame.keyframe and output.arriving:
+            output.arrive()
+
+    async def run(self) -> None:
+        """Encode until cancelled."""
+        self._turns = turns_of_loop()
+        try:
+            self._begin_next()
+            await asyncio.get_running_loop().create_future()
+        finally:
+            self._turns = None
+            await asyncio.to_thread(self._thread.shutdown)
+
+    def _begin_next(self) -> None:
+        """Give the worker what it does next, unless it has something to do."""
+        if self._turns is not None and not self._works and (job := self._next_job()) is not None:
+            self._works = True
+            self._thread.submit(self._work_and_tell, job, self._turns)
+
+    def _work_and_tell(self, job: Job, turns: CooperativeScheduler) -> None:
+        """In the thread. What it made goes out at once: it does not wait for a task to have its turn."""
+        try:
+            tell = partial(self._worked, self._work(job))
+        except Exception as error:  # a codec library did what it never should; the stream must go on
+            tell = partial(self._worked, (), error)
+        turns.call_from_thread(tell)
+
+    def _worked(self, results: Sequence[Encoded], error: Exception | None = None) -> None:
+        self._works = False
+        if self._turns is None:  # ended meanwhile
+            return
+        try:
+            if error is not None:
+                self._failed(error)
+            for encoded in results:
+                self._finish(encoded)
+        finally:
+            self._begin_next()
+
+    def _failed(self, error: Exception) -> None:
+        if not self._reported:
+            text = "stream %s: the worker failed; further failures are only counted"
+            logger.error(text, self.name, exc_info=error)
+        self._reported = True
+        self._drop("worker_failed")
+        for output in self._outputs.values():
+            output.keyframes.request()
+
+    def _finish(self, encoded: Encoded) -> None:
+        if encoded.error is not None:
+            self._drop(encoded.error.name)
+            encoded.output.keyframes.request()  # it may have been a keyframe that somebody waits for
+        else:
+            encoded.output.encode_seconds.observe(encoded.seconds)
+        for frame in encoded.frames:
+            self._publish(encoded.output, frame)
+
+    @abstractmethod
+    def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
+        """Keep a medium for the worker; never blocks."""
+
+    @abstractmethod
+    def _next_job(self) -> Job | None:
+        """What the worker does next, decided now; None when there is nothing."""
+
+    @abstractmethod
+    def _work(self, job: Job) -> list[Encoded]:
+        """Runs in the stream's thread. Raises nothing: errors of media come back as results."""

@@ -1,0 +1,35 @@
+"""What `--whip` says: a camera of the console's own that somebody publishes. No I/O.
+
+`NAME[#option=value,option=value]`, as in `phone#label=Ann%27s%20phone,latency=0.4`.
+"""
+
+from collections.abc import Iterable
+
+from lockstep.server.media.sources.source_url import NAME, BadSource, SourceSpec, parse_source
+
+__all__ = ["SCHEME", "parse_published"]
+
+SCHEME = "whip"
+LATENCY = 0.3  # s from capture until the quickest picture leaves the publisher
+MOST = 4  # cameras to publish to
+
+
+def parse_published(texts: Iterable[str]) -> tuple[SourceSpec, ...]:
+    """Each with a name of its own.
+
+    Raises:
+        BadSource: one cannot be meant like this.
+    """
+    given = list(texts)
+    if len(given) > MOST:
+        raise BadSource(f"more than {MOST}")
+    found: list[SourceSpec] = []
+    for text in given:
+        name, _, options = text.strip().partition("#")
+        if not NAME.fullmatch(name):
+            raise BadSource(f"{name[:40]!r} is no name: letters, digits, - and _, at most 32, the first a letter")
+        if name in (each.name for each in found):
+            raise BadSource(f"{name} is the name of another one")
+        spec = parse_source("video", f"{name}={SCHEME}://publisher#latency={LATENCY}{',' if options else ''}{options}")
+        found.append(spec._replace(passing=False))
+    return tuple(found)

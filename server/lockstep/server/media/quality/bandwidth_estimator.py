@@ -1,0 +1,288 @@
+"""How many bits per second of pictures one peer's path is given: the core of the quality controller. No I/O.
+
+The rules, looked at ten times a second; the first that holds decides. Between two decreases lies the time that the
+first needs to show: the round trip and half a second.
+
+| when | the rate becomes | reason |
+|---|---|---|
+| pictures leave and nothing was heard for 2 s (at first 5 s) and a round trip | 70 %, every second | no feedback |
+| round trips grew beyond their spread | 85 % of what it carries, after a pause | round trip |
+| the peer's estimate fell, and a queue, loss or the gap confirms it | the estimate | bandwidth |
+| the gap nears the tolerance and was smaller before, in two reports running | 80 % | gap |
+| more than 10 % is lost | by half the loss; without a queue not below half of what it was | loss |
+| 2 to 10 % is lost, or the estimate fell, or a queue begins, or the console itself is late | stays | |
+| nothing of this for a second, the rate is used, and something was heard since the last increase | see below | |
+
+The pause is as long as the queue, a second at most: meanwhile the pictures that wait in it arrive, and the next one
+finds an empty path.
+
+Increase: by 35 % every second until the first limit was met; after that 12 % a second up to 85 % of the
+last limit, and 4 % beyond. What was lost to silence comes back at once, by half.
+
+What a decrease does not cure is not caused by the rate: when three of them did not shorten the round trips by a fifth,
+and nothing is lost, the path has become longer and its new length counts; when two did not narrow the gap, the gap is
+left alone for half a minute; loss without a queue costs half the rate at most, and loss as usual nothing. A rate that
+an undemanding picture does not use is not raised, and not lowered either.
+
+In the words of RFC 8836: round trips and the receiver's own delay-based estimate (REMB, which Chromium and aiortc make
+from abs-send-time) detect the standing queue, loss is only its last resort, and "no feedback" is its circuit breaker
+(RFC 8083 asks for one). Ours is what makes it an operator's: the gap in events, which is what the person can bear.
+"""
+
+from typing import Literal, NamedTuple
+
+from lockstep.server.media.quality.loss_window import LossWindow
+from lockstep.server.media.quality.round_trips import RoundTrips
+
+__all__ = ["BandwidthEstimator", "RateLimits", "Reason"]
+
+Reason = Literal["", "no feedback", "round trip", "bandwidth", "gap", "loss"]
+
+SILENCE = 2.0  # s
+FIRST_ANSWER = 5.0  # s; a browser takes its time to start
+SILENT_STEP = 1.0  # s between two decreases in silence
+REACTION = 0.5  # s on top of a round trip until a decrease shows
+FRESH = 0.3  # s after a decrease from which on a round trip tells what it did
+LOSS_EVERY = 2.0  # s
+LATENESS = 0.3  # s
+DRAINS = 0.8  # share of a queue that shows that it does
+EPISODE = 4.0  # s; decreases that follow one another so closely are of one queue
+CALM = 1.0  # s without any sign before an increase
+RAISE_EVERY = 1.0  # s
+HIGH_LOSS, SOME_LOSS = 0.10, 0.02
+FALL = 0.97  # an estimate below this share of the one before has fallen
+NEAR_TOLERANCE = 0.75
+MOST_PAUSE = 1.0  # s
+START_GROWTH, FAR_GROWTH, NEAR_GROWTH = 1.35, 1.12, 1.04
+NEAR_LIMIT = 0.85
+USED = 0.7  # share of the rate that has to leave for it to count as tried
+GAP_TRIES, LENGTH_TRIES = 2, 3
+GAP_REST = 30.0  # s
+LIMIT_MEMORY = 60.0  # s that a limit is remembered
+
+
+class RateLimits(NamedTuple):
+    """Bits per second, of all pictures of a peer together."""
+
+    minimum: float
+    start: float
+    maximum: float
+
+
+class BandwidthEstimator:
+    """One per peer. Order of calls: the inputs at any time, `decide` at regular intervals.
+
+    `now` is on one monotonic clock.
+    """
+
+    def __init__(self, limits: RateLimits, now: float) -> None:
+        self.limits = limits
+        self.rate = limits.start
+        self.reason: Reason = ""  # of the last decrease; "" when the rate is back at its maximum
+        self.paused_until = 0.0  # no picture is to leave before
+        self.round_trips = RoundTrips()
+        self.losses = LossWindow()
+        self.sent_bps = 0.0  # over the last second or so
+        self.limited_at: float | None = None  # when the path last showed a limit
+        self._ceiling: float | None = None  # rate at which it did
+        self._heard_at = now
+        self._heard = False  # anything since the last increase
+        self._answered = False  # anything at all
+        self._silent_from: float | None = None  # rate before the silence
+        self._lowered_at = now - CALM
+        self._raised_at = now
+        self._sign_at = now - CALM  # of the last sign of a limit
+        self._sent: tuple[int, float] | None = None  # octets in all, when
+        self._estimate: float | None = None
+        self._estimate_fell = False
+        self._gap_base: list[int] = []  # the last reports' lags
+        self._gap_near = 0  # reports running
+        self._lag = 0
+        self._gap_tries: list[int] = []  # lag at each decrease for it
+        self._gap_rests_until = 0.0
+        self._length_tries: list[float] = []  # queue at each decrease for it
+        self._queue_then = 0.0  # at the last decrease
+        self._loss_floor: float | None = None
+        self._late_at = float("-inf")
+
+    # what comes in
+
+    def heard(self, now: float) -> None:
+        """The peer gave a sign of life."""
+        if self._silent_from is not None:
+            self.rate = max(self.rate, min(self.limits.maximum, self._silent_from / 2))
+            self._silent_from = None
+        self._heard_at = now
+        self._heard = self._answered = True
+
+    def received(self, lost: int, expected: int, round_trip: float | None, now: float) -> None:
+        """A receiver report: packets since the last one, and the round trip in s if it tells one."""
+        self.heard(now)
+        self.losses.add(lost, expected, now)
+        if round_trip is not None and now - self._late_at > LATENESS:
+            self.round_trips.add(round_trip, now)
+
+    def estimated(self, bitrate_bps: float, now: float) -> None:
+        """The peer's own estimate of what it can receive (REMB)."""
+        self.heard(now)
+        # aiortc gives its first estimate when it finds the path overused.
+        before = self.sent_bps if self._estimate is None else self._estimate
+        if bitrate_bps < FALL * before:
+            self._estimate_fell = True
+        self._estimate = bitrate_bps
+
+    def lagged(self, lag: int, tolerance: int, now: float) -> None:
+        """The largest gap of pictures since the last report, and the tolerance; both in events."""
+        self.heard(now)
+        usual = min(self._gap_base, default=lag)
+        near = tolerance > 0 and lag >= NEAR_TOLERANCE * tolerance and lag > usual
+        self._gap_near = self._gap_near + 1 if near else 0
+        self._lag = lag
+        self._gap_base = [*self._gap_base[-19:], lag]
+
+    def late(self, now: float) -> None:
+        """This computer was busy: round trips measured now say nothing of the network."""
+        self._late_at = self._sign_at = now
+
+    def sent(self, octets: int, now: float) -> None:
+        """So many bytes of pictures have been sent in all."""
+        if self._sent is None:
+            self._sent = octets, now
+            return
+        passed = now - self._sent[1]
+        if passed < 0.05:
+            return
+        rate = max(0, octets - self._sent[0]) * 8 / passed
+        self.sent_bps += (rate - self.sent_bps) * min(1.0, passed / 0.7)
+        self._sent = octets, now
+
+    # what follows
+
+    def decide(self, now: float) -> None:
+        """Apply the rules."""
+        if self._silent(now):
+            self._in_silence(now)
+        elif not self._lower(now) and self._may_raise(now):
+            self._raise(now)
+        if self.limited_at is not None and now - self.limited_at > LIMIT_MEMORY:
+            self.limited_at = self._ceiling = None
+        if self.rate >= self.limits.maximum:
+            self.reason = ""
+
+    @property
+    def limited(self) -> bool:
+        """Whether the path showed a limit within the last minute."""
+        return self.limited_at is not None
+
+    def calm_for(self, now: float) -> float:
+        """Seconds since the last sign of a limit."""
+        return now - max(self._sign_at, self._lowered_at)
+
+    def assume(self, rate: float, now: float) -> None:
+        """Try a rate that others are served with."""
+        self.rate = max(self.limits.minimum, rate)  # a peer without a camera needs nothing, and may get one
+        self._raised_at = self._lowered_at = self._sign_at = now
+
+    def _silent(self, now: float) -> bool:
+        patience = SILENCE if self._answered else FIRST_ANSWER
+        return self.sent_bps > 0 and now - self._heard_at > patience + self.round_trips.base
+
+    def _in_silence(self, now: float) -> None:
+        if self._silent_from is None:
+            self._silent_from = self.rate
+        if now - self._lowered_at >= SILENT_STEP:
+            self._set(0.7 * self.rate, "no feedback", now)
+
+    def _lower(self, now: float) -> bool:
+        """Whether something speaks against an increase; the decrease that it asks for is made."""
+        queued = self.round_trips.queued and self.round_trips.at > self._lowered_at + FRESH
+        loss = self.losses.unusual(now)
+        fell, self._estimate_fell = self._estimate_fell, False
+        near = self._gap_near >= 2 and now >= self._gap_rests_until
+        queue_begins = self.round_trips.queue > self.round_trips.limit
+        if not (queued or fell or near or loss > SOME_LOSS or queue_begins):
+            self._loss_floor = None
+            return False
+        self._sign_at = now
+        if now - self._lowered_at < self.round_trips.base + REACTION:
+            self._estimate_fell = fell
+            return True
+        if queued:
+            self._for_queue(now)
+        elif fell and self._estimate is not None and (queue_begins or near or loss > SOME_LOSS):
+            if self._estimate < self.rate:
+                self._limit(self._estimate, "bandwidth", now)
+        elif near:
+            self._for_gap(now)
+        elif loss > HIGH_LOSS and now - self._lowered_at >= LOSS_EVERY:
+            self._for_loss(loss, now)
+        return True
+
+    def _for_queue(self, now: float) -> None:
+        trips = self.round_trips
+        self.paused_until = now + min(MOST_PAUSE, trips.queue)
+        recent = now - self._lowered_at < EPISODE
+        if recent and trips.growth == 0 and trips.queue < DRAINS * self._queue_then:
+            return
+        if self._length_tries and trips.queue < DRAINS * self._length_tries[0]:
+            self._length_tries = []
+        if self.losses.fraction(now) <= SOME_LOSS:  # a queue that overflows is no longer path
+            self._length_tries.append(trips.queue)
+        if len(self._length_tries) > LENGTH_TRIES:
+            trips.accept()
+            self._length_tries = []
+            return
+        self._queue_then = trips.queue
+        carried = min(self.rate, self.sent_bps or self.rate) / (1 + trips.growth)
+        # What an undemanding picture left unused says little of the path, unless the queue is seen to grow or overflow.
+        sure = trips.growth > 0.2 or self.losses.fraction(now) > SOME_LOSS
+        self._limit(max(0.85 * carried, (0.4 if sure else 0.65) * self.rate), "round trip", now)
+
+    def _for_gap(self, now: float) -> None:
+        if len(self._gap_tries) >= GAP_TRIES and self._lag >= self._gap_tries[0]:
+            self._gap_rests_until = now + GAP_REST
+            self._gap_tries = []
+            return
+        if self._gap_tries and self._lag < self._gap_tries[0]:
+            self._gap_tries = []
+        self._gap_tries.append(self._lag)
+        self._gap_near = 0
+        self._limit(0.8 * min(self.rate, max(self.sent_bps, 0.5 * self.rate)), "gap", now)
+
+    def _for_loss(self, loss: float, now: float) -> None:
+        if self._loss_floor is None:
+            self._loss_floor = self.rate / 2
+        wanted = self.rate * (1 - loss / 2)
+        if wanted > self._loss_floor:
+            self._set(wanted, "loss", now)
+
+    def _limit(self, rate: float, reason: Reason, now: float) -> None:
+        """The path carries no more than about `rate`."""
+        self.limited_at = now
+        if self._ceiling is None or now - self._lowered_at > EPISODE:
+            self._ceiling = max(rate, min(self.rate, rate / 0.85))
+        self._set(rate, reason, now)
+
+    def _set(self, rate: float, reason: Reason, now: float) -> None:
+        self.rate = max(self.limits.minimum, min(self.rate, rate))
+        self.reason = reason
+        self._lowered_at = now
+
+    def _may_raise(self, now: float) -> bool:
+        self._length_tries = []
+        return (
+            self.rate < self.limits.maximum
+            and self._heard
+            and now - self._sign_at >= CALM
+            and now - self._raised_at >= RAISE_EVERY
+            and self.sent_bps >= USED * self.rate
+        )
+
+    def _raise(self, now: float) -> None:
+        if self._ceiling is None:
+            growth = START_GROWTH
+        else:
+            growth = FAR_GROWTH if self.rate < NEAR_LIMIT * self._ceiling else NEAR_GROWTH
+        self.rate = min(self.limits.maximum, growth * self.rate)
+        self._raised_at = now
+        self._heard = False

@@ -1,0 +1,39 @@
+"""Which of the two observers' tiers a peer gets. No I/O.
+
+| in | when | then |
+|---|---|---|
+| high | its path carries less than 60 % of what high needs | low |
+| low | it was patient, and its path without a sign of a limit, for 10 s | high, as a trial |
+| high | it falls back within 20 s of a trial | low, and twice as patient as before: 10 s to 160 s |
+"""
+
+from lockstep.protocol.console import Tier
+from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator
+
+__all__ = ["ObserverLayer"]
+
+ENOUGH = 0.6
+TRIAL = 20.0  # s
+PATIENCE, MOST_PATIENCE = 10.0, 160.0  # s
+
+
+class ObserverLayer:
+    """One per observer; begins in the high tier."""
+
+    def __init__(self, now: float) -> None:
+        self.tier: Tier = "high"
+        self._since = now
+        self._patience = PATIENCE
+        self._tried = False
+
+    def decide(self, path: BandwidthEstimator, high_bps: float, now: float) -> Tier:
+        """`high_bps` is what the high tier needs of a path."""
+        if self.tier == "high":
+            if path.rate < ENOUGH * high_bps:
+                hasty = self._tried and now - self._since < TRIAL
+                self._patience = min(MOST_PATIENCE, 2 * self._patience) if hasty else PATIENCE
+                self.tier, self._since = "low", now
+        elif now - self._since >= self._patience and path.calm_for(now) >= PATIENCE:
+            self.tier, self._since, self._tried = "high", now, True
+            path.assume(high_bps, now)
+        return self.tier

@@ -1,0 +1,153 @@
+"""One peer's side of quality: what it says about its path, and what was decided for it."""
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+from lockstep.protocol.console import Quality, Report, StreamQuality, Tier
+from lockstep.protocol.serial import event_gap
+from lockstep.server.media.pipeline.rtp_sender import SenderStats
+from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits, Reason
+from lockstep.server.media.quality.encoding_target import PictureTier
+from lockstep.server.media.quality.observer_layer import ObserverLayer
+from lockstep.server.media.subscription import Subscription
+
+if TYPE_CHECKING:
+    from lockstep.server.media.pipeline.audio_stream import AudioStream
+    from lockstep.server.media.pipeline.video_stream import VideoStream
+
+__all__ = ["CameraLink", "PeerQuality", "SoundLink"]
+
+WIRE_SHARE = 0.92  # of what a receiver counts; the rest are headers
+
+
+class Counted(Protocol):
+    """What it needs of what sends a stream."""
+
+    @property
+    def stats(self) -> SenderStats: ...
+
+
+class CameraLink(NamedTuple):
+    """One camera on its way to this peer."""
+
+    stream: "VideoStream"
+    codec: str
+    target: Subscription
+    sender: Counted
+
+
+class SoundLink(NamedTuple):
+    """One microphone on its way to this peer."""
+
+    stream: "AudioStream"
+    codec: str
+    target: Subscription
+
+
+class PeerQuality:
+    """Hears receiver reports, bandwidth estimates and the client's own reports."""
+
+    def __init__(
+        self, *, operator: bool, limits: RateLimits, tier: Tier, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.operator = operator
+        self.drives = False  # holds the control seat
+        self.stays_low = False  # a thumbnail: never more than the lowest tier
+        self.relays = False  # a relay, with many behind it
+        self.cameras: list[CameraLink] = []  # the main one first
+        self.sounds: list[SoundLink] = []
+        self.pace: Callable[[float | None], None] = lambda rate: None  # bit/s that the path carries; None: no limit
+        self.path = BandwidthEstimator(limits, clock())
+        self.choice = ObserverLayer(clock())
+        self.tier = tier  # what its pictures are made for
+        self.encoded_as: PictureTier = tier  # whose pictures it gets: a tier may be served by another's encoder
+        self.hears_as: PictureTier = "operator"  # whose packets of sound it gets: a crowd's are longer
+        self.held_back = False  # from a camera's own pictures, which cannot be made smaller
+        self.on_quality: Callable[[Quality], None] | None = None
+        self.quality: Quality | None = None  # last one told
+        self._clock = clock
+        self._estimates: dict[frozenset[int], int] = {}
+
+    def stay_low(self) -> None:
+        """Nobody looks closely at this peer's pictures. Call before it joins."""
+        self.stays_low = True
+        self.tier = self.encoded_as = "low"
+
+    @property
+    def in_crowd(self) -> bool:
+        """Whether it is one of those who get fewer pictures when there are many of them, as long as it does not drive.
+
+        Who may drive at any moment, a relay and a thumbnail are not.
+        """
+        return bool(self.cameras) and not (self.operator or self.relays or self.stays_low)
+
+    @property
+    def estimate_bps(self) -> int | None:
+        """The peer's estimate of its bandwidth (REMB); None before the first."""
+        return sum(self._estimates.values()) if self._estimates else None
+
+    @property
+    def loss(self) -> float | None:
+        """0 to 1, of pictures; None before the first report."""
+        return self.path.losses.fraction(self._clock()) if self.path.losses.known else None
+
+    @property
+    def round_trip_ms(self) -> float | None:
+        """None before the first that was measured."""
+        return next((ms for ms in (stats.round_trip_ms for stats in self.stats()) if ms is not None), None)
+
+    def stats(self) -> list[SenderStats]:
+        return [camera.sender.stats for camera in self.cameras]
+
+    def reception(self, lost: int, expected: int, round_trip: float | None) -> None:
+        """A receiver report about one of its streams, sound included: each tells of the one path."""
+        self.path.received(lost, expected, round_trip, self._clock())
+
+    def bandwidth(self, bitrate_bps: int, ssrcs: frozenset[int]) -> None:
+        """A receiver estimates for all its streams together, or for each by itself."""
+        self._estimates = {known: bps for known, bps in self._estimates.items() if not known & ssrcs}
+        self._estimates[ssrcs] = bitrate_bps
+        self.path.estimated(WIRE_SHARE * sum(self._estimates.values()), self._clock())
+
+    def report(self, report: Report, now: float) -> None:
+        """The client's own report. Its gaps count for the main camera, or the first that gives pictures.
+
+        The gap of one that gives none grows with every event, which says nothing of the path.
+        """
+        if not self.cameras:
+            return
+        streams = [camera.stream for camera in self.cameras]
+        main = next((stream.name for stream in streams if stream.is_giving(now)), streams[0].name)
+        for stream in report.streams:
+            if stream.stream != main or stream.stamp == 0 or report.event == 0:
+                continue
+            lag = max(stream.lag, event_gap(report.event, stream.stamp))
+            self.path.lagged(lag, stream.tolerance, now)
+
+    def decide(self, now: float) -> Reason | None:
+        """Look at the path; the reason if its rate was lowered."""
+        before = self.path.rate
+        self.path.sent(sum(stats.octets for stats in self.stats()), now)
+        self.path.decide(now)
+        self.pace(self.path.rate if self.path.limited else None)
+        return self.path.reason if self.path.rate < before else None
+
+    def tell(self, streams: list[StreamQuality], crowd: int) -> None:
+        """Say what was decided, if it is news to the peer; `crowd` as in `Quality`."""
+        quality = Quality(streams=streams, reason=self.path.reason, crowd=crowd)
+        if self.on_quality is not None and _differs(self.quality, quality):
+            self.quality = quality
+            self.on_quality(quality)
+
+
+def _differs(old: Quality | None, new: Quality) -> bool:
+    """Whether a person would call it another quality."""
+    if old is None or (old.reason, old.crowd) != (new.reason, new.crowd) or len(old.streams) != len(new.streams):
+        return True
+    return any(
+        (a.stream, a.tier, a.width, a.height) != (b.stream, b.tier, b.width, b.height)
+        or abs(a.frames_per_second - b.frames_per_second) > 0.1
+        or abs(a.bits_per_second - b.bits_per_second) > 0.2 * a.bits_per_second
+        for a, b in zip(old.streams, new.streams, strict=True)
+    )

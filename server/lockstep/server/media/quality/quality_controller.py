@@ -1,0 +1,311 @@
+"""The quality of all peers: tiers, what each is encoded like, and who gets which.
+
+| tier | who | its bits per second |
+|---|---|---|
+| operator | who holds the control seat; while nobody does, all operators | of the one with the least |
+| high | observers (and other operators) whose paths carry it | all |
+| low | the others, and thumbnails | of the one with the least, but no less than a floor and no more than half of high |
+
+While the operator's pictures are whole and their path shows no limit, the high tier gets the same pictures: one
+encoder serves both. As soon as that ends it has an encoder of its own. So there are at most three encoders for a camera
+and codec, and one where the network is good.
+
+In a crowd (`LoadShedding`) the observers of the high tier get every second or third picture, fewer where the event
+loop has more to do than it can, from one more encoder, with as many bits for each picture as before, and their sound in
+longer packets. Who may drive, relays, recordings and thumbnails get what they got.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable, Iterable
+
+from lockstep.protocol.console import StreamQuality, Tier
+from lockstep.server.media.pipeline.audio_stream import AudioStream
+from lockstep.server.media.pipeline.video_stream import VideoStream
+from lockstep.server.media.quality.adaptation import Adaptation
+from lockstep.server.media.quality.budget import CameraNeed, share_out
+from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
+from lockstep.server.media.quality.load_shedding import LoadShedding
+from lockstep.server.media.quality.metrics import QualityMetrics
+from lockstep.server.media.quality.peer_quality import PeerQuality
+from lockstep.server.media.settings import MediaSettings
+
+__all__ = ["QualityController"]
+
+TICK = 0.1  # s
+LATE = 0.03  # s by which a tick may be late
+LOAD_SECONDS = 1.0  # between two looks at the loop's load
+OBSERVER_TICKS = 10  # an observer is looked at once in so many
+SHARE_AFTER = 5.0  # s of an operator's path without a limit
+LOW_FLOOR_BPS = 120_000
+LOW_SHARE = 0.5  # of the high tier, at most
+
+
+class QualityController:
+    """One per media plane; runs on its loop. Switched off, everybody gets one tier with everything."""
+
+    def __init__(
+        self,
+        settings: MediaSettings,
+        metrics: QualityMetrics,
+        clock: Callable[[], float] = time.monotonic,
+        busy_seconds: Callable[[], float] = lambda: 0.0,
+        on_fault: Callable[[Exception], None] | None = None,
+    ) -> None:
+        """`busy_seconds`: as of `CooperativeScheduler`. `on_fault` hears what a tick raised; the next is tried."""
+        self._settings = settings
+        self._metrics = metrics
+        self._clock = clock
+        self._peers: dict[PeerQuality, None] = {}  # an ordered set
+        self._ladders: dict[tuple[Tier, str], Adaptation] = {}
+        self._plans: dict[tuple[Tier, str], EncodingTarget] = {}
+        self._crowd = LoadShedding(settings.crowd_observers)
+        self._low_divisor = 1  # the low tier gets one of so many pictures
+        self._busy_seconds = busy_seconds
+        self._on_fault = on_fault
+        self._load_at = clock(), busy_seconds()  # the last look at it
+        self._ticks = 0
+        self._common: object = None  # what decides for all observers, at the last tick
+        self._whole_since: float | None = None  # the operator's pictures; None: they are not
+
+    def join(self, peer: PeerQuality) -> None:
+        self._peers[peer] = None
+        if self._settings.quality:
+            self.tick()
+
+    def leave(self, peer: PeerQuality) -> None:
+        """Idempotent."""
+        self._peers.pop(peer, None)
+        self._common = None
+        self._metrics.forget(peer)
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while self._settings.quality:
+            due = self._clock() + TICK
+            await asyncio.sleep(TICK)
+            if (now := self._clock()) > due + LATE:
+                for peer in list(self._peers):
+                    peer.path.late(now)
+            if self._peers:
+                self._try_tick()
+
+    def _try_tick(self) -> None:
+        try:
+            self.tick()
+        except Exception as error:
+            if self._on_fault is None:
+                raise
+            self._on_fault(error)
+
+    def tick(self) -> None:
+        """Look at the paths, plan the tiers, move who has to move, tell whom it concerns."""
+        now = self._clock()
+        self._ticks += 1
+        leaders = self.leaders()
+        for peer in leaders:
+            if (reason := peer.decide(now)) is not None:
+                self._metrics.lowered(reason)
+        self._plan_operator(leaders, now)
+        observers = [peer for peer in self._peers if peer not in leaders]
+        for peer in observers:
+            if peer.tier == "operator":  # it drove until now
+                self._step_back(peer, now)
+        turn = observers[-self._ticks % OBSERVER_TICKS :: OBSERVER_TICKS]
+        for peer in turn:
+            peer.decide(now)
+            peer.tier = "low" if peer.stays_low else peer.choice.decide(peer.path, self._needs(peer), now)
+        self._plan_low([peer for peer in observers if peer.tier == "low"], now)
+        self._look_at_load(now)
+        self._thin(observers, now)
+        shared = self._whole_since is not None and now - self._whole_since >= SHARE_AFTER
+        for peer in leaders:
+            self._settle(peer, "operator", "operator")
+        # What concerns all of them is rare, and there may be hundreds: else only those whose turn it is.
+        common = shared, self._crowd.divisor > 1, leaders, observers
+        settled = turn if common == self._common else observers
+        self._common = common
+        for peer in settled:
+            self._settle(peer, peer.tier, self._encoded_as(peer, shared))
+        for peer in turn:
+            self._tell(peer)
+        for peer in (*leaders, *settled):
+            self._sound_for(peer)
+            if peer.held_back != (held_back := peer.path.limited or peer.tier == "low"):
+                peer.held_back = held_back
+                for camera in peer.cameras:
+                    camera.stream.hold_back(camera.target, held_back)
+        if self._ticks % OBSERVER_TICKS == 0:
+            for peer in leaders:
+                self._tell(peer)
+            self._protect_sound(leaders or observers, now)
+            self._measure(leaders, observers)
+
+    def _look_at_load(self, now: float) -> None:
+        (since, before), busy = self._load_at, self._busy_seconds()
+        if now - since >= LOAD_SECONDS:
+            self._load_at = now, busy
+            self._crowd.loaded((busy - before) / (now - since), now)
+
+    def _thin(self, observers: list[PeerQuality], now: float) -> None:
+        """Look whether there is a crowd, and what it gets."""
+        members = [peer for peer in observers if peer.in_crowd]
+        if self._crowd.watch(len(members), now) > 1:
+            for stream in _streams(members):
+                for output in stream.outputs_of("crowd"):
+                    output.plan = self._plan_of(stream, "crowd")
+
+    def _encoded_as(self, peer: PeerQuality, shared: bool) -> PictureTier:
+        """Whose pictures an observer gets; `shared`: the operator's serve the high tier."""
+        if peer.tier != "high":
+            return peer.tier
+        if peer.in_crowd and self._crowd.divisor > 1:
+            return "crowd"
+        return "operator" if shared else "high"
+
+    def leaders(self) -> list[PeerQuality]:
+        """Whom the operator's tier is for."""
+        return [peer for peer in self._peers if peer.drives] or [peer for peer in self._peers if peer.operator]
+
+    def _step_back(self, peer: PeerQuality, now: float) -> None:
+        """An operator becomes one who watches; where its path has shown no limit, on trial with everything."""
+        if not peer.path.limited:
+            peer.path.assume(self._needs(peer), now)
+        peer.tier = peer.choice.decide(peer.path, self._needs(peer), now)
+
+    def _needs(self, peer: PeerQuality) -> float:
+        whole = len(_giving(_streams([peer]), self._clock())) * float(self._settings.video_bitrate_bps)
+        return whole / self._crowd.divisor if peer.in_crowd else whole
+
+    def _plan_operator(self, leaders: list[PeerQuality], now: float) -> None:
+        if not leaders:
+            self._whole_since = None
+            return
+        tightest = min(leaders, key=lambda peer: peer.path.rate)
+        streams = _streams(leaders)
+        self._plan("operator", streams, tightest.path.rate, now)
+        limited = any(peer.path.limited for peer in leaders)
+        pause = max(peer.path.paused_until for peer in leaders)
+        for stream in streams:
+            for output in stream.outputs_of("operator"):
+                output.paused_until = pause
+                output.keyframes.sparing = limited
+        whole = not limited and all(
+            plan.scale == 1.0 and plan.frame_rate >= stream.frame_rate
+            for stream in streams
+            if (plan := self._plans.get(("operator", stream.name))) is not None
+        )
+        if not whole:
+            self._whole_since = None
+        elif self._whole_since is None:
+            self._whole_since = now
+
+    def _plan_low(self, members: list[PeerQuality], now: float) -> None:
+        if members:
+            watched = [peer for peer in members if not peer.stays_low]
+            least = min((peer.path.rate for peer in watched), default=LOW_FLOOR_BPS)
+            most = LOW_SHARE * max(self._needs(peer) for peer in members)
+            # Whoever of a crowd cannot take what it gets does not get more pictures than it. The tier has one encoder:
+            # while somebody else is in it, who is owed all of them, all get them.
+            self._low_divisor = self._crowd.divisor if all(peer.in_crowd for peer in members) else 1
+            self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now, self._low_divisor)
+
+    def _plan(self, tier: Tier, streams: list[VideoStream], total_bps: float, now: float, divisor: int = 1) -> None:
+        """`divisor`: the tier gets one picture of so many, at most.
+
+        A camera that gives nothing keeps the plan that it would have, so that it begins with no more than its share;
+        the others have all of it until then.
+        """
+        shares = self._shares(total_bps, streams) | self._shares(total_bps, _giving(streams, now))
+        for stream, bps in shares.items():
+            ladder = self._ladders.setdefault((tier, stream.name), Adaptation())
+            plan = ladder.plan(bps, stream.frame_rate / divisor, stream.size, now)
+            self._plans[tier, stream.name] = plan
+            for output in stream.outputs_of(tier):
+                output.plan = plan
+
+    def _shares(self, total_bps: float, streams: list[VideoStream]) -> dict[VideoStream, float]:
+        """Bits per second of each of these cameras, the main one first."""
+        maximum = float(self._settings.video_bitrate_bps)
+        needs = [CameraNeed(stream.size[0] * stream.size[1] * stream.frame_rate, maximum) for stream in streams]
+        return dict(zip(streams, share_out(total_bps, needs), strict=True))
+
+    def _settle(self, peer: PeerQuality, tier: Tier, encoded_as: PictureTier) -> None:
+        peer.tier = tier
+        if peer.encoded_as == encoded_as:
+            return
+        peer.encoded_as = encoded_as
+        for camera in peer.cameras:
+            camera.stream.move(camera.codec, camera.target, encoded_as)
+            for output in camera.stream.outputs_of(encoded_as):
+                output.plan = self._plan_of(camera.stream, encoded_as)
+
+    def _sound_for(self, peer: PeerQuality) -> None:
+        """Also who gets small pictures in a crowd hears longer packets: their headers are a third of a small path."""
+        hears_as: PictureTier = "crowd" if peer.in_crowd and not peer.drives and self._crowd.divisor > 1 else "operator"
+        if peer.hears_as != hears_as:
+            peer.hears_as = hears_as
+            for sound in peer.sounds:
+                sound.stream.move(sound.codec, sound.target, hears_as)
+
+    def _plan_of(self, stream: VideoStream, tier: PictureTier) -> EncodingTarget:
+        if tier == "crowd":
+            return stream.full_plan.thinned(self._crowd.divisor)
+        return stream.full_plan if tier == "high" else self._plans.get((tier, stream.name), stream.full_plan)
+
+    def _tell(self, peer: PeerQuality) -> None:
+        streams, thinned = [], False
+        for camera in peer.cameras:
+            plan = self._plan_of(camera.stream, peer.encoded_as)
+            width, height = plan.size(*camera.stream.size)
+            rate, bps = plan.frame_rate, float(plan.bitrate_bps)
+            if (passed := camera.stream.measured(camera.target)) is not None:  # as the camera made it
+                (width, height), (rate, bps) = camera.stream.size, passed
+            else:
+                thinned |= (
+                    self._low_divisor if peer.encoded_as == "low" else self._crowd.divisor
+                ) > 1 and peer.in_crowd
+            streams.append(
+                StreamQuality(
+                    stream=camera.stream.name,
+                    tier=peer.tier,
+                    width=width,
+                    height=height,
+                    frames_per_second=round(rate, 2),
+                    bits_per_second=bps,
+                    camera_frames_per_second=round(camera.stream.frame_rate, 2),
+                )
+            )
+        peer.tell(streams, self._crowd.size if thinned else 0)
+
+    @staticmethod
+    def _protect_sound(peers: list[PeerQuality], now: float) -> None:
+        """Sound is encoded once for all: against the operator's loss, or the worst observer's without one."""
+        losses: dict[AudioStream, float] = {}
+        for peer in peers:
+            for sound in peer.sounds:
+                losses[sound.stream] = max(losses.get(sound.stream, 0.0), peer.loss or 0.0)
+        for stream, loss in losses.items():
+            stream.measured_loss(loss, now)
+
+    def _measure(self, leaders: list[PeerQuality], observers: list[PeerQuality]) -> None:
+        tiers: dict[PictureTier, list[PeerQuality]] = {
+            "operator": leaders,
+            "high": [peer for peer in observers if peer.tier == "high" and peer.encoded_as != "crowd"],
+            "crowd": [peer for peer in observers if peer.encoded_as == "crowd"],
+            "low": [peer for peer in observers if peer.tier == "low"],
+        }
+        for tier, peers in tiers.items():
+            self._metrics.paths(tier, peers)
+            for stream in _streams(peers):
+                self._metrics.plan(stream.name, tier, self._plan_of(stream, tier), stream.size)
+
+
+def _streams(peers: Iterable[PeerQuality]) -> list[VideoStream]:
+    """The cameras of these peers, the main one first."""
+    return list({camera.stream: None for peer in peers for camera in peer.cameras})
+
+
+def _giving(streams: list[VideoStream], now: float) -> list[VideoStream]:
+    """Those that give pictures; all where none does, as before the first picture."""
+    return [stream for stream in streams if stream.is_giving(now)] or streams

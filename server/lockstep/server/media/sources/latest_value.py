@@ -1,0 +1,67 @@
+"""Between the thread that hears a source and the event loop: bounded, newest wins. No I/O."""
+
+import threading
+from collections import deque
+
+from lockstep.server.media.sources.source_wire import Captured, Said
+
+__all__ = ["LatestValue"]
+
+MOST_WORDS = 8  # of what is no medium
+MOST_SOUND = 25  # segments
+MOST_DEPENDENT = 60  # pictures that build on each other
+
+
+class LatestValue:
+    """`put` from one thread, `take` from another.
+
+    Of pictures that stand for themselves the newest is kept. When those that build on each other no longer fit, all of
+    them go and the next keyframe begins anew.
+    """
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        self._lock = threading.Lock()
+        self._words: deque[Said] = deque(maxlen=MOST_WORDS)
+        self._media: deque[Captured] = deque()
+        self._broken = False  # until a keyframe
+
+    def put(self, said: Said) -> bool:
+        """Whether somebody has to be told: the box was empty."""
+        with self._lock:
+            empty = not self._words and not self._media
+            if isinstance(said, Captured):
+                self._keep(said)
+            else:
+                self._words.append(said)
+            return empty and bool(self._words or self._media)
+
+    def _keep(self, medium: Captured) -> None:
+        most = {"pcm_s16le": MOST_SOUND, "h264": MOST_DEPENDENT}.get(medium.codec, 1)
+        if medium.codec == "h264" and medium.keyframe:
+            self._broken = False
+            self._forget()
+        elif self._broken:
+            self.dropped += 1
+            return
+        elif len(self._media) >= most and medium.codec == "h264":
+            self._broken = True
+            self._forget()
+            self.dropped += 1
+            return
+        while len(self._media) >= most:
+            self._media.popleft()
+            self.dropped += 1
+        self._media.append(medium)
+
+    def _forget(self) -> None:
+        self.dropped += len(self._media)
+        self._media.clear()
+
+    def take(self) -> list[Said]:
+        """All there is; words first."""
+        with self._lock:
+            found = [*self._words, *self._media]
+            self._words.clear()
+            self._media.clear()
+            return found

@@ -1,0 +1,93 @@
+"""One stream on its way to one peer."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from lockstep.protocol.carriers import Carrier
+from lockstep.server.media.codecs.h264 import Profile
+from lockstep.server.media.metrics import MediaMetrics
+from lockstep.server.media.pipeline.frame import EncodedFrame
+from lockstep.server.media.pipeline.frame_queue import Outbox
+
+__all__ = ["FrameSender", "Subscription"]
+
+
+class FrameSender(Protocol):
+    """What sends frames over RTP."""
+
+    @property
+    def paced(self) -> bool:
+        """Whether packets wait for the pacer."""
+
+    def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
+        """Send a frame: packets and bytes of payload. None, and nothing is sent, while the network takes nothing.
+
+        What the pacer holds back of it waits; call only when nothing waits.
+        """
+
+
+class Subscription:
+    """A fan-out target: an outbox in front of a sender."""
+
+    def __init__(
+        self,
+        outbox: Outbox,
+        *,
+        priority: bool,
+        stream: str,
+        carrier: Carrier,
+        metrics: MediaMetrics,
+        on_dropped: Callable[[], None],
+        on_failed: Callable[[Exception], None],
+    ) -> None:
+        """`on_failed` hears what serving this stream raised, and raises nothing itself."""
+        self.priority = priority
+        self.trailer = carrier == "trailer"
+        self.h264: Profile | None = None  # that was negotiated; None for another codec
+        self.sender: FrameSender | None = None  # None before the transport is connected
+        self._outbox = outbox
+        self._on_dropped = on_dropped
+        self._on_failed = on_failed
+        self._dropped = metrics.dropped.labels(stream, "peer_busy")
+        self._packets = metrics.packets.labels(stream, carrier)
+        self._octets = metrics.octets.labels(stream, carrier)
+
+    @property
+    def dropped(self) -> int:
+        """Frames that this peer did not get because it could not keep up."""
+        return self._outbox.dropped
+
+    @property
+    def paced(self) -> bool:
+        """Whether part of the last frame has not left yet."""
+        return self.sender is not None and self.sender.paced
+
+    def put(self, frame: EncodedFrame) -> None:
+        before = self._outbox.dropped
+        complete = self._outbox.put(frame)
+        if self._outbox.dropped != before:
+            self._dropped.inc(self._outbox.dropped - before)
+        if not complete:
+            self._on_dropped()
+
+    def send_next(self) -> bool:
+        sender = self.sender
+        if sender is None or sender.paced:
+            return False
+        frame = self._outbox.peek()
+        if frame is None:
+            return False
+        sent = sender.transmit(frame)
+        if sent is None:
+            return False
+        self._outbox.pop()
+        self._count(*sent)
+        return self._outbox.peek() is not None and not sender.paced
+
+    def failed(self, error: Exception) -> None:
+        self.sender = None
+        self._on_failed(error)
+
+    def _count(self, packets: int, octets: int) -> None:
+        self._packets.inc(packets)
+        self._octets.inc(octets)

@@ -1,0 +1,67 @@
+"""Data channels that an offer names (RFC 8864), so that neither side waits for a message that opens them. No I/O."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from lockstep.rtc.sctp import SctpSettings
+from lockstep.server.errors import BadSdp, ChannelError
+from lockstep.server.peers.channels import CHANNELS, ChannelName, channel_name
+
+__all__ = ["AgreedChannel", "agreed_channels"]
+
+MAX_ID = SctpSettings().max_streams - 1
+MAX_RETRANSMITS = 65535  # RFC 8832 5.1: 16 bits carry it
+MAP = re.compile(r'(\d{1,5}) ([^;"=]+="?[^;"]*"?(?:;[^;"=]+="?[^;"]*"?)*)')
+
+
+class AgreedChannel(NamedTuple):
+    """One of our channels, and how the peer keeps it."""
+
+    id: int
+    name: ChannelName
+    ordered: bool
+    max_retransmits: int | None  # None: as often as it takes
+
+
+def agreed_channels(maps: Sequence[str]) -> list[AgreedChannel]:
+    """Those that an offer names by `a=dcmap`; empty when the peer opens its channels by itself.
+
+    Raises:
+        BadSdp: a line that is none, a channel that we have not, or one twice.
+    """
+    if len(maps) > len(CHANNELS):
+        raise BadSdp(f"more data channels than the {len(CHANNELS)} that there are")
+    found = [_channel(each) for each in maps]
+    if len({each.id for each in found}) < len(found) or len({each.name for each in found}) < len(found):
+        raise BadSdp("a=dcmap: a data channel that is there already")
+    return found
+
+
+def _channel(text: str) -> AgreedChannel:
+    parsed = MAP.fullmatch(text)
+    if parsed is None or int(parsed[1]) > MAX_ID:
+        raise BadSdp("an a=dcmap line that is not valid (RFC 8864 5.1)")
+    options = dict(each.split("=", 1) for each in parsed[2].split(";"))
+    if len(options) < parsed[2].count(";") + 1 or options.keys() - {"label", "ordered", "max-retr"}:
+        raise BadSdp("a=dcmap: label, ordered and max-retr can be agreed on, each once")
+    try:
+        name = channel_name(options.get("label", "").strip('"'))
+    except ChannelError as error:
+        raise BadSdp(f"a=dcmap: {error.detail}") from error
+    return AgreedChannel(int(parsed[1]), name, _ordered(options.get("ordered", "true")), _repeats(options))
+
+
+def _ordered(said: str) -> bool:
+    if said not in ("true", "false"):
+        raise BadSdp("a=dcmap: ordered is true or false")
+    return said == "true"
+
+
+def _repeats(options: dict[str, str]) -> int | None:
+    said = options.get("max-retr")
+    if said is None:
+        return None
+    if not re.fullmatch(r"[0-9]{1,5}", said) or int(said) > MAX_RETRANSMITS:
+        raise BadSdp(f"a=dcmap: max-retr is 0 to {MAX_RETRANSMITS}")
+    return int(said)

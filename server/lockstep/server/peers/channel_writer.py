@@ -1,0 +1,55 @@
+"""Writes to one data channel without ever filling it: what the channel does not take at once waits in an outbox."""
+
+from lockstep.rtc.channels import ChannelNotOpen
+from lockstep.rtc.endpoint import Connection
+from lockstep.rtc.peer import PeerNotReady
+from lockstep.rtc.sctp import AssociationClosed, MessageTooLarge
+from lockstep.server.peers.channel_queue import ChannelQueue
+
+__all__ = ["ChannelWriter"]
+
+ENDED = (ChannelNotOpen, AssociationClosed, PeerNotReady)
+
+
+class ChannelWriter:
+    """A message is handed to the channel only while none waits there, so feedback is never queued behind feedback.
+
+    Attributes:
+        too_large: messages that the peer's max-message-size (RFC 8841 6) forbids
+    """
+
+    def __init__(self, connection: Connection, channel: int) -> None:
+        """Call `flush` with `ChannelWritable`."""
+        self._connection = connection
+        self._channel = channel
+        self.outbox = ChannelQueue()
+        self.too_large = 0
+
+    @property
+    def lost(self) -> int:
+        """Messages that did not fit."""
+        return self.outbox.dropped + self.too_large
+
+    def send(self, text: str) -> None:
+        self.outbox.put(text)
+        self.flush()
+
+    def send_newest(self, text: str) -> None:
+        self.outbox.put_newest(text)
+        self.flush()
+
+    def flush(self) -> None:
+        """Hand on what waits in the outbox, as far as the channel takes it at once."""
+        peer = self._connection.peer
+        while not peer.has_waiting(self._channel):
+            text = self.outbox.take()
+            if text is None:
+                return
+            try:
+                self._connection.send(self._channel, text)
+            except MessageTooLarge:
+                self.too_large += 1
+            except ENDED:
+                return  # the peer's end follows
+        if not self.outbox.empty:
+            peer.tell_when_empty(self._channel)

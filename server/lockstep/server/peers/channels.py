@@ -1,0 +1,140 @@
+"""Parses what clients send on data channels and lines. Failures are named ChannelErrors; nothing else comes out."""
+
+import json
+from typing import Literal
+
+import msgspec
+
+from lockstep.protocol.console import (
+    ClientMessage,
+    Note,
+    Rename,
+    Report,
+    SeatDecline,
+    SeatGrant,
+    SeatRelease,
+    SeatRequest,
+    SeatTake,
+    SilenceStops,
+    decode_client_message,
+)
+from lockstep.protocol.errors import MessageError
+from lockstep.protocol.messages import Command, Ping, Reset, Rest, Stop
+from lockstep.server.errors import BinaryMessage, Flood, MalformedMessage, MessageTooLarge, UnknownChannel, WrongChannel
+from lockstep.server.stop.stop_presses import MAX_REASON, stop_text
+
+__all__ = [
+    "CHANNELS",
+    "MAX_MESSAGE",
+    "ChannelName",
+    "MessageBudget",
+    "channel_name",
+    "channel_of",
+    "parse_message",
+    "stop_in",
+]
+
+ChannelName = Literal["control", "session", "stop"]
+
+
+class _AnyStop(msgspec.Struct, frozen=True, tag_field="type", tag="stop"):
+    reason: object = ""
+    press: object = ""
+
+
+CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
+    "control": (Command, Rest, Report, Ping, Stop),  # a stop is never turned away for the channel it took
+    "session": (SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, SilenceStops, Rename, Note, Stop),
+    "stop": (Stop, Reset),
+}
+
+# Where one line carries all channels, the kind says which it is; a stop is for `stop`, the last that takes it.
+CHANNEL_OF: dict[type[ClientMessage], ChannelName] = {kind: name for name in CHANNELS for kind in CHANNELS[name]}
+
+_any_stop = msgspec.json.Decoder(_AnyStop)
+
+MAX_MESSAGE = 16 * 1024  # bytes; a report of 32 streams is the largest, about 7 kB
+
+
+def channel_name(label: str) -> ChannelName:
+    """The channel with this label.
+
+    Raises:
+        UnknownChannel: we have no such channel.
+    """
+    for name in CHANNELS:
+        if label == name:
+            return name
+    raise UnknownChannel(f"the channels are {', '.join(CHANNELS)}")
+
+
+def channel_of(message: ClientMessage) -> ChannelName:
+    return CHANNEL_OF[type(message)]
+
+
+def parse_message(channel: ChannelName | None, data: object) -> ClientMessage:
+    """What a client sent on `channel`; None: on a line, which carries all of them.
+
+    Raises:
+        BinaryMessage: not text.
+        MessageTooLarge: longer than MAX_MESSAGE.
+        MalformedMessage: not JSON, an unknown kind, or a field of the wrong type or range.
+        WrongChannel: this kind is not for this channel.
+    """
+    if not isinstance(data, str):
+        raise BinaryMessage("messages are text")
+    if len(data) > MAX_MESSAGE:
+        raise MessageTooLarge(f"{len(data)} characters, the bound is {MAX_MESSAGE}")
+    try:
+        message = decode_client_message(data)
+    except MessageError as error:
+        raise MalformedMessage(error.detail) from error
+    if channel is not None and not isinstance(message, CHANNELS[channel]):
+        raise WrongChannel(f"{type(message).__name__.lower()} does not belong on {channel}")
+    return message
+
+
+def stop_in(data: object) -> Stop | None:
+    """The stop in what `parse_message` refuses. What says that it is a stop is one, whatever else is wrong with it."""
+    if not isinstance(data, str | bytes) or len(data) > MAX_MESSAGE:
+        return None
+    try:
+        found = _any_stop.decode(data)
+    except (msgspec.DecodeError, UnicodeError, RecursionError):
+        return _stop_in_text_cut_short(data)
+    return Stop(reason=stop_text(found.reason)[:MAX_REASON], press=stop_text(found.press))
+
+
+def _stop_in_text_cut_short(data: str | bytes) -> Stop | None:
+    """JSON with half of a surrogate pair in it, as of text that was cut within an emoji."""
+    try:
+        found = msgspec.convert(_whole(json.loads(data)), _AnyStop)
+    except (ValueError, RecursionError):
+        return None
+    return Stop(reason=stop_text(found.reason)[:MAX_REASON], press=stop_text(found.press))
+
+
+def _whole(value: object) -> object:
+    """Without halves of surrogate pairs in the texts of an object."""
+    if not isinstance(value, dict):
+        return value
+    return {
+        key: each.encode(errors="replace").decode() if isinstance(each, str) else each for key, each in value.items()
+    }
+
+
+class MessageBudget:
+    """Token bucket: how many messages one peer may send. Stop messages do not ask."""
+
+    def __init__(self, rate: float, now: float) -> None:
+        self._rate = rate
+        self._level = rate
+        self._at = now
+
+    def spend(self, now: float) -> None:
+        """Raises Flood when more than `rate` messages a second come, after a burst of as many."""
+        self._level = min(self._rate, self._level + (now - self._at) * self._rate)
+        self._at = now
+        if self._level < 1:
+            raise Flood(f"more than {self._rate:g} messages a second")
+        self._level -= 1

@@ -1,0 +1,235 @@
+"""The peers that are connected: admitted, told, seen off."""
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+import structlog
+
+from lockstep.protocol.console import Participant, Participants, ServerMessage, encode_console_message
+from lockstep.server.auth.tokens import Identity
+from lockstep.server.errors import NotFound, ShuttingDown, TooManyRequests
+from lockstep.server.peers.channels import ChannelName
+from lockstep.server.peers.feedback_fanout import FeedbackReceiver
+from lockstep.server.peers.peer import Peer
+from lockstep.server.peers.peer_places import check_place
+from lockstep.server.peers.webrtc_peer import WebRtcPeer
+from lockstep.server.peers.websocket_peer import WebSocketPeer
+from lockstep.server.telemetry.metrics import Metrics
+from lockstep.server.util.display_names import unique_names
+from lockstep.server.util.fair_queue import FairQueue
+
+__all__ = ["PeerRegistry"]
+
+log = structlog.get_logger(__name__)
+
+FEW = 10  # participants up to which everybody's measured values are shared
+CLOSE_TIMEOUT = 8.0  # s for all peers together
+
+
+class PeerRegistryLimits(Protocol):
+    """The settings that all peers together need."""
+
+    @property
+    def max_peers(self) -> int: ...
+    @property
+    def max_relayed(self) -> int: ...
+    @property
+    def reserved_places(self) -> int: ...
+    @property
+    def max_unconnected(self) -> int: ...
+    @property
+    def max_thumbnails(self) -> int: ...
+
+
+class PeerRegistry:
+    """At most `max_peers` peers. Each runs in a task that this object owns; `close` waits for all of them."""
+
+    def __init__(
+        self,
+        limits: PeerRegistryLimits,
+        metrics: Metrics,
+        joined: Callable[[Peer], None],
+        told: Callable[[ServerMessage], None] = lambda message: None,
+    ) -> None:
+        """`joined` is called with newcomers, `told` with what everyone is told."""
+        self._limits = limits
+        self._joined = joined
+        self._told = told
+        self._metrics = metrics
+        self._sessions: dict[Peer, asyncio.Task[None]] = {}
+        self._reserved: Counter[str] = Counter()  # places of peers that are being negotiated, by token
+        self._closing = False
+        self.ended = 0  # connections, ever
+        self.relays: list[FeedbackReceiver] = []
+        self.turns = FairQueue()  # in which watchers are written to
+        self.further_bounds: list[Callable[[Identity], None]] = []  # raise TooManyPeers where there is no place
+
+    def __iter__(self) -> Iterator[Peer]:
+        return iter(list(self._sessions))
+
+    def __len__(self) -> int:
+        return len(self._sessions)
+
+    @property
+    def taken(self) -> int:
+        """Places that are taken by peers that get media from here, and by those that are being negotiated."""
+        return sum(not peer.relay for peer in self._sessions) + self._reserved.total()
+
+    def taken_by(self, token_id: str) -> int:
+        """Of the `taken` places, those of one link."""
+        here = sum(not peer.relay and peer.identity.token_id == token_id for peer in self._sessions)
+        return here + self._reserved[token_id]
+
+    @property
+    def thumbnails(self) -> int:
+        """Of these, small pictures on somebody's overview: no participants."""
+        return sum(peer.thumbnail for peer in self._sessions)
+
+    def drivers(self) -> list[Peer]:
+        """Those whose role may drive."""
+        return [peer for peer in self._sessions if peer.role != "observer"]
+
+    def observers(self) -> list[FeedbackReceiver]:
+        """Those that get feedback from here: a relay gets it once for all who watch through it."""
+        here = [peer for peer in self._sessions if peer.role == "observer" and not peer.relay]
+        return [*self.relays, *here]
+
+    def settle_names(self) -> list[Peer]:
+        """Give everyone the name they asked for, or that with a number; those whose name changed."""
+        people = [peer for peer in self._sessions if not peer.thumbnail]
+        names = unique_names([(peer.wanted_name, peer.name) for peer in people])
+        changed = []
+        for peer, name in zip(people, names, strict=True):
+            if peer.name != name:
+                peer.name = name
+                changed.append(peer)
+        return changed
+
+    @contextmanager
+    def place(self, identity: Identity, *, relayed: bool = False, thumbnail: bool = False) -> Iterator[None]:
+        """Keeps a place while a peer is being negotiated; `check_place` says who gets one.
+
+        `relayed`: it has its media from a relay; such peers cost little, and are counted by themselves; as are those
+        that get a `thumbnail`.
+
+        Raises:
+            TooManyPeers: there is no place for this link.
+            TooManyRequests: so many peers of this link have not connected yet.
+            ShuttingDown: the console ends.
+        """
+        if self._closing:
+            raise ShuttingDown("the console is shutting down")
+        limits, token_id = self._limits, identity.token_id
+        bound = limits.max_relayed if relayed else limits.max_thumbnails if thumbnail else limits.max_peers
+        alike = [peer for peer in self._sessions if (bool(peer.relay), peer.thumbnail) == (relayed, thumbnail)]
+        held = sum(peer.identity.token_id == token_id for peer in alike) + self._reserved[token_id]
+        taken = len(alike) + self._reserved.total()
+        check_place(identity.role, held, taken, bound, 0 if thumbnail else limits.reserved_places)
+        for check in () if relayed else self.further_bounds:
+            check(identity)
+        waiting = sum(peer.identity.token_id == token_id and not peer.connected for peer in self._sessions)
+        if waiting + self._reserved[token_id] >= limits.max_unconnected:
+            raise TooManyRequests(f"{limits.max_unconnected} peers of this link have not connected yet")
+        self._reserved[token_id] += 1
+        try:
+            yield
+        finally:
+            self._reserved[token_id] -= 1
+            if self._reserved[token_id] == 0:
+                del self._reserved[token_id]
+
+    def admit(self, peer: Peer) -> None:
+        task = asyncio.get_running_loop().create_task(self._run(peer), name=f"peer {peer.id}")
+        self._sessions[peer] = task
+        self._metrics.peers.labels(peer.role).inc()
+        with peer.contained("join"):
+            self.settle_names()
+            self._joined(peer)
+        log.info("peer joined", peer=peer.id, role=peer.role, name=peer.name)
+
+    def by_id(self, peer_id: str) -> Peer | None:
+        return next((peer for peer in self._sessions if peer.id == peer_id), None)
+
+    def by_resource(self, resource: str) -> WebRtcPeer:
+        """Raises NotFound when no peer has this WHEP resource."""
+        for peer in self._sessions:
+            if isinstance(peer, WebRtcPeer) and peer.resource == resource:
+                return peer
+        raise NotFound("no such WHEP resource")
+
+    def by_ticket(self, ticket: str) -> WebSocketPeer:
+        """Raises NotFound when nobody is waited for with this ticket."""
+        for peer in self._sessions:
+            if isinstance(peer, WebSocketPeer) and not peer.ended and peer.ticket == ticket != "":
+                return peer
+        raise NotFound("no such ticket")
+
+    def tell(self, channel: ChannelName, message: ServerMessage) -> None:
+        """Everyone."""
+        text = encode_console_message(message)
+        for peer in self._sessions:
+            peer.send_text(channel, text)
+        self._told(message)
+
+    def participants(self) -> Participants:
+        """Those who may drive first. In a crowd only they come with measured values: the list changes less often."""
+        people = [peer for peer in self._sessions if not peer.thumbnail]
+        found = []
+        for peer in people:
+            with peer.contained("participant"):
+                found.append(peer.participant())
+        everyone = sorted(found, key=lambda each: each.role == "observer")
+        return Participants(
+            participants=[
+                each if len(everyone) <= FEW or each.role != "observer" else _without_values(each) for each in everyone
+            ]
+        )
+
+    def end_all(self, why: str) -> None:
+        for peer in self._sessions:
+            peer.end(why)
+
+    async def all_gone(self) -> None:
+        """Returns when those who are here now have left."""
+        if self._sessions:
+            await asyncio.wait(self._sessions.values())
+
+    async def close(self) -> None:
+        """No more peers; the ones here end. Idempotent."""
+        self._closing = True
+        self.end_all("shutdown")
+        try:
+            async with asyncio.timeout(CLOSE_TIMEOUT):
+                await self.all_gone()
+        except TimeoutError:
+            late = list(self._sessions.values())
+            for task in late:
+                task.cancel()
+            await asyncio.gather(*late, return_exceptions=True)
+
+    async def _run(self, peer: Peer) -> None:
+        try:
+            await peer.run()
+        except Exception as error:
+            # A fault with one peer must not end the others.
+            self._metrics.faults.caught("peer", error, peer=peer.id)
+        finally:
+            del self._sessions[peer]
+            self.ended += 1
+            self._metrics.peers.labels(peer.role).dec()
+            self._metrics.peers_ended.labels(peer.ended).inc()
+            self._metrics.dropped.labels("channel").inc(peer.dropped())
+            log.info("peer left", peer=peer.id, role=peer.role, name=peer.name, why=peer.ended)
+
+
+def _without_values(participant: Participant) -> Participant:
+    return Participant(
+        peer=participant.peer,
+        name=participant.name,
+        role=participant.role,
+        carrier=participant.carrier,
+        silenced=participant.silenced,
+    )

@@ -1,0 +1,74 @@
+"""Ends what a link gave when the link ends: peers at once, viewers of the 3D scene too."""
+
+import asyncio
+from collections.abc import Callable
+
+from lockstep.server.audit.audit_trail import AuditTrail
+from lockstep.server.audit.records import Actor, AuditKind
+from lockstep.server.auth.invitation_store import InvitationStore
+from lockstep.server.auth.invitations import Invitation
+from lockstep.server.peers.peer_registry import PeerRegistry
+
+__all__ = ["UNKNOWN_SECONDS", "TokenRevocation"]
+
+# For how long who is here may stay while nobody can know which links are revoked. Newcomers are refused at once; a disk
+# that is away for a moment should not take the robot out of somebody's hands.
+UNKNOWN_SECONDS = 10.0
+
+
+class TokenRevocation:
+    """Of one robot. The house calls `enforce`."""
+
+    def __init__(
+        self,
+        invitations: InvitationStore,
+        peers: PeerRegistry,
+        audit: AuditTrail,
+        robot: str = "",
+        show_silence: Callable[[], None] = lambda: None,
+    ) -> None:
+        """`show_silence`: called at every look; tells peers whether their stops are silenced."""
+        self.peers = peers
+        self._show_silence = show_silence
+        self._audit = audit
+        self._invitations = invitations
+        self._robot = robot
+        self._looked = asyncio.Event()  # replaced at every look
+        self._trouble_since: float | None = None
+
+    def enforce(self, changed: list[Invitation], by: Actor, now: float) -> None:
+        """Act on what `by` has invited or revoked, and on what has expired. `now` is s since 1970."""
+        for each in changed:
+            if each.concerns(self._robot):
+                kind: AuditKind = "invitation" if each.revoked_at is None else "revocation"
+                self._audit.record(kind, by, each.role, f"{each.name} ({each.id})")
+        unknown = self._unknown_for(now)
+        for peer in self.peers:
+            if unknown > UNKNOWN_SECONDS:
+                peer.end("links unreadable")
+            elif self._invitations.is_revoked(peer.identity.token_id):
+                peer.end("link revoked")
+            elif now >= peer.identity.expires:
+                peer.end("link expired")
+        self._show_silence()
+        self._looked.set()
+        self._looked = asyncio.Event()
+
+    def silence_ended(self, link: str) -> None:
+        """The stops of this link are heard again, by themselves."""
+        self._audit.record("silence", what="ended", detail=link)
+
+    async def ended(self, link: str, expires: float) -> None:
+        """Returns when the link with this id is revoked or has expired, at the next look at the latest."""
+        while not self._invitations.has_ended(link, expires):
+            if self._unknown_for(self._invitations.now()) > UNKNOWN_SECONDS:
+                return
+            await self._looked.wait()
+
+    def _unknown_for(self, now: float) -> float:
+        """How long nobody has known which links are revoked, in s."""
+        if not self._invitations.trouble:
+            self._trouble_since = None
+            return 0.0
+        self._trouble_since = now if self._trouble_since is None else self._trouble_since
+        return now - self._trouble_since

@@ -1,0 +1,31 @@
+"""`lockstep export --to csv`: one row for each event."""
+
+import csv
+from pathlib import Path
+
+from lockstep.server.recording.format.topics import stream_of
+from lockstep.server.recording.reading.event_rows import columns_of, event_rows, values_of
+from lockstep.server.recording.reading.reader import RecordingReader
+
+__all__ = ["export"]
+
+
+def export(path: Path, out: Path | None, task: str) -> list[Path]:
+    """The file that was written: `out`, or beside `path`. Raises RecordingError, OSError."""
+    target = out or path.with_suffix(".csv")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingReader(path) as reader, target.open("w", newline="", encoding="utf-8") as file:
+        description = reader.description()
+        streams = [stream for each in reader.index.topics if (stream := stream_of(each.topic))]
+        writer = csv.writer(file)
+        writer.writerow(columns_of(description, streams))
+        for row in event_rows(reader):
+            writer.writerow([_cell(value) for value in values_of(row, description, streams)])
+    return [target]
+
+
+def _cell(value: object) -> object:
+    """A text that a spreadsheet would calculate stands behind an apostrophe: people choose their names."""
+    if isinstance(value, str) and value.startswith(("=", "+", "-", "@")):
+        return f"'{value}"
+    return "" if value is None else value

@@ -1,0 +1,163 @@
+"""`lockstep export --to mp4`: one file for each camera, with sound. Pictures and Opus are copied, not encoded again.
+
+Only where the size of the pictures changed on the way, or where there is VP8, which MP4 does not hold, they are encoded
+anew, all in the largest size.
+"""
+
+import re
+from collections.abc import Iterator
+from fractions import Fraction
+from io import BytesIO
+from pathlib import Path
+from typing import NamedTuple
+
+import av
+from av.container import OutputContainer
+
+from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export.export_sound import sound_writer
+from lockstep.server.recording.format.payload import SOUND, RecordedPicture, RecordedSound
+from lockstep.server.recording.format.topics import CAMERA
+from lockstep.server.recording.reading.pictures import RecordedPictures, picture_size
+from lockstep.server.recording.reading.reader import RecordingReader
+
+__all__ = ["export"]
+
+VIDEO_BASE = Fraction(1, 90_000)
+SECOND = 1_000_000_000
+MILLISECOND = 1_000_000
+MAX_CAMERA = 60  # characters of its name that are taken into a file's
+
+
+class Timed(NamedTuple):
+    topic: str
+    captured: int  # ns since 1970
+    data: bytes
+    picture: RecordedPicture | None
+    sound: RecordedSound | None
+
+
+def export(path: Path, out: Path | None, task: str) -> list[Path]:
+    """The files that were written.
+
+    Args:
+        out: with one camera the file, else the directory; None: beside `path`
+
+    Raises:
+        RecordingError: the recording cannot be read, or has no pictures.
+        OSError: a file cannot be written.
+    """
+    with RecordingReader(path) as reader:
+        cameras = [each.topic for each in reader.index.topics if each.topic.startswith(CAMERA)]
+        cameras = [topic for topic in cameras if reader.index.counts.get(topic)]
+        if not cameras:
+            raise RecordingDamaged("it has no pictures")
+        sound = _first_sound(reader)
+        written = []
+        for topic in cameras:
+            target = _target(path, out, topic.removeprefix(CAMERA), len(cameras) == 1)
+            while target in written:  # names that differ in what no file's name has
+                target = target.with_stem(f"{target.stem}_")
+            target.parent.mkdir(parents=True, exist_ok=True)
+            _write(reader, topic, sound, target)
+            written.append(target)
+        return written
+
+
+def _first_sound(reader: RecordingReader) -> str | None:
+    """Of the microphones the topic of the first one that was heard."""
+    found = (each.topic for each in reader.index.topics if each.schema in SOUND)
+    return next((topic for topic in found if reader.index.counts.get(topic)), None)
+
+
+def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
+    if out is not None and only and out.suffix == ".mp4":
+        return out
+    # The camera's name is the robot's word, or of whoever made the file: it names no folder.
+    name = re.sub(r"[^\w. -]", "_", camera)[:MAX_CAMERA]
+    return (out or path.parent) / f"{path.stem}-{name}.mp4"
+
+
+def _write(reader: RecordingReader, topic: str, sound: str | None, target: Path) -> None:
+    keyframes = (each.picture for each in _timed(reader, topic) if each.picture is not None and each.picture.keyframe)
+    kinds = {(each.format, size) for each in keyframes if (size := picture_size(each)) is not None}
+    sizes = {size for _, size in kinds}
+    first = next(_timed(reader, topic), None)
+    if first is None or not sizes:
+        raise RecordingDamaged(f"{topic}: there is no picture that can be decoded")
+    packet = None if sound is None else next(_timed(reader, sound), None)
+    heard = (each.sound for each in _timed(reader, sound) if each.sound is not None) if sound is not None else ()
+    began = min(each.captured for each in (first, packet) if each is not None)
+    with av.open(str(target), "w", format="mp4", options={"movflags": "+faststart"}) as output:
+        copied = kinds == {("h264", *sizes)}
+        video = _Copied(output, first.data) if copied else _Encoded(output, max(sizes))
+        audio = sound_writer(output, heard)
+        for each in _timed(reader, topic, *([] if sound is None else [sound])):
+            if each.topic == topic:
+                video.take(each, began)
+            elif audio is not None and each.sound is not None:
+                audio.take(each.sound, each.captured - began)
+        video.close()
+        if audio is not None:
+            audio.close()
+
+
+class _Copied:
+    """Pictures as they were recorded."""
+
+    def __init__(self, output: OutputContainer, keyframe: bytes) -> None:
+        self._output = output
+        # A muxer wants to be told of a stream by one that was read: that of the first picture alone.
+        with av.open(BytesIO(keyframe), format="h264") as first:
+            self._stream = output.add_stream_from_template(first.streams.video[0])
+        self._stream.time_base = VIDEO_BASE
+
+    def take(self, each: Timed, began: int) -> None:
+        packet = av.Packet(each.data)
+        packet.stream, packet.time_base = self._stream, VIDEO_BASE
+        packet.pts = packet.dts = round((each.captured - began) / SECOND / VIDEO_BASE)
+        packet.is_keyframe = each.picture is not None and each.picture.keyframe
+        self._output.mux(packet)
+
+    def close(self) -> None: ...
+
+
+class _Encoded:
+    """Pictures of different sizes or formats, all in one."""
+
+    def __init__(self, output: OutputContainer, size: tuple[int, int]) -> None:
+        self._output = output
+        self._decoder = RecordedPictures()
+        self._stream = output.add_stream("libx264", rate=25, options={"preset": "veryfast", "crf": "20"})
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = "yuv420p"
+        self._stream.codec_context.time_base = VIDEO_BASE
+
+    def take(self, each: Timed, began: int) -> None:
+        if each.picture is not None:
+            self._encode(self._decoder.decode(each.picture, round((each.captured - began) / SECOND / VIDEO_BASE)))
+
+    def close(self) -> None:
+        self._encode(self._decoder.flush())
+        self._output.mux(self._stream.encode(None))
+
+    def _encode(self, frames: list[av.VideoFrame]) -> None:
+        for frame in frames:
+            whole = frame.reformat(self._stream.width, self._stream.height, interpolation="BILINEAR")
+            whole.pts, whole.time_base = frame.pts, VIDEO_BASE
+            self._output.mux(self._stream.encode(whole))
+
+
+def _timed(reader: RecordingReader, *topics: str) -> Iterator[Timed]:
+    """In the order of arrival; pictures from the first keyframe on, times of each topic increasing."""
+    newest: dict[str, int] = {}
+    for record in reader.records(topics=topics):
+        picture, sound = record.picture, record.sound
+        medium = picture or sound
+        if medium is None:
+            continue
+        if record.topic not in newest and picture is not None and not picture.keyframe:
+            continue
+        captured = max(record.captured, newest.get(record.topic, 0) + MILLISECOND)
+        newest[record.topic] = captured
+        yield Timed(record.topic, captured, medium.data, picture, sound)

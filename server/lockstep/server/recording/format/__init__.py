@@ -1,0 +1,1 @@
+"""What is in a recording: topics, records, index, signatures. No I/O."""

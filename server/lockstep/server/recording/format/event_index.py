@@ -1,0 +1,217 @@
+"""The index of a recording by event: which chunk has what. No I/O."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+import msgspec
+
+from lockstep.protocol.serial import event_gap, is_newer
+from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.format.records import Whole
+from lockstep.server.recording.reading.bookmarks import Mark
+
+__all__ = [
+    "INDEX_NAME",
+    "ChunkEntry",
+    "EventEntry",
+    "EventIndex",
+    "IndexBuilder",
+    "TopicEntry",
+    "check_index",
+    "decode_index",
+]
+
+INDEX_NAME = "lockstep-index.json"
+EVENT_SPACING = 100_000  # µs between two events of the index
+MAX_MARKS = 20_000
+MAX_TOPICS = 128  # the streams of a robot, and Lockstep's own
+MAX_TOPIC = 1000  # characters
+
+
+class TopicEntry(msgspec.Struct, frozen=True):
+    id: Whole  # MCAP's channel
+    topic: str
+    schema: str
+    encoding: str
+
+
+class ChunkEntry(msgspec.Struct, array_like=True):
+    offset: Whole  # bytes, where the chunk's record begins
+    first_event: Whole  # smallest of its records
+    last_event: Whole
+    started: Whole  # µs since 1970, arrival of its first record
+    ended: Whole
+
+
+class EventEntry(msgspec.Struct, frozen=True, array_like=True):
+    event: Whole
+    arrived: Whole  # µs since 1970
+    chunk: Whole
+
+
+class EventIndex(msgspec.Struct, kw_only=True):
+    """See docs/recording.md, "The index"."""
+
+    version: Literal[1] = 1
+    epoch: str = ""
+    recording: str = ""
+    part: Whole = 1
+    started: Whole = 0
+    ended: Whole = 0
+    first_event: Whole = 0  # 0: no feedback
+    last_event: Whole = 0
+    topics: list[TopicEntry] = []
+    chunks: list[ChunkEntry] = []
+    events: list[EventEntry] = []
+    keyframes: dict[str, list[EventEntry]] = {}
+    marks: list[Mark] = []
+    counts: dict[str, Whole] = {}
+    lost: Whole = 0
+
+    def chunks_with(self, first_event: int, last_event: int) -> Iterator[int]:
+        """Numbers of the chunks that can hold records of these events."""
+        for number, chunk in enumerate(self.chunks):
+            if not is_newer(chunk.first_event, last_event) and not is_newer(first_event, chunk.last_event):
+                yield number
+
+    def after(self, chunk: int) -> "EventIndex":
+        """What is known from that chunk on; the rest of the index is whole."""
+        if chunk == 0:
+            return self
+        begin = self.chunks[chunk].started if chunk < len(self.chunks) else self.ended + 1
+        return msgspec.structs.replace(
+            self,
+            chunks=self.chunks[chunk:],
+            events=[each for each in self.events if each.chunk >= chunk],
+            keyframes={
+                topic: [each for each in entries if each.chunk >= chunk] for topic, entries in self.keyframes.items()
+            },
+            marks=[each for each in self.marks if each.time >= begin],
+        )
+
+    def without_chunks_before(self, chunk: int) -> "EventIndex":
+        """As if it began with that chunk, but for the list of chunks itself, whose numbers stay."""
+        later = self.after(chunk)
+        events = later.events
+        return msgspec.structs.replace(
+            later,
+            started=self.chunks[chunk].started,
+            first_event=events[0].event if events else self.chunks[chunk].first_event,
+            chunks=self.chunks,
+            counts={},
+        )
+
+    def sparse(self, spacing: int) -> "EventIndex":
+        """With events at least `spacing` µs apart, for who loads the chunks that it looks at anyway."""
+        events: list[EventEntry] = []
+        for each in self.events:
+            if not events or each.arrived - events[-1].arrived >= spacing:
+                events.append(each)
+        return msgspec.structs.replace(self, events=events)
+
+    def keyframe_before(self, topic: str, event: int) -> EventEntry | None:
+        """The newest keyframe stamped `event` or earlier; None: there is none."""
+        entries = self.keyframes.get(topic, [])
+        low, high = 0, len(entries)
+        while low < high:
+            middle = (low + high) // 2
+            if event_gap(entries[middle].event, event) <= 0:
+                low = middle + 1
+            else:
+                high = middle
+        # Of several stamped alike the first: pictures of an event begin there.
+        while low > 1 and entries[low - 2].event == event:
+            low -= 1
+        return entries[low - 1] if low else None
+
+
+_decoder = msgspec.json.Decoder(EventIndex)
+
+
+def check_index(index: EventIndex) -> None:
+    """Whether a page can show it, whoever made the file. Raises RecordingDamaged."""
+    counts = {
+        "topics": (len(index.topics), MAX_TOPICS),
+        "topics with keyframes": (len(index.keyframes), MAX_TOPICS),
+        "topics that are counted": (len(index.counts), MAX_TOPICS),
+        "marks": (len(index.marks), MAX_MARKS),
+    }
+    for kind, (count, most) in counts.items():
+        if count > most:
+            raise RecordingDamaged(f"the index has {count} {kind}, the bound is {most}")
+    if any(len(each.topic) > MAX_TOPIC for each in index.topics):
+        raise RecordingDamaged(f"the index has a topic of more than {MAX_TOPIC} characters")
+
+
+def decode_index(data: bytes) -> EventIndex:
+    """Raises RecordingDamaged."""
+    try:
+        return _decoder.decode(data)
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise RecordingDamaged(f"the index cannot be read: {error}") from error
+
+
+class IndexBuilder:
+    """Grows with the file: `add` every record in the order of the file, `chunk_written` after each chunk."""
+
+    def __init__(self, index: EventIndex) -> None:
+        self.index = index
+        self._chunk: ChunkEntry | None = None  # that is being filled
+
+    def add(self, topic: str, event: int, arrived: int, *, keyframe: bool, feedback: bool) -> None:
+        """`arrived` in µs; `keyframe` of a picture; `feedback`: it is one."""
+        index = self.index
+        if not index.started:
+            index.started = arrived
+        index.ended = arrived
+        index.counts[topic] = index.counts.get(topic, 0) + 1
+        chunk = self._chunk
+        if chunk is None:
+            chunk = self._chunk = ChunkEntry(0, event, event, arrived, arrived)
+        chunk.ended = arrived
+        if is_newer(chunk.first_event, event):
+            chunk.first_event = event
+        elif is_newer(event, chunk.last_event):
+            chunk.last_event = event
+        if keyframe:
+            index.keyframes.setdefault(topic, []).append(EventEntry(event, arrived, len(index.chunks)))
+        if feedback:
+            self._add_event(event, arrived)
+
+    def _add_event(self, event: int, arrived: int) -> None:
+        index = self.index
+        if not index.first_event:
+            index.first_event = event
+        new = event != index.last_event
+        index.last_event = event
+        if new and (not index.events or arrived - index.events[-1].arrived >= EVENT_SPACING):
+            index.events.append(EventEntry(event, arrived, len(index.chunks)))
+
+    def mark(self, mark: Mark) -> None:
+        if len(self.index.marks) < MAX_MARKS:
+            self.index.marks.append(mark)
+
+    def chunk_written(self, offset: int) -> None:
+        """All that was added since the last time is one chunk, at `offset`."""
+        if self._chunk is not None:
+            self._chunk.offset = offset
+            self.index.chunks.append(self._chunk)
+            self._chunk = None
+
+    def written(self) -> EventIndex:
+        """The index of what is in the file by now: a copy. May be called from another thread."""
+        index = self.index
+        chunks = list(index.chunks)
+        ended = chunks[-1].ended if chunks else index.started
+        return msgspec.structs.replace(
+            index,
+            ended=ended,
+            chunks=chunks,
+            events=[each for each in list(index.events) if each.chunk < len(chunks)],
+            keyframes={
+                topic: [each for each in list(entries) if each.chunk < len(chunks)]
+                for topic, entries in list(index.keyframes.items())
+            },
+            marks=[each for each in list(index.marks) if each.time <= ended],
+            counts=dict(index.counts),
+        )

@@ -1,0 +1,202 @@
+"""What Lockstep itself writes into a recording: JSON, with a published JSON Schema for each kind.
+
+The JSON Schemas are generated from this file (scripts/generate_wire.py). Pictures, sound, joints and so on have
+Foxglove's schemas; see `lockstep.server.recording.format.topics`.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from lockstep.protocol.console import Participant, Report
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import EventReference, RefusalReason, StopState
+
+__all__ = [
+    "OWN_RECORDS",
+    "CommandOutcome",
+    "CommandRecord",
+    "Degraded",
+    "FeedbackRecord",
+    "NoteRecord",
+    "OwnRecord",
+    "ParticipantsRecord",
+    "RefusalRecord",
+    "ReportRecord",
+    "RestRecord",
+    "RobotRecord",
+    "SeatRecord",
+    "SignatureRecord",
+    "StopRecord",
+    "Vector",
+    "Whole",
+    "WrenchRecord",
+]
+
+Count = Annotated[int, msgspec.Meta(ge=0)]
+Whole = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # what a JavaScript number holds exactly
+
+# What became of a command at the console. Only a forwarded one reached the robot bridge.
+CommandOutcome = Literal["forwarded", "repeated", "refused", "undelivered"]
+
+
+class OwnRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """What all of them have."""
+
+    epoch: str  # run of the robot bridge; references of different epochs are never compared
+    event: EventReference
+
+
+class RobotRecord(OwnRecord, frozen=True, kw_only=True):
+    """The robot link, at the start of every file and whenever it changes."""
+
+    link: Literal["up", "down"]
+    detail: str = ""  # why it is down
+    description: RobotDescription
+
+
+class CommandRecord(OwnRecord, frozen=True, kw_only=True):
+    """A command that somebody sent; `event` is the one that it is to become."""
+
+    issue: Annotated[int, msgspec.Meta(ge=1)]  # of the feedback that it answers
+    values: list[float]  # one per axis, in its unit; what was forwarded, else what was asked
+    peer: str
+    name: str
+    outcome: CommandOutcome
+    reason: RefusalReason | Literal[""] = ""  # why it was refused
+    nonce: int = 0  # that the sender named; 0 in recordings of before there were any
+
+
+class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
+    """Measured state after command `event`, as the robot bridge sent it (docs/robot-link.md)."""
+
+    issue: Annotated[int, msgspec.Meta(ge=1)]
+    time: float  # s, the bridge's monotonic clock
+    axes: list[float]
+    joints: list[float] = []
+    wrench: list[float] = []
+    ranges: list[float] = []
+    at_rest: bool = True
+    stop: StopState = StopState()
+    faults: list[str] = []
+    limits: list[str] = []
+    unknown: list[str] = []
+    nonce: int = 0  # of this issue; 0 in recordings of before there were any
+    neutral_needed: bool = False  # no moving command executes before a neutral one
+    warning: float = 0.0  # s that the robot still warns before it may move
+
+
+class RefusalRecord(OwnRecord, frozen=True, kw_only=True):
+    """Something was refused; `event` is the current one."""
+
+    refused: Count  # the refused command's event; 0 for what is no command
+    reason: RefusalReason
+    detail: str = ""
+    by: Literal["console", "robot"]
+    peer: str = ""  # who was told; "" for nobody
+    name: str = ""
+
+
+class RestRecord(OwnRecord, frozen=True, kw_only=True):
+    """A rest that went to the robot; `event` is the one that it names."""
+
+    peer: str = ""  # "" when the console sent it because the seat changed hands
+    why: str = ""
+
+
+class SeatRecord(OwnRecord, frozen=True, kw_only=True):
+    """Who may drive from now on; at the start of every file and whenever it changes."""
+
+    holder: str  # peer; "" when the seat is free
+    name: str = ""
+    role: str = ""
+    why: str = ""  # "request", "granted", "taken", "released", "disconnected", "heartbeat lost", "idle"
+
+
+class StopRecord(OwnRecord, frozen=True, kw_only=True):
+    """Somebody pressed STOP, the robot took that press, or a stop was released. What held when is in the feedback."""
+
+    kind: Literal["stop", "taken", "reset"]
+    by: str
+    where: str  # the channel, "http", "board", or "robot"
+    reason: str = ""
+    delivered: bool = True  # False: there was no robot link
+    press: str = ""  # id of the press; "" of a reset
+    number: int = 0  # of the stop that was taken or released; 0 where nobody knows it yet
+    kept: bool = True  # whether the stop that was taken is on the robot's disk
+
+
+class ParticipantsRecord(OwnRecord, frozen=True, kw_only=True):
+    """Who is there, at the start of every file and whenever it changes."""
+
+    participants: list[Participant]
+
+
+class ReportRecord(OwnRecord, frozen=True, kw_only=True):
+    """What the page of the seat's holder says of itself: what it rendered, with which gaps."""
+
+    peer: str
+    name: str
+    report: Report
+
+
+class NoteRecord(OwnRecord, frozen=True, kw_only=True):
+    """What somebody wrote to everyone."""
+
+    peer: str
+    name: str
+    role: str
+    text: str
+
+
+class Degraded(OwnRecord, frozen=True, kw_only=True):
+    """The recorder was too slow and left records out before this one. Without it a recording has no gaps."""
+
+    lost: Annotated[int, msgspec.Meta(ge=1)]
+
+
+class SignatureRecord(OwnRecord, frozen=True, kw_only=True):
+    """The last message of a chunk: signs all that is in the file up to here (docs/recording.md, "Signatures")."""
+
+    recording: str
+    part: Annotated[int, msgspec.Meta(ge=1)]
+    number: Annotated[int, msgspec.Meta(ge=1)]  # counts the signatures of the file
+    until: Count  # ns since 1970, arrival of the last record that it signs
+    final: bool  # nothing comes behind it
+    head: str  # of the hash chain, 64 hexadecimal digits
+    previous: str  # head of the part before; "" in the first part
+    audit: str  # newest signed head of the audit, JSON; "" when there was none
+    key: str  # Ed25519 public key, 64 hexadecimal digits
+    signature: str  # 128 hexadecimal digits
+
+
+class Vector(msgspec.Struct, frozen=True):
+    x: float
+    y: float
+    z: float
+
+
+class WrenchRecord(OwnRecord, frozen=True, kw_only=True):
+    """Force and torque, named as in geometry_msgs/WrenchStamped."""
+
+    frame_id: str  # the body that the sensor sits on
+    force: Vector  # N
+    torque: Vector  # N m
+
+
+OWN_RECORDS: dict[str, type[OwnRecord]] = {
+    "lockstep.Robot": RobotRecord,
+    "lockstep.Command": CommandRecord,
+    "lockstep.Feedback": FeedbackRecord,
+    "lockstep.Refusal": RefusalRecord,
+    "lockstep.Rest": RestRecord,
+    "lockstep.Seat": SeatRecord,
+    "lockstep.Stop": StopRecord,
+    "lockstep.Participants": ParticipantsRecord,
+    "lockstep.Report": ReportRecord,
+    "lockstep.Note": NoteRecord,
+    "lockstep.Degraded": Degraded,
+    "lockstep.Wrench": WrenchRecord,
+    "lockstep.Signature": SignatureRecord,
+}
+"""By the name of their schema."""

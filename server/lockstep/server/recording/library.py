@@ -1,0 +1,132 @@
+"""The recordings that can be looked at: those of a console, or one file. What blocks is marked; use a thread for it."""
+
+from pathlib import Path
+from typing import Protocol
+
+from lockstep.protocol.console import RecordingState
+from lockstep.server.errors import AlreadyRecording, NotAllowed, NotFound
+from lockstep.server.recording.format.event_index import EventIndex
+from lockstep.server.recording.reading.known_indexes import KnownIndexes
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.recording_store import RecordingEntry, entry_of
+from lockstep.server.recording.recording_store import recording_id as id_of
+from lockstep.server.recording.writing.recorder import Recorder
+
+__all__ = ["ConsoleLibrary", "FileLibrary", "Library"]
+
+
+class Library(Protocol):
+    @property
+    def automatic(self) -> bool:
+        """Whether it records without being asked."""
+
+    def state(self) -> RecordingState: ...
+
+    def start(self, by: str, name: str) -> RecordingState:
+        """Raises ConsoleError."""
+
+    async def stop(self) -> RecordingState:
+        """Raises ConsoleError."""
+
+    def entries(self) -> list[RecordingEntry]:
+        """Blocks. The newest first."""
+
+    def open(self, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
+        """Blocks; close the reader. Raises NotFound, RecordingError, OSError."""
+
+    def delete(self, recording_id: str) -> None:
+        """Blocks. Raises NotFound, AlreadyRecording, NotAllowed, OSError."""
+
+
+class ConsoleLibrary:
+    """Of a running console: also the file that is being written."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        self._indexes = KnownIndexes()
+
+    @property
+    def automatic(self) -> bool:
+        return self._recorder.automatic
+
+    def state(self) -> RecordingState:
+        return self._recorder.state()
+
+    def start(self, by: str, name: str) -> RecordingState:
+        return self._recorder.start(by, name)
+
+    async def stop(self) -> RecordingState:
+        return await self._recorder.stop()
+
+    def entries(self) -> list[RecordingEntry]:
+        found = self._recorder.shelf.entries()
+        running = self._running()
+        if running is not None and running[1].chunks:
+            with RecordingReader(*running) as reader:
+                found.insert(0, entry_of(running[0], reader.info, reader.index, running=True))
+        return found
+
+    def open(self, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
+        running = self._running()
+        if running is not None and running[0].stem == recording_id:
+            reader = RecordingReader(*running)
+            return reader, entry_of(reader.path, reader.info, reader.index, running=True)
+        path = self._recorder.shelf.path(recording_id)
+        if path is None:
+            raise NotFound("no such recording")
+        return _open(path, self._indexes)
+
+    def delete(self, recording_id: str) -> None:
+        running = self._running()
+        if running is not None and running[0].stem == recording_id:
+            raise AlreadyRecording("it is being written; stop it first")
+        path = self._recorder.shelf.path(recording_id)
+        if path is None:
+            raise NotFound("no such recording")
+        self._recorder.shelf.delete(path)
+
+    def _running(self) -> tuple[Path, EventIndex] | None:
+        thread = self._recorder.running
+        path, index = (None, None) if thread is None else (thread.path, thread.index())
+        return None if path is None or index is None else (path, index)
+
+
+class FileLibrary:
+    """One file, for `lockstep replay`."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._indexes = KnownIndexes()
+
+    automatic = False
+
+    def state(self) -> RecordingState:
+        return RecordingState(state="off")
+
+    def start(self, by: str, name: str) -> RecordingState:
+        raise NotAllowed("there is no robot here, only a recording")
+
+    async def stop(self) -> RecordingState:
+        return self.state()
+
+    def entries(self) -> list[RecordingEntry]:
+        reader, entry = _open(self._path, self._indexes)
+        reader.close()
+        return [entry]
+
+    def open(self, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
+        if recording_id != id_of(self._path):
+            raise NotFound("no such recording")
+        return _open(self._path, self._indexes)
+
+    def delete(self, recording_id: str) -> None:
+        raise NotAllowed("a replayed file is not deleted here")
+
+
+def _open(path: Path, indexes: KnownIndexes) -> tuple[RecordingReader, RecordingEntry]:
+    reader = indexes.open(path)
+    try:
+        return reader, entry_of(path, reader.info, reader.index, interrupted=reader.interrupted)
+    except OSError:
+        reader.close()
+        raise

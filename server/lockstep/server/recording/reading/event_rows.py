@@ -1,0 +1,105 @@
+"""A recording as a table: one row for each event."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.serial import event_gap
+from lockstep.server.recording.format.payload import own_record_of
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, SeatRecord
+from lockstep.server.recording.format.topics import CAMERA, MICROPHONE, OWN_TOPICS
+from lockstep.server.recording.reading.reader import RecordingReader
+
+__all__ = ["EventRow", "columns_of", "event_rows", "values_of"]
+
+Value = str | int | float | bool | None
+WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
+READ = {OWN_TOPICS[FeedbackRecord], OWN_TOPICS[CommandRecord], OWN_TOPICS[SeatRecord]}
+
+
+class EventRow(NamedTuple):
+    """Times in ns since 1970."""
+
+    feedback: FeedbackRecord  # the first of the event
+    arrived: int
+    captured: int
+    command: CommandRecord | None  # that became the event; None for the file's first one
+    driver: str  # name of the seat's holder
+    stamps: dict[str, int]  # of the newest picture and sound that had arrived, by stream
+
+
+def event_rows(reader: RecordingReader) -> Iterator[EventRow]:
+    """In the order of their events. Raises RecordingError."""
+    event = 0
+    command: CommandRecord | None = None
+    driver = ""
+    stamps: dict[str, int] = {}
+    for record in reader.records():
+        for prefix in (CAMERA, MICROPHONE):
+            if record.topic.startswith(prefix):
+                stamps[record.topic.removeprefix(prefix)] = record.event
+        if record.topic not in READ:
+            continue
+        match own_record_of(record.schema, record.data):
+            case CommandRecord(outcome="forwarded") as forwarded:
+                command = forwarded
+            case SeatRecord(name=name):
+                driver = name
+            case FeedbackRecord() as feedback if feedback.event != event:
+                event = feedback.event
+                became = command if command is not None and command.event == event else None
+                yield EventRow(feedback, record.arrived, record.captured, became, driver, dict(stamps))
+
+
+def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, type]:
+    """Names and types, in order; units are SI, times say theirs."""
+    columns: dict[str, type] = {
+        "event": int,
+        "arrived_us": int,
+        "captured_us": int,
+        "bridge_time_s": float,
+        "driver": str,
+        "command_peer": str,
+        "command_issue": int,
+    }
+    columns |= {f"command.{axis.name}": float for axis in description.axes}
+    columns |= {f"axis.{axis.name}": float for axis in description.axes}
+    columns |= {f"joint.{joint.name}": float for joint in description.joints}
+    if description.wrench is not None:
+        columns |= {f"wrench.{name}": float for name in WRENCH}
+    if description.ranges is not None:
+        columns |= {f"range.{number}": float for number in range(description.ranges.count)}
+    columns |= {"at_rest": bool, "stopped": bool, "faults": str, "limits": str}
+    for stream in streams:
+        columns |= {f"stamp.{stream}": int, f"gap.{stream}": int}
+    return columns
+
+
+def values_of(row: EventRow, description: RobotDescription, streams: list[str]) -> list[Value]:
+    """In the order of `columns_of`; None: not known."""
+    feedback, command = row.feedback, row.command
+    values: list[Value] = [
+        feedback.event,
+        row.arrived // 1000,
+        row.captured // 1000,
+        feedback.time,
+        row.driver,
+        "" if command is None else command.peer,
+        None if command is None else command.issue,
+    ]
+    values += _filled([] if command is None else command.values, len(description.axes))
+    values += _filled(feedback.axes, len(description.axes))
+    values += _filled(feedback.joints, len(description.joints))
+    if description.wrench is not None:
+        values += _filled(feedback.wrench, len(WRENCH))
+    if description.ranges is not None:
+        values += _filled(feedback.ranges, description.ranges.count)
+    values += [feedback.at_rest, feedback.stop.stopped, "; ".join(feedback.faults), "; ".join(feedback.limits)]
+    for stream in streams:
+        stamp = row.stamps.get(stream)
+        values += [stamp, None if stamp is None else event_gap(feedback.event, stamp)]
+    return values
+
+
+def _filled(values: list[float], count: int) -> list[float | None]:
+    return [*values[:count], *[None] * (count - len(values))]

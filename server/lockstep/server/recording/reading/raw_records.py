@@ -1,0 +1,75 @@
+"""The records of an MCAP file in the order in which they lie there, without any index, and what a chunk holds."""
+
+import os
+import struct
+from collections.abc import Iterator
+from typing import BinaryIO, NamedTuple
+
+from mcap.exceptions import McapError
+from mcap.records import Chunk, McapRecord
+from mcap.stream_reader import CRCValidationError, breakup_chunk
+from zstandard import ZstdError, frame_content_size
+
+from lockstep.server.recording.errors import RecordingDamaged
+
+__all__ = [
+    "BROKEN",
+    "HEAD",
+    "MAGIC",
+    "MAX_RECORD",
+    "MAX_UNPACKED",
+    "RawRecord",
+    "check_packed",
+    "chunk_records",
+    "raw_records",
+]
+
+MAGIC = b"\x89MCAP0\r\n"
+HEAD = 9  # bytes of opcode and length
+MAX_RECORD = 256 * 1024 * 1024  # bytes; the index of a long recording is the largest
+MAX_UNPACKED = 32 * 1024 * 1024  # bytes, of a chunk; ours have one megabyte and one picture more
+
+# What the mcap library raises where bytes are not what they should be.
+BROKEN = (McapError, CRCValidationError, ZstdError, struct.error, ValueError, KeyError, EOFError, RuntimeError)
+
+
+class RawRecord(NamedTuple):
+    opcode: int
+    offset: int
+    content: bytes
+
+    @property
+    def end(self) -> int:
+        return self.offset + HEAD + len(self.content)
+
+
+def raw_records(file: BinaryIO) -> Iterator[RawRecord]:
+    """From where `file` stands on, as far as they are whole. Raises RecordingDamaged: one is too large."""
+    size = os.fstat(file.fileno()).st_size
+    while True:
+        offset = file.tell()
+        head = file.read(HEAD)
+        length = int.from_bytes(head[1:], "little")
+        if len(head) < HEAD or offset + HEAD + length > size:
+            return
+        if length > MAX_RECORD:  # a file with holes is as long as it says, and takes no room on the disk
+            raise RecordingDamaged(f"a record of {length} bytes at byte {offset}, the bound is {MAX_RECORD}")
+        yield RawRecord(head[0], offset, file.read(length))
+
+
+def check_packed(chunk: Chunk) -> None:
+    """Whether it may be unpacked: no few bytes that would become more than fits in memory, and no lz4.
+
+    Raises ValueError.
+    """
+    if chunk.compression not in ("", "zstd"):
+        raise ValueError(f"compressed as {chunk.compression!r}")
+    unpacked = frame_content_size(chunk.data) if chunk.compression else len(chunk.data)
+    if unpacked != chunk.uncompressed_size or unpacked > MAX_UNPACKED:
+        raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes, or {unpacked}")
+
+
+def chunk_records(chunk: Chunk) -> list[McapRecord]:
+    """What is in it. Raises one of BROKEN."""
+    check_packed(chunk)
+    return breakup_chunk(chunk, validate_crc=True)

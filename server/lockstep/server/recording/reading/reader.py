@@ -1,0 +1,268 @@
+"""Reads a recording by event: through its index, chunk by chunk. Also one that is still written, or was interrupted."""
+
+from collections.abc import Collection, Iterator
+from io import BytesIO
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple, Self
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, AttachmentIndex, Chunk, Footer, Message, Metadata
+from mcap.stream_reader import CRCValidationError
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.serial import is_newer
+from lockstep.robot_bridge.description.check_description import check_bounds
+from lockstep.robot_bridge.errors import DescriptionError
+from lockstep.server.recording.errors import RecordingDamaged, RecordingTampered
+from lockstep.server.recording.format.event_index import INDEX_NAME, EventEntry, EventIndex, check_index, decode_index
+from lockstep.server.recording.format.info import METADATA_NAME, RecordingInfo
+from lockstep.server.recording.format.payload import (
+    SOUND,
+    VIDEO,
+    RecordedPicture,
+    RecordedSound,
+    own_record,
+    payload_of,
+    picture_of,
+    sound_of,
+)
+from lockstep.server.recording.format.records import RobotRecord
+from lockstep.server.recording.format.topics import OWN_TOPICS
+from lockstep.server.recording.reading.raw_records import BROKEN, HEAD, MAGIC, MAX_RECORD, chunk_records
+from lockstep.server.recording.reading.scan import scan_file
+from lockstep.server.util.regular_file import open_regular
+
+__all__ = ["Record", "RecordingReader"]
+
+FOOTER = HEAD + 20 + len(MAGIC)
+
+
+class Record(NamedTuple):
+    """One record of the file. Times in ns since 1970."""
+
+    topic: str
+    schema: str
+    event: int
+    arrived: int
+    captured: int
+    data: bytes  # the message as it stands in the file
+    chunk: int
+
+    @property
+    def payload(self) -> bytes:
+        """The bare encoded picture or sound; of every other topic the message itself. Raises RecordingDamaged."""
+        return payload_of(self.schema, self.data)
+
+    @property
+    def picture(self) -> RecordedPicture | None:
+        """None: it is none. Raises RecordingDamaged."""
+        return picture_of(self.data) if self.schema == VIDEO else None
+
+    @property
+    def sound(self) -> RecordedSound | None:
+        """As `picture`."""
+        return sound_of(self.schema, self.data) if self.schema in SOUND else None
+
+    @property
+    def keyframe(self) -> bool:
+        """Whether it can be decoded without earlier ones: always, but for most pictures."""
+        picture = self.picture
+        return picture is None or picture.keyframe
+
+
+class RecordingReader:
+    """Close it, or use it as a context manager. Used from one thread at a time.
+
+    Args:
+        index: of a file that is still written; None: read it from the file, or build it from what is there
+
+    Raises:
+        RecordingDamaged: it is no recording.
+        OSError: it cannot be read.
+    """
+
+    def __init__(self, path: Path, index: EventIndex | None = None) -> None:
+        self.path = path
+        self.interrupted = False  # neither closed nor still written: the index was made from what is there
+        self._file = open_regular(path)
+        try:
+            self.info = self._read_info()
+            self.index = index or self._read_index() or self._scan()
+            check_index(self.index)
+        except BROKEN as error:
+            self._file.close()
+            raise RecordingDamaged(f"{path.name}: {error or type(error).__name__}") from error
+        except BaseException:
+            self._file.close()
+            raise
+        self._topics = {each.id: each for each in self.index.topics}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._file.close()
+
+    @property
+    def size(self) -> int:
+        return self.path.stat().st_size
+
+    def description(self) -> RobotDescription:
+        """Of the robot. Raises RecordingDamaged when the file has none."""
+        for number in range(min(2, len(self.index.chunks))):
+            for record in self.chunk(number, {OWN_TOPICS[RobotRecord]}):
+                return _shown(own_record(RobotRecord, record.data).description)
+        raise RecordingDamaged("it does not say which robot it is of")
+
+    def records(
+        self,
+        first_event: int | None = None,
+        last_event: int | None = None,
+        topics: Collection[str] | None = None,
+        *,
+        decodable: bool = False,
+    ) -> Iterator[Record]:
+        """In the order of arrival, those stamped with `first_event` to `last_event`.
+
+        Args:
+            first_event, last_event: None: from the beginning, to the end
+            topics: None: all
+            decodable: pictures come from the last keyframe at or before `first_event` on
+        """
+        index = self.index
+        if first_event is None and last_event is None:
+            for number in range(len(index.chunks)):
+                yield from self.chunk(number, topics)
+            return
+        first = index.first_event if first_event is None else first_event
+        last = index.last_event if last_event is None else last_event
+        starts = self._picture_starts(first) if decodable else {}
+        wanted = sorted({*index.chunks_with(first, last), *self._chunks_from(starts, first)})
+        for number in wanted:
+            for record in self.chunk(number, topics):
+                if is_newer(record.event, last):
+                    continue
+                if not is_newer(first, record.event) or (
+                    record.topic in starts and record.arrived // 1000 >= starts[record.topic].arrived
+                ):
+                    yield record
+
+    def _picture_starts(self, event: int) -> dict[str, EventEntry]:
+        found = {topic: self.index.keyframe_before(topic, event) for topic in self.index.keyframes}
+        return {topic: entry for topic, entry in found.items() if entry is not None}
+
+    def _chunks_from(self, starts: dict[str, EventEntry], event: int) -> Iterator[int]:
+        """From the earliest of the keyframes to the event."""
+        if starts:
+            first = min(entry.chunk for entry in starts.values())
+            until = next(iter(self.index.chunks_with(event, event)), first)
+            yield from range(first, min(until + 1, len(self.index.chunks)))
+
+    def chunk(self, number: int, topics: Collection[str] | None = None) -> Iterator[Record]:
+        """The records of one chunk.
+
+        Raises:
+            IndexError: there is no such chunk.
+            RecordingTampered: its checksum does not fit.
+            RecordingDamaged: it cannot be read.
+        """
+        if not 0 <= number < len(self.index.chunks):
+            raise IndexError(number)
+        try:
+            content = Chunk.read(
+                ReadDataStream(BytesIO(self._record_at(self.index.chunks[number].offset, Opcode.CHUNK)))
+            )
+            parts = chunk_records(content)
+        except CRCValidationError as error:
+            raise RecordingTampered(f"chunk {number} is not what was written") from error
+        except BROKEN as error:
+            raise RecordingDamaged(f"chunk {number}: {error}") from error
+        for part in parts:
+            topic = self._topics.get(part.channel_id) if isinstance(part, Message) else None
+            if topic is None or not isinstance(part, Message) or (topics is not None and topic.topic not in topics):
+                continue
+            yield Record(topic.topic, topic.schema, part.sequence, part.log_time, part.publish_time, part.data, number)
+
+    def _record_at(self, offset: int, opcode: int) -> bytes:
+        """The content of one MCAP record, after its opcode and length."""
+        self._seek(offset)
+        head = self._file.read(HEAD)
+        length = int.from_bytes(head[1:], "little")
+        if len(head) < HEAD or head[0] != opcode or length > MAX_RECORD:
+            raise RecordingDamaged(f"no record of kind {opcode} at {offset}")
+        content = self._file.read(length)
+        if len(content) < length:
+            raise RecordingDamaged(f"the record at {offset} is cut off")
+        return content
+
+    def _seek(self, offset: int) -> None:
+        """Where the file says that something stands; what it says may be any number."""
+        if not 0 <= offset <= self.size:
+            raise RecordingDamaged(f"nothing stands at byte {offset} of {self.size}")
+        self._file.seek(offset)
+
+    def _read_info(self) -> RecordingInfo:
+        self._file.seek(0)
+        if self._file.read(len(MAGIC)) != MAGIC:
+            raise RecordingDamaged(f"{self.path.name} is no MCAP file")
+        header = self._file.read(HEAD)
+        offset = len(MAGIC) + HEAD + int.from_bytes(header[1:], "little")
+        metadata = Metadata.read(ReadDataStream(BytesIO(self._record_at(offset, Opcode.METADATA))))
+        if metadata.name != METADATA_NAME:
+            raise RecordingDamaged(f"{self.path.name} is no recording of Lockstep")
+        return RecordingInfo.parse(metadata.metadata)
+
+    def _read_index(self) -> EventIndex | None:
+        """None: the file was not closed."""
+        end = self._file.seek(0, 2)
+        if end < FOOTER:
+            return None
+        self._file.seek(end - len(MAGIC))
+        if self._file.read() != MAGIC:
+            return None
+        footer = Footer.read(ReadDataStream(BytesIO(self._record_at(end - FOOTER, Opcode.FOOTER))))
+        entry = self._attachment(footer, end)
+        if entry is None:
+            return None
+        attachment = Attachment.read(ReadDataStream(BytesIO(self._record_at(entry.offset, Opcode.ATTACHMENT))))
+        return decode_index(attachment.data)
+
+    def _attachment(self, footer: Footer, end: int) -> AttachmentIndex | None:
+        """Where the index is: the summary's last groups are short, so they are read from their own beginning."""
+        self._seek(footer.summary_offset_start or footer.summary_start)
+        length = end - self._file.tell() - FOOTER
+        if length > MAX_RECORD:
+            raise RecordingDamaged(f"a summary of {length} bytes, the bound is {MAX_RECORD}")
+        summary = self._file.read(length)
+        at = 0
+        while at + HEAD <= len(summary):
+            opcode, length = summary[at], int.from_bytes(summary[at + 1 : at + HEAD], "little")
+            content = ReadDataStream(BytesIO(summary[at + HEAD : at + HEAD + length]))
+            at += HEAD + length
+            if opcode == Opcode.SUMMARY_OFFSET:
+                group = content.read1()
+                start = content.read8()
+                if group == Opcode.ATTACHMENT_INDEX:
+                    found = AttachmentIndex.read(ReadDataStream(BytesIO(self._record_at(start, group))))
+                    return found if found.name == INDEX_NAME else None
+        return None
+
+    def _scan(self) -> EventIndex:
+        self.interrupted = True
+        return scan_file(self.path, self.info).index
+
+
+def _shown(description: RobotDescription) -> RobotDescription:
+    """Whoever made the file may have written anything. Raises RecordingDamaged."""
+    try:
+        check_bounds(description)
+    except DescriptionError as error:
+        raise RecordingDamaged(f"the robot's description: {error}") from error
+    return description

@@ -1,0 +1,235 @@
+"""The directory of recordings: lists them, completes interrupted ones, deletes what is too much. Blocks."""
+
+import fcntl
+import math
+import os
+import threading
+import time
+from collections.abc import Collection
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import structlog
+
+from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.format.event_index import EventIndex
+from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.reading.scan import complete_file
+from lockstep.server.recording.settings import RecordingSettings
+
+__all__ = ["RecordingEntry", "RecordingStore", "entry_of", "recording_id"]
+
+log = structlog.get_logger(__name__)
+
+SUFFIX = ".mcap"
+DAY = 86_400.0
+LIST_SECONDS = 1.0  # that a list holds at most: whoever asks again and again costs no more than a look at the directory
+SETTLED_NS = 100_000_000  # since when a directory is unchanged, or a change may bear the same time
+
+
+class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
+    """One file. Times in µs since 1970."""
+
+    id: str  # as `recording_id`
+    recording: str
+    part: int
+    name: str
+    robot: str
+    epoch: str
+    by: str
+    started: int
+    ended: int
+    first_event: int
+    last_event: int
+    bytes: int
+    marks: dict[str, int]  # how many of each kind
+    lost: int
+    running: bool
+    interrupted: bool
+
+
+class _Listed(NamedTuple):
+    """What the directory had."""
+
+    at: float  # s, monotonic; minus infinity: it may have changed since without a sign
+    changed: int  # ns, when it was changed last
+    written: list[Path]  # what somebody was writing
+    entries: list[RecordingEntry]
+
+
+def recording_id(path: Path) -> str:
+    """The file's name without its suffix; bytes that are no UTF-8 cannot be told, and are replaced."""
+    return os.fsencode(path.stem).decode(errors="replace")
+
+
+class RecordingStore:
+    """One directory. Files that are no recordings are passed over, and so are symbolic links: whoever may read what is
+    here may not read what somewhere else is. From any thread.
+    """
+
+    def __init__(self, directory: Path, settings: RecordingSettings) -> None:
+        self.directory = directory
+        self._settings = settings
+        self._busy = threading.Lock()  # one list at a time: those that wait find all known
+        self._listed = _Listed(-math.inf, -1, [], [])
+        self._written: list[Path] = []  # what somebody writes, as far as the list under way has come
+        self._known: dict[Path, tuple[tuple[int, int], RecordingEntry | None]] = {}  # by size and time of change
+
+    def prepare(self) -> None:
+        """Raises OSError: the directory cannot be made."""
+        self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+
+    def files(self) -> list[Path]:
+        """Raises OSError: the directory cannot be read."""
+        return [path for path in self.directory.glob(f"*{SUFFIX}") if path.is_file() and not path.is_symlink()]
+
+    def path(self, wanted: str) -> Path | None:
+        """None: there is none of that id. Raises OSError."""
+        return next((path for path in self.files() if recording_id(path) == wanted), None)
+
+    def entries(self) -> list[RecordingEntry]:
+        """The newest first. Files that are being written are not among them. Raises OSError."""
+        with self._busy:
+            if not self._is_still(self._listed):
+                self._listed = self._list()
+            return [*self._listed.entries]
+
+    def _list(self) -> _Listed:
+        now, changed = time.monotonic(), _changed(self.directory)
+        paths = self.files()
+        present = set(paths)
+        self._known = {path: known for path, known in self._known.items() if path in present}
+        self._written = []
+        found = [entry for path in paths if (entry := self._entry(path)) is not None]
+        if time.time_ns() - changed < SETTLED_NS:
+            now = -math.inf
+        return _Listed(now, changed, self._written, sorted(found, key=lambda entry: entry.started, reverse=True))
+
+    def _is_still(self, listed: _Listed) -> bool:
+        """Whether nothing was made, deleted or finished since."""
+        try:
+            return (
+                time.monotonic() - listed.at < LIST_SECONDS
+                and _changed(self.directory) == listed.changed
+                and all(map(_is_locked, listed.written))
+            )
+        except OSError:
+            return False
+
+    def _entry(self, path: Path) -> RecordingEntry | None:
+        try:
+            status = path.stat()
+            version = status.st_size, status.st_mtime_ns
+            known = self._known.get(path)
+            if known is not None and known[0] == version:
+                return known[1]
+            entry = None
+            if _is_locked(path):
+                self._written.append(path)
+            else:
+                with RecordingReader(path) as reader:
+                    entry = entry_of(path, reader.info, reader.index, interrupted=reader.interrupted)
+                self._known[path] = version, entry
+            return entry
+        except (RecordingError, OSError):
+            return None
+
+    def recover(self) -> int:
+        """Complete the files that were interrupted; how many."""
+        count = 0
+        for path in self.files():
+            try:
+                if _is_locked(path):
+                    continue
+                with RecordingReader(path) as reader:
+                    if not reader.interrupted:
+                        continue
+                    info, empty = reader.info, not reader.index.chunks
+                if empty:
+                    path.unlink()
+                    continue
+                complete_file(path, info)
+                count += 1
+                log.warning("an interrupted recording was completed", file=path.name)
+            except (RecordingError, OSError) as error:
+                log.error("an interrupted recording cannot be completed", file=path.name, reason=str(error))
+        return count
+
+    def prune(self, keep: Collection[Path] = ()) -> list[str]:
+        """Delete recordings that are too old, and the oldest while there are too many bytes; returns their ids.
+
+        Raises:
+            OSError: the directory cannot be read.
+        """
+        dated = []
+        for path in self.files():
+            with suppress(OSError):  # somebody else deletes too
+                status = path.stat()
+                dated.append((status.st_mtime, status.st_size, path))
+        total = sum(size for _, size, _ in dated)
+        oldest = time.time() - self._settings.age_days * DAY
+        gone = []
+        for changed, size, path in sorted(dated):
+            if total <= self._settings.total_bytes and changed >= oldest:
+                break
+            try:
+                if path in keep or _is_locked(path):
+                    continue
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                log.error("a recording cannot be deleted", file=path.name, reason=error.strerror)
+                continue
+            total -= size
+            gone.append(recording_id(path))
+            log.warning("a recording was deleted to make room", file=path.name)
+        return gone
+
+    def delete(self, path: Path) -> None:
+        path.unlink(missing_ok=True)
+
+
+def entry_of(
+    path: Path, info: RecordingInfo, index: EventIndex, *, running: bool = False, interrupted: bool = False
+) -> RecordingEntry:
+    marks: dict[str, int] = {}
+    for mark in index.marks:
+        marks[mark.kind] = marks.get(mark.kind, 0) + 1
+    return RecordingEntry(
+        id=recording_id(path),
+        recording=info.recording,
+        part=info.part,
+        name=info.name,
+        robot=info.robot,
+        epoch=info.epoch,
+        by=info.by,
+        started=index.started,
+        ended=index.ended,
+        first_event=index.first_event,
+        last_event=index.last_event,
+        bytes=path.stat().st_size,
+        marks=marks,
+        lost=index.lost,
+        running=running,
+        interrupted=interrupted,
+    )
+
+
+def _changed(directory: Path) -> int:
+    """When something was made in it or deleted, in ns; -1: nobody knows."""
+    try:
+        return directory.stat().st_mtime_ns
+    except OSError:
+        return -1
+
+
+def _is_locked(path: Path) -> bool:
+    """Whether somebody writes it now."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        return False

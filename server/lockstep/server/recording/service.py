@@ -1,0 +1,73 @@
+"""What the routes of recordings need."""
+
+import asyncio
+import contextvars
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
+
+from lockstep.server.audit.records import Actor, AuditKind
+from lockstep.server.auth.tokens import Access
+from lockstep.server.errors import ShuttingDown
+from lockstep.server.recording.library import Library
+from lockstep.server.util.rate_limits import RateLimits
+
+__all__ = ["RecordingAudit", "RecordingService"]
+
+
+STARTS, START_RATE = 20, 0.1  # Hz, of one link: the shelf is bounded in bytes, not in files
+READERS = 2  # threads; who reads recordings waits for each other
+
+Result = TypeVar("Result")
+
+
+class RecordingAudit(Protocol):
+    """What the routes need of the audit."""
+
+    def record(self, kind: AuditKind, actor: Actor = ..., what: str = ..., detail: str = ...) -> None: ...
+    def again(self, kind: AuditKind, actor: Actor, what: str) -> None: ...
+
+
+class _NoAudit:
+    def record(self, kind: AuditKind, actor: Actor = Actor(), what: str = "", detail: str = "") -> None:  # noqa: B008
+        pass
+
+    def again(self, kind: AuditKind, actor: Actor, what: str) -> None:
+        pass
+
+
+@dataclass(frozen=True)
+class RecordingService:
+    """`app.state.recordings`; None while a robot's session has failed.
+
+    Attributes:
+        holds_seat: whether a peer with the link of this id drives
+        starts: how often each link may begin a recording
+        opens_all: every good link reads everything: it was made for the one file that is replayed
+    """
+
+    library: Library
+    access: Access
+    audit: RecordingAudit = _NoAudit()
+    holds_seat: Callable[[str], bool] = lambda link: False
+    opens_all: bool = False
+    starts: RateLimits = field(default_factory=lambda: RateLimits(START_RATE, STARTS))
+    threads: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(READERS, "recordings"))
+
+    async def in_thread(self, work: Callable[[], Result]) -> Result:
+        """What reads files. A slow disk, or many who read, take no thread from anything else.
+
+        Raises:
+            ShuttingDown: it is closed.
+        """
+        loop, context = asyncio.get_running_loop(), contextvars.copy_context()
+        try:
+            reading = loop.run_in_executor(self.threads, context.run, work)
+        except RuntimeError as error:
+            raise ShuttingDown("the session of this robot ends") from error
+        return await reading
+
+    def close(self) -> None:
+        """Idempotent; waits for nobody."""
+        self.threads.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,1 @@
+"""Whether a recording keeps the promises of Lockstep, and whether it was changed."""

@@ -1,0 +1,354 @@
+"""Checks a recording against what Lockstep promises (DESIGN: exactly once, never late, only from the seat). No I/O.
+
+Show a `Verifier` every record in the order of the file, then ask for its `verdict`. It goes by events and by the robot
+bridge's own clock; the console's clock decides nothing.
+"""
+
+from typing import Literal
+
+import msgspec
+
+from lockstep.protocol.console import StreamReport
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.serial import event_after, event_gap, is_event, is_newer
+from lockstep.server.recording.format.records import (
+    CommandRecord,
+    Degraded,
+    FeedbackRecord,
+    OwnRecord,
+    RefusalRecord,
+    ReportRecord,
+    RobotRecord,
+    SeatRecord,
+    StopRecord,
+)
+from lockstep.server.recording.verify.verify_signature import SignatureReport
+
+__all__ = ["CHECKS", "Check", "CheckName", "Verdict", "Verifier", "Violation"]
+
+CheckName = Literal[
+    "readable",  # the file is whole, and its checksums fit
+    "complete",  # no event is missing, and the recorder left nothing out
+    "monotonic",  # `s` never decreases, and everything is of one epoch
+    "once",  # every event comes from one forwarded command, and executes once
+    "in_time",  # no command executes later than max_event_age after the feedback that it answers, and has seen
+    "seat",  # commands are forwarded for the seat's holder alone
+    "stopped",  # and not while the robot is stopped, or a stop is on its way to it
+    "stamps",  # no picture or sound is stamped newer than it is
+    "rendered",  # the operator's page rendered nothing beyond its tolerance
+    "signed",  # everything is what was signed, to its end; or nothing is signed
+]
+CHECKS: tuple[CheckName, ...] = (
+    "readable",
+    "complete",
+    "monotonic",
+    "once",
+    "in_time",
+    "seat",
+    "stopped",
+    "stamps",
+    "rendered",
+    "signed",
+)
+TICK = 0.25  # s from the decision to execute until the feedback's own time: a tick and the measurement, with room
+ROUNDING = 2e-6  # s; times in the file are rounded to ns, capture times of sound to a sample
+MANY_PRESSES = 64  # on their way; of more some share an answer, and the oldest of them may have none of their own
+MOST = 50  # violations of a check that are listed
+
+
+class Violation(msgspec.Struct, frozen=True):
+    event: int
+    time: int  # µs since 1970, arrival
+    text: str
+
+
+class Check(msgspec.Struct):
+    """One promise."""
+
+    looked: int = 0  # how often there was something to check
+    count: int = 0  # of violations
+    violations: list[Violation] = []  # the first ones
+
+    @property
+    def ok(self) -> bool:
+        return self.count == 0
+
+
+class Verdict(msgspec.Struct, kw_only=True):
+    ok: bool
+    checks: dict[CheckName, Check]
+    events: int  # that were executed
+    commands: int  # forwarded
+    pictures_and_sounds: int
+    signature: SignatureReport
+
+
+class _Answered(msgspec.Struct):
+    """Feedback of one event, by the issues that were recorded."""
+
+    times: dict[int, float]  # s, the bridge's clock
+    stopped: dict[int, bool]
+    nonces: dict[int, int]  # 0 in recordings of before there were any
+
+
+class _Stops:
+    """Whether a stop is on its way to the robot. In recordings of before there were numbers, a stop has no press."""
+
+    def __init__(self) -> None:
+        self.shown = 0  # number of the newest that a feedback has shown
+        self._asked: dict[str, None] = {}  # presses that the robot has not taken, oldest first
+        self._taken = 0  # number of the newest that it has
+        self._asked_without_id = False
+
+    @property
+    def coming(self) -> bool:
+        return bool(self._asked) or self._asked_without_id or self._taken > self.shown
+
+    def record(self, record: StopRecord) -> str:
+        """What is wrong with it; "" for nothing."""
+        if record.kind == "stop":
+            if record.press:
+                self._asked[record.press] = None
+            else:
+                self._asked_without_id = True
+        elif record.kind == "taken":
+            self._take(record)
+        elif not record.number:
+            self._asked_without_id = False
+        elif record.number < self.shown:
+            return f"a reset of stop {record.number} had effect, and stop {self.shown} is newer"
+        return ""
+
+    def _take(self, taken: StopRecord) -> None:
+        self._taken = max(self._taken, taken.number)
+        while len(self._asked) > MANY_PRESSES and (oldest := next(iter(self._asked))) != taken.press:
+            del self._asked[oldest]
+        self._asked.pop(taken.press, None)
+
+    def feedback(self, feedback: FeedbackRecord) -> str:
+        """As `record`."""
+        stop, shown = feedback.stop, self.shown
+        self.shown = max(shown, stop.number)
+        if stop.stopped:
+            self._asked_without_id = False
+        return f"stop {stop.number} is shown after stop {shown}" if stop.number < shown else ""
+
+
+class Verifier:
+    def __init__(self, epoch: str) -> None:
+        self._epoch = epoch
+        self._checks: dict[CheckName, Check] = {name: Check() for name in CHECKS}
+        self._description: RobotDescription | None = None
+        self._newest: FeedbackRecord | None = None
+        self._answered: dict[int, _Answered] = {}  # by event: the newest two
+        self._first_times: dict[int, float] = {}  # by event, s, the bridge's clock
+        self._offset = 0  # ns from the bridge's clock to the recording's
+        self._holder: str | None = None  # None: not known yet
+        self._stops = _Stops()
+        self._stopped = False
+        self._in_flight: CommandRecord | None = None
+        self._linked = True
+        self._waiting: list[tuple[str, int, int, float]] = []  # stamped with an event whose feedback is not here yet
+        self._rendered: dict[tuple[str, str], StreamReport] = {}  # newest, by peer and stream
+        self._events = self._commands = self._media = 0
+        self._signature = SignatureReport()
+
+    def fail(self, check: CheckName, text: str, event: int = 0, time: int = 0) -> None:
+        """Something is not as promised."""
+        found = self._checks[check]
+        found.count += 1
+        if len(found.violations) < MOST:
+            found.violations.append(Violation(event, time, text))
+
+    def signed(self, report: SignatureReport) -> None:
+        """What the file's signatures say."""
+        self._signature = report
+        self._checks["signed"].looked += report.signatures
+        for fault in report.faults:
+            self.fail("signed", fault.text, fault.event, fault.time)
+
+    def record(self, record: OwnRecord, arrived: int, captured: int) -> None:
+        """One of Lockstep's own; times in ns since 1970."""
+        micros = arrived // 1000
+        if record.epoch != self._epoch:
+            self.fail("monotonic", f"a record of epoch {record.epoch!r}", record.event, micros)
+        match record:
+            case RobotRecord():
+                self._description = record.description
+                self._linked = record.link == "up"
+                self._in_flight = None
+            case SeatRecord():
+                self._holder = record.holder
+            case StopRecord():
+                if wrong := self._stops.record(record):
+                    self.fail("stopped", wrong, record.event, micros)
+            case RefusalRecord(by="robot", refused=refused) if self._in_flight is not None:
+                if refused in (0, self._in_flight.event):
+                    self._in_flight = None
+            case CommandRecord(outcome="forwarded"):
+                self._command(record, micros)
+            case FeedbackRecord():
+                self._feedback(record, micros, captured)
+            case ReportRecord():
+                self._report(record, micros)
+            case Degraded(lost=lost):
+                self.fail("complete", f"the recorder left out {lost} records", record.event, micros)
+
+    def _command(self, command: CommandRecord, micros: int) -> None:
+        self._commands += 1
+        for check in (self._checks["seat"], self._checks["stopped"], self._checks["once"]):
+            check.looked += 1
+        if self._holder is not None and command.peer != self._holder:
+            holds = f"{self._holder!r} holds the seat" if self._holder else "nobody holds the seat"
+            self.fail("seat", f"a command of {command.peer!r} went to the robot while {holds}", command.event, micros)
+        if self._stops.coming or self._stopped:
+            self.fail("stopped", "a command went to the robot while it was stopped", command.event, micros)
+        if self._in_flight is not None:
+            self.fail(
+                "once", f"a command while that of event {self._in_flight.event} is on its way", command.event, micros
+            )
+        if self._newest is not None and command.event != event_after(self._newest.event):
+            self.fail("once", f"a command that is not the next after event {self._newest.event}", command.event, micros)
+        self._judge_nonce(command, micros)
+        self._in_flight = command
+
+    def _judge_nonce(self, command: CommandRecord, micros: int) -> None:
+        """Whoever drives has seen what the command answers."""
+        known = None if self._newest is None else self._answered.get(self._newest.event)
+        nonce = 0 if known is None else known.nonces.get(command.issue, 0)
+        if nonce and command.nonce != nonce:
+            text = f"its nonce is not that of issue {command.issue}, which it answers"
+            self.fail("in_time", text, command.event, micros)
+
+    def _feedback(self, feedback: FeedbackRecord, micros: int, captured: int) -> None:
+        before = self._newest
+        self._checks["monotonic"].looked += 1
+        self._offset = captured - round(feedback.time * 1e9)
+        if before is None:
+            self._begin(feedback)
+        elif feedback.event == before.event:
+            self._again(before, feedback, micros)
+        elif is_newer(feedback.event, before.event):
+            self._executed(before, feedback, micros)
+        else:
+            self.fail("monotonic", f"event {feedback.event} after event {before.event}", feedback.event, micros)
+            return
+        self._newest = feedback
+        self._stopped = feedback.stop.stopped
+        if wrong := self._stops.feedback(feedback):
+            self.fail("stopped", wrong, feedback.event, micros)
+        known = self._answered[feedback.event]
+        known.times[feedback.issue] = feedback.time
+        known.stopped[feedback.issue] = feedback.stop.stopped
+        known.nonces[feedback.issue] = feedback.nonce
+        self._settle_stamps(feedback.event)
+
+    def _begin(self, feedback: FeedbackRecord) -> None:
+        """The first of the file: what was before is not known."""
+        self._answered = {feedback.event: _Answered({}, {}, {})}
+        if feedback.issue == 1:
+            self._first_times[feedback.event] = feedback.time
+
+    def _again(self, before: FeedbackRecord, feedback: FeedbackRecord, micros: int) -> None:
+        if feedback.issue <= before.issue:
+            text = f"issue {feedback.issue} after issue {before.issue}: the event was executed again"
+            self.fail("once", text, feedback.event, micros)
+        if feedback.time < before.time:
+            self.fail("monotonic", "the robot bridge's clock went back", feedback.event, micros)
+
+    def _executed(self, before: FeedbackRecord, feedback: FeedbackRecord, micros: int) -> None:
+        event = feedback.event
+        self._events += 1
+        self._checks["complete"].looked += 1
+        if event != event_after(before.event):
+            missing = event_gap(event, before.event) - 1
+            self.fail("complete", f"{missing} events are missing before event {event}", event, micros)
+        if feedback.time < before.time:
+            self.fail("monotonic", "the robot bridge's clock went back", event, micros)
+        command, self._in_flight = self._in_flight, None
+        if command is not None and command.event == event:
+            self._judge_age(before, command, feedback, micros)
+        elif self._commands > 0 or self._events > 1:  # the very first may have been sent before the file began
+            self.fail("once", f"event {event} was executed without a forwarded command", event, micros)
+        self._answered = {
+            before.event: self._answered.get(before.event, _Answered({}, {}, {})),
+            event: _Answered({}, {}, {}),
+        }
+        self._first_times[event] = feedback.time
+
+    def _judge_age(self, before: FeedbackRecord, command: CommandRecord, feedback: FeedbackRecord, micros: int) -> None:
+        known = self._answered.get(before.event)
+        if known is None or self._description is None:
+            return
+        check = self._checks["in_time"]
+        check.looked += 1
+        issued = known.times.get(command.issue)
+        if issued is None:
+            if self._events > 1:
+                text = f"it answers issue {command.issue}, which is not in the record"
+                self.fail("in_time", text, command.event, micros)
+            return
+        age = feedback.time - issued
+        most = self._description.max_event_age
+        if age > most + TICK:
+            text = f"executed {age:.3f} s after the feedback that it answers; {most:g} s are allowed"
+            self.fail("in_time", text, command.event, micros)
+        if known.stopped.get(command.issue):
+            self.fail("stopped", "it answers a feedback that says stopped", command.event, micros)
+
+    def medium(self, stream: str, stamp: int, arrived: int, captured: int) -> None:
+        """A picture or a sound of the robot's; times in ns since 1970."""
+        self._media += 1
+        self._checks["stamps"].looked += 1
+        micros = arrived // 1000
+        if not is_event(stamp):
+            self.fail("stamps", f"{stream}: {stamp} is no event", stamp, micros)
+            return
+        at = (captured - self._offset) / 1e9
+        if self._newest is None or is_newer(stamp, self._newest.event):
+            if len(self._waiting) < 10_000:
+                self._waiting.append((stream, stamp, micros, at))
+        else:
+            self._judge_stamp(stream, stamp, micros, at)
+
+    def _judge_stamp(self, stream: str, stamp: int, micros: int, at: float) -> None:
+        began = self._first_times.get(stamp)
+        if began is not None and at < began - ROUNDING:
+            text = f"{stream}: captured {1000 * (began - at):.1f} ms before its event began"
+            self.fail("stamps", text, stamp, micros)
+
+    def _settle_stamps(self, event: int) -> None:
+        left = []
+        for waiting in self._waiting:
+            if is_newer(waiting[1], event):
+                left.append(waiting)
+            else:
+                self._judge_stamp(*waiting)
+        self._waiting = left
+
+    def _report(self, record: ReportRecord, micros: int) -> None:
+        for stream in record.report.streams:
+            key = record.peer, stream.stream
+            before = self._rendered.get(key)
+            self._rendered[key] = stream
+            if before is None or "off" in (before.gate, stream.gate) or "age" in (before.gate, stream.gate):
+                continue  # what it rendered before is not known, or was not promised
+            self._checks["rendered"].looked += 1
+            more = stream.violations - before.violations
+            if more > 0:
+                text = f"{record.name}'s page rendered {stream.stream} {more} times beyond the tolerance"
+                self.fail("rendered", text, record.event, micros)
+
+    def verdict(self, ended: int) -> Verdict:
+        """After the last record, which arrived then (µs)."""
+        for stream, stamp, micros, _ in self._waiting:
+            if ended - micros > 2_000_000:  # a picture may overtake its feedback, but not by that much
+                self.fail("stamps", f"{stream}: stamped with an event that never came", stamp, micros)
+        return Verdict(
+            ok=all(check.ok for check in self._checks.values()),
+            checks=self._checks,
+            events=self._events,
+            commands=self._commands,
+            pictures_and_sounds=self._media,
+            signature=self._signature,
+        )

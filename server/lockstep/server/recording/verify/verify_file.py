@@ -1,0 +1,86 @@
+"""Checks a recording file: `lockstep verify`."""
+
+from pathlib import Path
+
+from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.format.payload import own_record_of
+from lockstep.server.recording.format.records import RobotRecord
+from lockstep.server.recording.format.topics import stream_of
+from lockstep.server.recording.reading.raw_records import MAGIC, raw_records
+from lockstep.server.recording.reading.reader import Record, RecordingReader
+from lockstep.server.recording.reading.scan import scan_file
+from lockstep.server.recording.verify.verifier import Verdict, Verifier
+from lockstep.server.recording.verify.verify_signature import SignatureChecker
+from lockstep.server.util.regular_file import open_regular
+
+__all__ = ["verify_file"]
+
+
+def verify_file(path: Path, key: str = "") -> Verdict:
+    """What a recording keeps of Lockstep's promises.
+
+    Args:
+        key: public key that has to have signed it; "": any, or none
+
+    Raises:
+        RecordingDamaged: it is no recording at all.
+        OSError: it cannot be read.
+    """
+    with RecordingReader(path) as reader:
+        verifier = Verifier(reader.info.epoch)
+        if reader.interrupted:
+            verifier.fail("readable", "it was interrupted, and ends where it was")
+        robots: set[str] = set()
+        counts: dict[str, int] = {}
+        ended = reader.index.started
+        for number in range(len(reader.index.chunks)):
+            try:
+                for record in reader.chunk(number):
+                    ended = max(ended, record.arrived // 1000)
+                    counts[record.topic] = counts.get(record.topic, 0) + 1
+                    _show(verifier, record, robots)
+            except RecordingError as error:
+                verifier.fail("readable", error.detail)
+        _compare(verifier, reader, counts)
+        _show_signatures(verifier, path, reader, key)
+        return verifier.verdict(ended)
+
+
+def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, key: str) -> None:
+    """Show it what the signatures say."""
+    checker = SignatureChecker(reader.info, None if reader.interrupted else reader.index, key)
+    with open_regular(path) as file:
+        file.seek(len(MAGIC))
+        try:
+            for raw in raw_records(file):
+                checker.take(raw)
+        except RecordingError as error:
+            verifier.fail("readable", error.detail)
+    checker.compare(scan_file(path, reader.info).index)
+    verifier.signed(checker.report())
+
+
+def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:
+    stream = stream_of(record.topic)
+    if stream:
+        if stream in robots:  # those of the console's own go by another clock
+            verifier.medium(stream, record.event, record.arrived, record.captured)
+        return
+    own = own_record_of(record.schema, record.data)
+    if own is None:
+        return
+    if own.event != record.event:
+        text = f"{record.topic}: the record says event {own.event}, its reference {record.event}"
+        verifier.fail("monotonic", text, record.event, record.arrived // 1000)
+    if isinstance(own, RobotRecord):
+        robots.update(camera.name for camera in own.description.cameras)
+        robots.update(microphone.name for microphone in own.description.microphones)
+    verifier.record(own, record.arrived, record.captured)
+
+
+def _compare(verifier: Verifier, reader: RecordingReader, counts: dict[str, int]) -> None:
+    """The index was written with the file: what is missing since then shows."""
+    for topic in sorted({*reader.index.counts, *counts}):
+        said, found = reader.index.counts.get(topic, 0), counts.get(topic, 0)
+        if said != found:
+            verifier.fail("complete", f"{topic}: the index says {said} records, there are {found}")

@@ -1,0 +1,272 @@
+"""Checks the signatures of a recording, by the order in which its bytes lie, and by no index. No I/O.
+
+Show a `SignatureChecker` every raw record of the file, then ask for its `report`.
+"""
+
+import zlib
+from io import BytesIO
+from typing import Literal, NamedTuple
+
+import msgspec
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, ChunkIndex, Message, MessageIndex, Schema
+from mcap.stream_reader import get_chunk_data_stream
+
+from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.format.event_index import INDEX_NAME, EventIndex
+from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.format.payload import own_record
+from lockstep.server.recording.format.records import SignatureRecord
+from lockstep.server.recording.format.signature import RecordingChain, TopicText, is_valid
+from lockstep.server.recording.format.topics import SIGNATURE
+from lockstep.server.recording.reading.raw_records import BROKEN, RawRecord, check_packed
+
+__all__ = ["SignatureChecker", "SignatureFault", "SignatureReport"]
+
+MOST = 50  # faults that are kept
+NO_CHECKSUM = bytes(4)
+
+
+class SignatureFault(NamedTuple):
+    event: int  # that the fault comes behind
+    time: int  # µs since 1970
+    text: str
+
+
+class SignatureReport(msgspec.Struct, kw_only=True):
+    """What the signatures say."""
+
+    state: Literal["unsigned", "signed", "open", "broken"] = "unsigned"  # open: all is signed, but how it ended
+    signer: str = ""  # public key
+    signatures: int = 0
+    until_event: int = 0  # up to here it is signed
+    until_time: int = 0  # µs since 1970
+    previous: str = ""  # head of the part before
+    audit: str = ""  # the newest signed head of the audit that it holds
+    faults: list[SignatureFault] = []
+
+
+class SignatureChecker:
+    """`take` each raw record in the order of the file, then `report`.
+
+    Args:
+        index: of the file, to be held against where its chunks are; None: it was interrupted and has none
+        key: public key that has to have signed it; "": any
+    """
+
+    def __init__(self, info: RecordingInfo, index: EventIndex | None, key: str = "") -> None:
+        self._info = info
+        self._index = index
+        self._key = key
+        self._report = SignatureReport()
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._chain: RecordingChain | None = None
+        self._last: SignatureRecord | None = None
+        self._chunks: list[int] = []  # offsets
+        self._index_chunks: list[int] = []  # as the summary has them
+        # Of the chunks: times of the first and last message, as they say; None: it cannot be read.
+        self._spans: list[tuple[int, int] | None] = []
+        self._index_spans: list[tuple[int, int]] = []  # as the summary has them
+        # Of the last chunk's messages, by channel, as far as no index has named them; None: it could not be read.
+        self._positions: dict[int, list[tuple[int, int]]] | None = {}
+        self._metadata = 0
+        self._behind_data = False
+        self._summary = bytearray()
+
+    def take(self, raw: RawRecord) -> None:
+        try:
+            self._take(raw)
+        except (*BROKEN, RecordingError) as error:
+            self._fault(f"the record at byte {raw.offset} cannot be read: {error or type(error).__name__}")
+
+    def _take(self, raw: RawRecord) -> None:
+        if self._behind_data and raw.opcode != Opcode.FOOTER:
+            self._summary += bytes([raw.opcode]) + len(raw.content).to_bytes(8, "little") + raw.content
+        stream = ReadDataStream(BytesIO(raw.content))
+        if raw.opcode == Opcode.CHUNK:
+            self._chunks.append(raw.offset)
+            self._spans.append(None)
+            self._chunk(Chunk.read(stream), len(self._chunks) - 1)
+        elif raw.opcode == Opcode.MESSAGE_INDEX:
+            self._message_index(MessageIndex.read(stream))
+        elif raw.opcode == Opcode.SCHEMA:
+            self._schema(Schema.read(stream))
+        elif raw.opcode == Opcode.CHANNEL:
+            self._channel(Channel.read(stream))
+        elif raw.opcode == Opcode.CHUNK_INDEX:
+            entry = ChunkIndex.read(stream)
+            self._index_chunks.append(entry.chunk_start_offset)
+            self._index_spans.append((entry.message_start_time, entry.message_end_time))
+        elif raw.opcode == Opcode.DATA_END:
+            self._behind_data = True
+            if raw.content != NO_CHECKSUM:
+                self._fault("the end of the data was changed")
+        elif raw.opcode == Opcode.FOOTER:
+            head = raw.content[:-4]
+            crc = zlib.crc32(
+                bytes([raw.opcode]) + len(raw.content).to_bytes(8, "little") + head, zlib.crc32(self._summary)
+            )
+            if crc.to_bytes(4, "little") != raw.content[-4:]:
+                self._fault("the summary was changed: its checksum does not fit")
+        elif raw.opcode == Opcode.ATTACHMENT:
+            self._attachment(raw.content)
+        elif raw.opcode == Opcode.METADATA:
+            self._metadata += 1
+            if self._metadata > 1:
+                self._fault("metadata that nobody signed")
+        elif raw.opcode == Opcode.MESSAGE:
+            self._fault(f"a message outside of all chunks, at byte {raw.offset}, that nobody signed")
+
+    def _attachment(self, content: bytes) -> None:
+        if zlib.crc32(content[:-4]).to_bytes(4, "little") != content[-4:]:
+            self._fault("the index was changed: its checksum does not fit")
+        if INDEX_NAME.encode() not in content[:64]:
+            self._fault("an attachment that nobody signed")
+
+    def _schema(self, schema: Schema) -> None:
+        if self._schemas.setdefault(schema.id, schema) != schema:
+            self._fault(f"another schema than the one that was signed: {schema.name}")
+        elif self._chain is not None and self._schemas[schema.id] is schema:
+            self._fault(f"a schema that nobody signed: {schema.name}")
+
+    def _channel(self, channel: Channel) -> None:
+        if self._channels.setdefault(channel.id, channel) != channel:
+            self._fault(f"another topic than the one that was signed: {channel.topic}")
+        elif self._chain is not None and self._channels[channel.id] is channel:
+            self._fault(f"a topic that nobody signed: {channel.topic}")
+
+    def _chunk(self, chunk: Chunk, number: int) -> None:
+        if self._positions:
+            self._fault(f"chunk {number - 1} has no message index")
+        self._positions = None
+        self._spans[number] = chunk.message_start_time, chunk.message_end_time
+        try:
+            check_packed(chunk)
+            stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+        except BROKEN as error:
+            self._fault(f"chunk {number} is not what was written: {type(error).__name__}")
+            return
+        self._positions = {}
+        while stream.count < length:
+            at = stream.count
+            opcode, size = stream.read1(), stream.read8()
+            if opcode == Opcode.SCHEMA:
+                self._schema(Schema.read(stream))
+            elif opcode == Opcode.CHANNEL:
+                self._channel(Channel.read(stream))
+            elif opcode == Opcode.MESSAGE:
+                self._message(Message.read(stream, size), at)
+            else:
+                stream.read(size)
+                self._fault(f"chunk {number} holds a record of kind {opcode} that nobody signed")
+        self._check_span(number)
+        self._end_chunk(number)
+
+    def _check_span(self, number: int) -> None:
+        """A reader that looks for a time passes over chunks that say they have none of it."""
+        times = [time for found in (self._positions or {}).values() for time, _ in found]
+        if times and self._spans[number] != (min(times), max(times)):
+            self._fault(f"chunk {number} says that it is of another time than its messages are")
+
+    def _message(self, message: Message, at: int) -> None:
+        channel = self._channels[message.channel_id]
+        if self._positions is not None:
+            self._positions.setdefault(channel.id, []).append((message.log_time, at))
+        if self._chain is None:
+            self._chain = RecordingChain(self._info, map(self._text, self._channels.values()))
+        if channel.topic == SIGNATURE:
+            self._signature(self._chain, own_record(SignatureRecord, message.data), message)
+            return
+        self._chain.add(channel.topic, message.sequence, message.log_time, message.publish_time, message.data)
+
+    def _text(self, channel: Channel) -> TopicText:
+        schema = self._schemas[channel.schema_id]
+        return TopicText(channel.topic, channel.message_encoding, schema.name, schema.encoding, schema.data)
+
+    def _signature(self, chain: RecordingChain, found: SignatureRecord, message: Message) -> None:
+        last = self._last
+        self._report.signatures += 1
+        if not is_valid(found):
+            chain.end_chunk()
+            self._fault(f"signature {found.number} is not one of {found.key or 'any key'}: it was changed or forged")
+            return
+        self._judge(chain.end_chunk(), found, last, message)
+        chain.head = found.head  # what follows is held against what was signed
+        self._last = found
+        self._report.signer = self._report.signer or found.key
+        self._report.until_event, self._report.until_time = found.event, found.until // 1000
+        self._report.previous, self._report.audit = found.previous, found.audit
+
+    def _judge(self, head: str, found: SignatureRecord, last: SignatureRecord | None, message: Message) -> None:
+        before = 0 if last is None else last.number
+        info = self._info
+        if (found.recording, found.part, found.epoch) != (info.recording, info.part, info.epoch):
+            self._fault(f"signature {found.number} is of another recording")
+        if found.key != (self._report.signer or found.key):
+            self._fault(f"signature {found.number} is of another key than those before: {found.key}")
+        if (message.log_time, message.publish_time, message.sequence) != (found.until, found.until, found.event):
+            self._fault(f"signature {found.number} stands at another event or time than it says")
+        if last is not None and last.final:
+            self._fault(f"signature {found.number} comes behind the closing one")
+        if found.number > before + 1:
+            self._fault(f"chunks were taken out: signature {found.number} comes behind signature {before}")
+        elif found.number <= before:
+            self._fault(f"chunks were reordered or repeated: signature {found.number} comes behind signature {before}")
+        elif head != found.head:
+            self._fault(
+                f"records behind signature {before}, up to event {found.event}, are not those that were signed: "
+                "changed, reordered, put in or taken out"
+            )
+
+    def _end_chunk(self, number: int) -> None:
+        if self._chain is not None and self._chain.waiting:
+            self._chain.drop_waiting()
+            self._fault(f"the end of chunk {number} was signed by nobody")
+
+    def _message_index(self, found: MessageIndex) -> None:
+        if self._positions is None:
+            return
+        expected = self._positions.pop(found.channel_id, [])
+        if expected != [(time, at) for time, at in found.records]:
+            self._fault(f"the message index of chunk {len(self._chunks) - 1} leads elsewhere")
+
+    def _fault(self, text: str) -> None:
+        report = self._report
+        if len(report.faults) < MOST:
+            report.faults.append(SignatureFault(max(1, report.until_event), report.until_time, text))
+
+    def compare(self, records: EventIndex) -> None:
+        """`records`: the index that the records themselves give. Lists and timelines show the one in the file."""
+        if self._index is None or not self._report.signatures:
+            return
+        for name in ("first_event", "last_event", "started", "ended", "marks"):
+            if getattr(self._index, name) != getattr(records, name):
+                self._fault(f"the index has other {name.replace('_', ' ')} than the records")
+
+    def report(self) -> SignatureReport:
+        """After the last record."""
+        report, last = self._report, self._last
+        if not report.signatures:
+            faults = [SignatureFault(1, 0, "it is not signed at all")] if self._key else []
+            return SignatureReport(faults=faults)
+        if self._key and report.signer != self._key:
+            self._fault(f"signed by {report.signer or 'nobody'}, not by {self._key}")
+        if self._behind_data:
+            self._compare_indexes()
+        report.state = "signed"
+        if report.faults:
+            report.state = "broken"
+        elif last is None or not last.final:
+            report.state = "open"
+            self._fault("no closing signature: the console was interrupted here, or somebody cut off the end")
+        return report
+
+    def _compare_indexes(self) -> None:
+        if self._index_chunks != self._chunks:
+            self._fault("the summary names other chunks than there are")
+        elif any(span not in (None, said) for span, said in zip(self._spans, self._index_spans, strict=True)):
+            self._fault("the summary says that chunks are of another time than they are")
+        if self._index is not None and [chunk.offset for chunk in self._index.chunks] != self._chunks:
+            self._fault("the index names other chunks than there are")

@@ -1,0 +1,1 @@
+"""The session is written to disk by a thread."""

@@ -1,0 +1,82 @@
+"""What the console hands to the recording thread. The thread encodes it. Times in ns since 1970."""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import msgspec
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Feedback
+from lockstep.server.recording.format.foxglove import camera_message, feedback_messages, log_message, sound_message
+from lockstep.server.recording.format.records import FeedbackRecord, OwnRecord, RobotRecord
+from lockstep.server.recording.format.records_in_words import in_words
+from lockstep.server.recording.format.topics import LOG, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS, media_topic
+from lockstep.server.recording.writing.writer import Entry
+
+__all__ = ["FeedbackItem", "Item", "MediaItem", "OwnItem", "RobotItem", "entries_of"]
+
+
+class RobotItem(NamedTuple):
+    """The robot, or the state of its link. Another epoch than before begins another file."""
+
+    arrived: int
+    record: RobotRecord
+    codecs: Mapping[str, str]  # by stream
+
+
+class FeedbackItem(NamedTuple):
+    arrived: int
+    captured: int
+    epoch: str
+    feedback: Feedback
+
+
+class MediaItem(NamedTuple):
+    arrived: int
+    captured: int
+    epoch: str
+    stream: str
+    codec: str  # "H264", "VP8", "opus" or "PCMU"
+    stamp: int
+    keyframe: bool
+    data: bytes
+
+
+class OwnItem(NamedTuple):
+    arrived: int
+    record: OwnRecord
+
+
+Item = RobotItem | FeedbackItem | MediaItem | OwnItem
+
+
+def entries_of(item: Item, description: RobotDescription) -> Iterator[Entry]:
+    """The records that `item` becomes."""
+    match item:
+        case MediaItem():
+            yield _media(item)
+        case FeedbackItem(arrived, captured, epoch, feedback):
+            record = FeedbackRecord(epoch=epoch, **msgspec.structs.asdict(feedback))
+            yield _own(record, arrived, captured)
+            yield from feedback_messages(description, record, arrived, captured)
+        case RobotItem(arrived=arrived, record=record) | OwnItem(arrived=arrived, record=record):
+            yield _own(record, arrived, arrived)
+            words = in_words(record)
+            if words:
+                data = log_message(arrived, words.text, warning=words.warning)
+                yield Entry(LOG, record.event, arrived, arrived, data)
+
+
+def _own(record: OwnRecord, arrived: int, captured: int) -> Entry:
+    topic = OWN_TOPICS[type(record)]
+    return Entry(topic, record.event, arrived, captured, msgspec.json.encode(record), record=record)
+
+
+def _media(item: MediaItem) -> Entry:
+    topic = media_topic(item.stream, item.codec)
+    picture_format = PICTURE_FORMATS.get(item.codec)
+    if picture_format is not None:
+        data = camera_message(item.stream, item.captured, item.data, picture_format)
+        return Entry(topic, item.stamp, item.arrived, item.captured, data, keyframe=item.keyframe)
+    data = sound_message(SOUND_FORMATS[item.codec], item.captured, item.data)
+    return Entry(topic, item.stamp, item.arrived, item.captured, data)

@@ -1,0 +1,249 @@
+"""The thread that writes a recording. The console's loop only appends to a bounded queue."""
+
+import shutil
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import structlog
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.server.recording.errors import DiskTrouble, RecordingError
+from lockstep.server.recording.format.event_index import EventIndex
+from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.format.records import Degraded, OwnRecord, ParticipantsRecord, SeatRecord
+from lockstep.server.recording.format.signature import RecordingSigning
+from lockstep.server.recording.reading.scan import complete_file
+from lockstep.server.recording.settings import RecordingSettings
+from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem, entries_of
+from lockstep.server.recording.writing.writer import RecordingWriter
+
+__all__ = ["RecordingThread"]
+
+log = structlog.get_logger(__name__)
+
+MAX_WAITING = 4096  # items, 15 s and more
+DRAIN_SECONDS = 0.05  # between two looks at the queue: nobody is woken for each item
+REMEMBERED = (SeatRecord, ParticipantsRecord)  # what every part begins with, besides robot and feedback
+
+
+class RecordingThread:
+    """`put` from the loop at any rate; `close` from another thread, which waits for the end.
+
+    Args:
+        now: ns since 1970 on the recording's clock
+        on_part: called from the thread when a file has begun
+        on_end: called from the thread when it ends by itself
+        signing: signs what is written; None: nothing does
+
+    Attributes:
+        failure: why it ended by itself; "" while it runs, or when it was closed
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        settings: RecordingSettings,
+        info: RecordingInfo,
+        now: Callable[[], int],
+        on_part: Callable[[], None],
+        on_end: Callable[[], None],
+        signing: RecordingSigning | None = None,
+    ) -> None:
+        self.info = info
+        self.failure = ""
+        self._directory = directory
+        self._settings = settings
+        self._now = now
+        self._on_part = on_part
+        self._on_end = on_end
+        self._signing = signing
+        self._head = ""  # of the signed chain of the part before
+        self._waiting: deque[Item] = deque()
+        self._lost = 0  # not told to the file yet; the loop adds, the thread takes
+        self._lost_ever = 0
+        self._closing = threading.Event()
+        self._robot: RobotItem | None = None
+        self._remembered: dict[type[OwnRecord], OwnItem] = {}
+        self._feedback: FeedbackItem | None = None
+        self._writer: RecordingWriter | None = None
+        self._part = 0
+        self._newest = 0  # ns, arrival of what was taken last
+        self._bytes_before = 0  # of earlier parts
+        self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def put(self, item: Item) -> None:
+        """Never blocks. When the disk is too slow the newest is left out, and counted."""
+        if len(self._waiting) >= MAX_WAITING:
+            self._lost += 1
+            self._lost_ever += 1
+        else:
+            self._waiting.append(item)
+
+    def close(self) -> None:
+        """Write what waits, and end. Blocks; idempotent."""
+        self._closing.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    @property
+    def running(self) -> bool:
+        return self._thread.is_alive()
+
+    @property
+    def lost(self) -> int:
+        """Records that were left out."""
+        return self._lost_ever
+
+    @property
+    def bytes_written(self) -> int:
+        writer = self._writer
+        return self._bytes_before + (writer.bytes_written if writer is not None else 0)
+
+    @property
+    def path(self) -> Path | None:
+        """Of the file that is being written."""
+        writer = self._writer
+        return None if writer is None else writer.path
+
+    def index(self) -> EventIndex | None:
+        """Of the file that is being written, as far as it is on the disk."""
+        writer = self._writer
+        return None if writer is None else writer.index()
+
+    def _run(self) -> None:
+        try:
+            while not self._closing.wait(DRAIN_SECONDS):
+                self._drain()
+            self._drain()
+            self._end_part()
+        except (RecordingError, OSError) as error:
+            self._fail(str(error))
+        except Exception as error:
+            log.exception("the recording failed")
+            self._fail(f"{type(error).__name__}: {error}")
+
+    def _drain(self) -> None:
+        for _ in range(len(self._waiting)):
+            self._take(self._waiting.popleft())
+            time.sleep(0)  # the loop goes first
+        writer = self._writer
+        if writer is None:
+            return
+        if self._lost:
+            self._tell_lost(writer)
+        if writer.flush_if_due(self._now()):
+            self._look_at_disk()
+
+    def _take(self, item: Item) -> None:
+        """Records of another epoch than the file's belong into none."""
+        self._newest = max(self._newest, item.arrived)
+        match item:
+            case RobotItem():
+                self._meet_robot(item)
+                return
+            case FeedbackItem():
+                self._feedback = item
+                epoch = item.epoch
+            case MediaItem():
+                epoch = item.epoch
+            case OwnItem(record=record):
+                epoch = record.epoch
+                if isinstance(record, REMEMBERED):
+                    self._remembered[type(record)] = item
+        if self._writer is not None and self._robot is not None and epoch == self._robot.record.epoch:
+            self._write(self._writer, item, self._robot.record.description)
+
+    def _meet_robot(self, item: RobotItem) -> None:
+        before, self._robot = self._robot, item
+        same_file = (
+            before is not None
+            and before.record.epoch == item.record.epoch
+            and before.record.description == item.record.description
+            and before.codecs == item.codecs
+        )
+        if same_file and self._writer is not None:
+            self._write(self._writer, item, item.record.description)
+            return
+        self._end_part()
+        self._begin_part(item)
+
+    def _begin_part(self, robot: RobotItem) -> None:
+        """The file begins with what holds now."""
+        self._look_at_disk()  # else what records by itself, and tries again and again, fills the disk with beginnings
+        self._part += 1
+        info = msgspec.structs.replace(
+            self.info, part=self._part, epoch=robot.record.epoch, robot=robot.record.description.label
+        )
+        suffix = f"-p{self._part}" if self._part > 1 else ""
+        writer = RecordingWriter(
+            self._directory / f"{info.recording}{suffix}.mcap",
+            info,
+            robot.record.description,
+            robot.codecs,
+            self._signing,
+            self._head,
+        )
+        self._writer = writer
+        now, epoch, event = self._newest, robot.record.epoch, robot.record.event
+        head: list[Item] = []
+        if self._feedback is not None and self._feedback.epoch == epoch:
+            event = self._feedback.feedback.event
+            head.append(self._feedback._replace(arrived=now))
+        for known in self._remembered.values():
+            head.insert(0, OwnItem(now, msgspec.structs.replace(known.record, epoch=epoch, event=event)))
+        head.insert(0, robot._replace(arrived=now, record=msgspec.structs.replace(robot.record, event=event)))
+        for item in head:
+            self._write(writer, item, robot.record.description)
+        self._on_part()
+
+    def _write(self, writer: RecordingWriter, item: Item, description: RobotDescription) -> None:
+        for entry in entries_of(item, description):
+            writer.write(entry)
+        if writer.bytes_written >= self._settings.file_bytes and self._robot is not None:
+            self._end_part()
+            self._begin_part(self._robot)
+
+    def _end_part(self) -> None:
+        writer = self._writer
+        if writer is not None:
+            writer.close()
+            self._writer = None  # not before: what fails here is cut to what is whole
+            self._bytes_before += writer.bytes_written
+            self._head = writer.head
+
+    def _tell_lost(self, writer: RecordingWriter) -> None:
+        lost, self._lost = self._lost, 0
+        writer.count_lost(lost)
+        if self._robot is not None:
+            event = self._robot.record.event if self._feedback is None else self._feedback.feedback.event
+            record = Degraded(epoch=self._robot.record.epoch, event=event, lost=lost)
+            self._write(writer, OwnItem(self._newest, record), self._robot.record.description)
+
+    def _look_at_disk(self) -> None:
+        free = shutil.disk_usage(self._directory).free
+        if free < self._settings.free_bytes:
+            raise DiskTrouble(f"only {free / 1e6:.0f} MB are free on the disk")
+
+    def _fail(self, reason: str) -> None:
+        """What was written stays: closed if there is room for that, else cut to what is whole."""
+        self.failure = reason
+        log.error("the recording ended", reason=reason)
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            self._bytes_before += writer.bytes_written
+            try:
+                writer.close()
+            except RecordingError:
+                writer.abandon()
+                try:
+                    complete_file(writer.path, writer.info)
+                except (RecordingError, OSError) as error:
+                    log.error("the recording is completed at the next start", reason=str(error))
+        self._on_end()

@@ -1,0 +1,1 @@
+"""The console's connection to a robot bridge."""

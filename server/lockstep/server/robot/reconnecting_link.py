@@ -1,0 +1,113 @@
+"""Keeps one robot link: connects, reads, and connects again when it breaks."""
+
+import asyncio
+from collections import Counter
+from functools import partial
+from typing import Protocol
+
+import structlog
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.errors import LinkError, LinkLost
+from lockstep.protocol.messages import LinkMessage, LinkRole
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.server.robot.credentials import LinkCredentials
+from lockstep.server.util.backoff import Backoff
+from lockstep.server.util.cooperative_scheduler import turns_of_loop
+from lockstep.server.util.uncancelled import attempt
+
+__all__ = ["ReconnectingLink", "LinkSink"]
+
+log = structlog.get_logger(__name__)
+
+HEALTHY_AFTER = 5.0  # s up, then the next loss is retried soon again
+FAULT = "internal_error: this console failed at what the robot sent"
+
+
+class LinkSink(Protocol):
+    """Who is told. `link_closed` also follows a try that failed, with what was wrong; `link_failed` comes before it
+    where one of these raised `error`."""
+
+    def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None: ...
+    def link_closed(self, role: LinkRole, detail: str) -> None: ...
+    def link_received(self, role: LinkRole, message: LinkMessage) -> None: ...
+    def link_failed(self, role: LinkRole, error: Exception) -> None: ...
+
+
+class ReconnectingLink:
+    """What hearing the robot raises ends this link alone, and is no reason not to connect again."""
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        role: LinkRole,
+        sink: LinkSink,
+        backoff: Backoff,
+        access: LinkCredentials,
+        name: str = "console",
+    ) -> None:
+        """`name`: a bridge keeps a robot for the console whose link broke by it."""
+        self._name = name
+        self._access = access
+        self._host = host
+        self._port = port
+        self._role: LinkRole = role
+        self._sink = sink
+        self._backoff = backoff
+        self._link: RobotLink | None = None  # None while down
+        self._bad_input: Counter[str] = Counter()  # of links that ended
+        self._drops: Counter[str] = Counter()
+
+    def send(self, message: LinkMessage) -> bool:
+        """Whether it was handed to a link that lives."""
+        if self._link is None:
+            return False
+        try:
+            self._link.send(message)
+        except LinkError:
+            return False
+        return True
+
+    def bad_input(self) -> Counter[str]:
+        """What the bridge sent that could not be read, by name, on all links so far."""
+        return self._bad_input + (self._link.bad_input if self._link is not None else Counter())
+
+    def drops(self) -> Counter[str]:
+        """Messages that came faster than they were read, by kind or stream, on all links so far."""
+        if self._link is None:
+            return self._drops
+        return self._drops + self._link.drops + self._link.media_drops
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            try:
+                await attempt(self._once())
+            except LinkError as error:
+                self._sink.link_closed(self._role, error.detail)
+            except Exception as error:
+                self._sink.link_failed(self._role, error)
+                self._sink.link_closed(self._role, FAULT)
+            await asyncio.sleep(self._backoff.next())
+
+    async def _once(self) -> None:
+        loop = asyncio.get_running_loop()
+        secret, tls = self._access
+        async with RobotLink(self._host, self._port, self._role, name=self._name, secret=secret, tls=tls) as link:
+            hello, since = link.hello, loop.time()
+            if hello.description is None:
+                raise LinkLost("the bridge sent no description")
+            log.info("robot link up", role=self._role, epoch=hello.epoch)
+            self._link = link
+            try:
+                self._sink.link_opened(self._role, hello.epoch, hello.description)
+                turns_of_loop().yield_to(link)
+                await link.deliver(partial(self._sink.link_received, self._role))
+            finally:
+                self._link = None
+                self._bad_input += link.bad_input
+                self._drops += link.drops + link.media_drops
+                if loop.time() - since > HEALTHY_AFTER:
+                    self._backoff.healthy()
+        raise LinkLost("the link was closed")

@@ -1,0 +1,155 @@
+"""The console's connection to the robot: a link for commands and one for media, so that pictures delay no command."""
+
+import asyncio
+import random
+from collections import Counter
+from pathlib import Path
+from typing import Protocol
+
+import structlog
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import (
+    Command,
+    Feedback,
+    LinkMessage,
+    LinkRole,
+    Media,
+    Refusal,
+    Reset,
+    Rest,
+    Stop,
+    StopTaken,
+)
+from lockstep.server.robot.console_name import console_name
+from lockstep.server.robot.credentials import LinkSettings, link_access
+from lockstep.server.robot.reconnecting_link import ReconnectingLink
+from lockstep.server.util.backoff import Backoff
+
+__all__ = ["RobotConnection", "RobotHost", "RobotSettings"]
+
+log = structlog.get_logger(__name__)
+
+_ROLES: tuple[LinkRole, ...] = ("operator", "media")
+
+
+class RobotSettings(LinkSettings, Protocol):
+    @property
+    def robot_host(self) -> str: ...
+    @property
+    def robot_port(self) -> int: ...
+    @property
+    def link_backoff(self) -> float: ...
+    @property
+    def link_backoff_cap(self) -> float: ...
+    @property
+    def state_dir(self) -> Path | None: ...
+
+
+class RobotHost(Protocol):
+    """Whom the connection reports to. All are called on the loop and return at once."""
+
+    def epoch_began(self, epoch: str, description: RobotDescription) -> None: ...
+    def link_up(self) -> None: ...
+    def link_down(self, detail: str) -> None: ...
+    def feedback_received(self, feedback: Feedback) -> None: ...
+    def refusal_received(self, refusal: Refusal) -> None: ...
+    def stop_taken(self, taken: StopTaken) -> None: ...
+    def media_received(self, media: Media) -> None: ...
+    def link_failed(self, role: LinkRole, error: Exception) -> None: ...
+
+
+class RobotConnection:
+    """`epoch_began` comes before `link_up`, and again whenever the bridge was restarted, whichever link sees it first.
+
+    Attributes:
+        epoch, description: of the bridge reached last; "" and None before the first
+        up: whether the operator link is up
+        reached: set while it is up
+        detail: why it is down
+    """
+
+    def __init__(self, settings: RobotSettings, host: RobotHost) -> None:
+        self.epoch = ""
+        self.description: RobotDescription | None = None
+        self.reached = asyncio.Event()
+        self.detail = "not connected yet"
+        self._host = host
+        self._epochs: dict[LinkRole, str] = {}  # of each link, open now or last
+        access = link_access(settings)
+        self._keepers = {
+            role: ReconnectingLink(
+                settings.robot_host,
+                settings.robot_port,
+                role,
+                self,
+                Backoff(settings.link_backoff, settings.link_backoff_cap, random.Random()),
+                access,
+                console_name(settings.state_dir),
+            )
+            for role in _ROLES
+        }
+
+    @property
+    def up(self) -> bool:
+        return self.reached.is_set()
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            for role, keeper in self._keepers.items():
+                tasks.create_task(keeper.run(), name=f"robot link {role}")
+
+    def send(self, message: Command | Rest | Reset) -> bool:
+        """Whether it was handed to the link."""
+        return self._keepers["operator"].send(message)
+
+    def send_stop(self, stop: Stop) -> bool:
+        """As `send`, over every link that lives: TCP may repeat a lost packet on one of them for seconds."""
+        sent = [keeper.send(stop) for keeper in self._keepers.values()]
+        return any(sent)
+
+    def bad_input(self) -> Counter[str]:
+        """What the bridge sent that could not be read, by name."""
+        return sum((keeper.bad_input() for keeper in self._keepers.values()), Counter())
+
+    def drops(self) -> Counter[str]:
+        """Messages from the bridge that came faster than they were read, by kind or stream."""
+        return sum((keeper.drops() for keeper in self._keepers.values()), Counter())
+
+    # the keepers' events
+
+    def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None:
+        self._epochs[role] = epoch
+        if epoch != self.epoch:
+            self.epoch, self.description = epoch, description
+            self._host.epoch_began(epoch, description)
+        if role == "operator":
+            self.reached.set()
+            self.detail = ""
+            self._host.link_up()
+
+    def link_closed(self, role: LinkRole, detail: str) -> None:
+        if role != "operator":
+            return
+        changed = self.up or detail != self.detail
+        self.reached.clear()
+        self.detail = detail
+        if changed:
+            log.warning("robot link down", detail=detail)
+            self._host.link_down(detail)
+
+    def link_failed(self, role: LinkRole, error: Exception) -> None:
+        self._host.link_failed(role, error)
+
+    def link_received(self, role: LinkRole, message: LinkMessage) -> None:
+        if self._epochs.get(role) != self.epoch:
+            return  # what the old bridge said last, while the other link has met the new one already
+        if isinstance(message, Media):
+            self._host.media_received(message)
+        elif isinstance(message, Feedback):
+            self._host.feedback_received(message)
+        elif isinstance(message, Refusal):
+            self._host.refusal_received(message)
+        elif isinstance(message, StopTaken):
+            self._host.stop_taken(message)

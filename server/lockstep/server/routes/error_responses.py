@@ -1,0 +1,81 @@
+"""How errors are answered over HTTP: by name, counted, and never cached."""
+
+from http import HTTPStatus
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from prometheus_client import Counter
+from starlette.exceptions import HTTPException
+from starlette.types import Scope
+
+from lockstep.server.audit.records import Actor
+from lockstep.server.errors import ConsoleError, TooManyRequests, http_error
+from lockstep.server.http.problem import PROBLEM_JSON, problem_body
+from lockstep.server.state.console_context import ConsoleContext
+from lockstep.server.state.dependencies import Dependencies
+
+__all__ = ["answer_errors", "count_refused"]
+
+
+def answer_errors(app: FastAPI) -> None:
+    """Everything that a route of `app` raises on purpose. It needs `app.state.house`."""
+    app.add_exception_handler(ConsoleError, _answer_console_error)
+    app.add_exception_handler(HTTPException, _answer_http_exception)
+    app.add_exception_handler(RequestValidationError, _answer_validation_error)
+
+
+def count_refused(scope: Scope, name: str) -> None:
+    """What the front door turned away."""
+    _bad_input(scope["app"].state).labels("http", name).inc()
+
+
+def _bad_input(state: object) -> Counter:
+    """Of the robot whose routes these are; of the house while it has no session, and where there is no robot."""
+    here = getattr(state, "services", None)
+    counted: Counter = here.metrics.bad_input if isinstance(here, Dependencies) else _house(state).metrics.bad_input
+    return counted
+
+
+def _house(state: object) -> ConsoleContext:
+    found = getattr(state, "house", None)
+    if not isinstance(found, ConsoleContext):
+        raise TypeError("the app is not running")
+    return found
+
+
+async def _answer_console_error(request: Request, error: Exception) -> Response:
+    if not isinstance(error, ConsoleError):
+        raise error
+    entry = http_error(error)
+    if entry.status == HTTPStatus.FORBIDDEN:
+        _audit_refused(request, entry.name)
+    if entry.status == HTTPStatus.UNAUTHORIZED and not _house(request.app.state).guard.may_fail(request.scope):
+        error = TooManyRequests("too many requests without a valid token from this address")
+        entry = http_error(error)
+    return _error_response(request, entry.status, entry.name, error.detail, entry.headers)
+
+
+def _audit_refused(request: Request, name: str) -> None:
+    """Merged, as all refusals are: by the route, of which there are few, and never by the path, of which are many."""
+    actor, here = getattr(request.state, "actor", None), getattr(request.app.state, "services", None)
+    if isinstance(actor, Actor) and isinstance(here, Dependencies):
+        route = getattr(request.scope.get("route"), "path", "")
+        here.console.audit.refused(actor, f"{name}: {request.method} {route}")
+
+
+async def _answer_http_exception(request: Request, error: Exception) -> Response:
+    """Routes that do not exist, methods that are not allowed."""
+    if not isinstance(error, HTTPException):
+        raise error
+    name = {404: "not_found", 405: "method_not_allowed"}.get(error.status_code, "http_error")
+    return _error_response(request, error.status_code, name, error.detail, dict(error.headers or {}))
+
+
+async def _answer_validation_error(request: Request, error: Exception) -> Response:
+    return _error_response(request, 422, "bad_parameter", "a parameter has a value that is not allowed", {})
+
+
+def _error_response(request: Request, status: int, name: str, detail: str, headers: dict[str, str]) -> Response:
+    _bad_input(request.app.state).labels("http", name).inc()
+    body = problem_body(status, name, detail)
+    return Response(body, status, {**headers, "Cache-Control": "no-store"}, media_type=PROBLEM_JSON)

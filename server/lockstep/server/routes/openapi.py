@@ -1,0 +1,391 @@
+"""The OpenAPI document of the console's HTTP interface: one table of operations. No I/O.
+
+FastAPI could only write one that knows no answers, since bodies are read with bounds and answers are msgspec structs.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import Any, NamedTuple
+
+import msgspec
+
+from lockstep.protocol.console import RecordingState
+from lockstep.protocol.serial import MAX_EVENT
+from lockstep.server.errors import (
+    HTTP_ERRORS,
+    AlreadyPublishing,
+    AlreadyRecording,
+    BadJson,
+    BadParameter,
+    BadSdp,
+    BadSdpFragment,
+    BodyTooLarge,
+    BodyTooSlow,
+    CameraTaken,
+    ConsoleError,
+    HostRefused,
+    HttpError,
+    LinkDown,
+    LinkExpired,
+    LinkOtherRobot,
+    LinkRevoked,
+    LockedOut,
+    NoSeat,
+    NotAcceptable,
+    NotAllowed,
+    NotConnected,
+    NotFound,
+    OriginRefused,
+    PreconditionFailed,
+    PreconditionRequired,
+    PressUsed,
+    RecordingFailed,
+    RecordingUnreadable,
+    ResetNotKept,
+    ResetTooSoon,
+    RobotUnreachable,
+    SceneUnavailable,
+    ShuttingDown,
+    Silenced,
+    StaleReset,
+    StateUnavailable,
+    TokenInvalid,
+    TokenMissing,
+    TooFewSections,
+    TooManyInvitations,
+    TooManyPeers,
+    TooManyRequests,
+    Unconfirmed,
+    WrongMediaType,
+)
+from lockstep.server.http.problem import PROBLEM_JSON, Problem
+from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
+from lockstep.server.routes.observer_websocket import WatchTicket
+from lockstep.server.routes.recordings import (
+    MAX_LISTED,
+    FileTicket,
+    RecordingDetails,
+    RecordingList,
+    RecordingRequest,
+)
+from lockstep.server.routes.session import Delivered, Health, Released, ResetRequest, ScenePath, SessionInfo
+from lockstep.server.routes.stop_body import StopRequest
+from lockstep.server.sfu.tickets import RelayAnswer
+from lockstep.server.webrtc.ice_servers import IceServers
+
+__all__ = ["OPERATIONS", "Operation", "openapi_document"]
+
+SDP = "application/sdp"
+FRAGMENT = "application/trickle-ice-sdpfrag"
+JSON = "application/json"
+OCTETS = "application/octet-stream"
+MCAP = "application/x-mcap"
+
+Errors = tuple[type[ConsoleError], ...]
+
+EVERYWHERE: Errors = (HostRefused, TooManyRequests)
+WITH_TOKEN: Errors = (TokenMissing, TokenInvalid, LinkExpired, LinkRevoked, LinkOtherRobot)
+WITH_BODY: Errors = (BodyTooLarge, BodyTooSlow)
+WITH_JSON: Errors = (BadJson, *WITH_BODY)
+
+
+class Parameter(NamedTuple):
+    name: str
+    where: str  # "path", "query", "header"
+    schema: dict[str, Any]
+    required: bool = False
+
+
+class Operation(NamedTuple):
+    """One method of one path."""
+
+    method: str
+    path: str
+    summary: str
+    status: int  # when it goes well
+    answer: type[msgspec.Struct] | str | None  # a struct as JSON, text of a media type, nothing
+    errors: Errors = ()
+    body: type[msgspec.Struct] | str | None = None
+    token: bool = True
+    parameters: tuple[Parameter, ...] = ()
+    headers: tuple[str, ...] = ()  # of the answer, besides those of every answer
+    also: tuple[int, ...] = ()  # other statuses that are no errors; without a body
+
+
+RESOURCE = Parameter("resource", "path", {"type": "string"}, required=True)
+MATCH = Parameter("If-Match", "header", {"type": "string", "pattern": r'^(\*|"[0-9a-f]{16}")$'}, required=True)
+STAMP = Parameter("stamp", "query", {"type": "string", "enum": ["trailer"]})
+RELAY = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{0,3}$"})
+WATCHED = Parameter("relay", "query", {"type": "string", "pattern": r"^\d{1,3}$"}, required=True)
+WATCH_TICKET = Parameter("ticket", "path", {"type": "string"}, required=True)
+CAMERA = Parameter("camera", "query", {"type": "string", "maxLength": 32})
+VIEW = Parameter("view", "query", {"type": "string", "enum": ["thumbnail"]})
+SECTIONS = Parameter("sections", "query", {"type": "string", "enum": ["all"]})
+PEER = Parameter("peer", "query", {"type": "string", "maxLength": 16})
+LOST = Parameter("lost", "query", {"type": "string", "maxLength": 40})
+AFTER = Parameter("after", "query", {"type": "integer", "default": 0})
+BEFORE = Parameter("before", "query", {"type": "integer", "minimum": 0, "default": 0})
+LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS, "default": 100})
+LISTED = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_LISTED, "default": MAX_LISTED})
+RECORDING = Parameter("recording_id", "path", {"type": "string"}, required=True)
+CHUNK = Parameter("number", "path", {"type": "integer"}, required=True)
+AFTER_CHUNK = Parameter("after", "query", {"type": "integer", "minimum": 0, "default": 0})
+FROM = Parameter("from", "query", {"type": "integer", "minimum": 1, "maximum": MAX_EVENT}, required=True)
+TO = Parameter("to", "query", {"type": "integer", "minimum": 1, "maximum": MAX_EVENT}, required=True)
+TOPIC = Parameter("topic", "query", {"type": "array", "items": {"type": "string"}, "maxItems": 50})
+DECODABLE = Parameter("decodable", "query", {"type": "boolean", "default": False})
+TICKET = Parameter("ticket", "query", {"type": "string"})
+INVITATION = Parameter("invitation_id", "path", {"type": "string"}, required=True)
+
+OPERATIONS: tuple[Operation, ...] = (
+    Operation(
+        *("post", "/whep", "Offer a WebRTC connection (WHEP).", 201, SDP),
+        errors=(
+            BadSdp,
+            TooFewSections,
+            WrongMediaType,
+            BadParameter,
+            RobotUnreachable,
+            TooManyPeers,
+            ShuttingDown,
+            *WITH_BODY,
+        ),
+        body=SDP,
+        parameters=(STAMP, RELAY, VIEW, SECTIONS),
+        headers=("Location", "ETag", "Accept-Patch"),
+    ),
+    Operation(
+        *("patch", "/whep/{resource}", "More ICE candidates, or an ICE restart (If-Match: *).", 200, FRAGMENT),
+        errors=(
+            *(BadSdpFragment, WrongMediaType, NotFound, NotConnected, PreconditionFailed, PreconditionRequired),
+            *WITH_BODY,
+        ),
+        body=FRAGMENT,
+        parameters=(RESOURCE, MATCH),
+        headers=("ETag",),
+        also=(204,),
+    ),
+    Operation("delete", "/whep/{resource}", "End a connection.", 200, None, (NotFound,), parameters=(RESOURCE,)),
+    Operation(
+        *("post", "/whip", "Publish a camera (WHIP).", 201, SDP),
+        errors=(
+            BadSdp,
+            NotAcceptable,
+            NotAllowed,
+            NotFound,
+            WrongMediaType,
+            BadParameter,
+            RobotUnreachable,
+            AlreadyPublishing,
+            CameraTaken,
+            ShuttingDown,
+            *WITH_BODY,
+        ),
+        body=SDP,
+        parameters=(CAMERA,),
+        headers=("Location", "ETag", "Accept-Patch"),
+    ),
+    Operation(
+        *("patch", "/whip/{resource}", "More ICE candidates, or an ICE restart (If-Match: *).", 200, FRAGMENT),
+        errors=(
+            *(BadSdpFragment, WrongMediaType, NotFound, NotConnected, PreconditionFailed, PreconditionRequired),
+            *WITH_BODY,
+        ),
+        body=FRAGMENT,
+        parameters=(RESOURCE, MATCH),
+        headers=("ETag",),
+        also=(204,),
+    ),
+    Operation("delete", "/whip/{resource}", "Publish no more.", 200, None, (NotFound,), parameters=(RESOURCE,)),
+    Operation("get", "/api/session", "What is going on.", 200, SessionInfo),
+    Operation("get", "/api/ice", "STUN and TURN servers, with credentials for a while.", 200, IceServers),
+    Operation(
+        *("get", "/api/relay", "Where an observer gets its media: null, from the console.", 200, RelayAnswer),
+        errors=(BadParameter,),
+        parameters=(PEER, LOST),
+    ),
+    Operation(
+        *("post", "/api/watch", "A ticket for the WebSocket of an observer behind a relay.", 201, WatchTicket),
+        errors=(NotAllowed, NotFound, BadParameter, RobotUnreachable, TooManyPeers, ShuttingDown),
+        parameters=(WATCHED,),
+    ),
+    Operation(
+        *("delete", "/watch/{ticket}", "Give a ticket back.", 200, None, (NotFound,)),
+        parameters=(WATCH_TICKET,),
+    ),
+    Operation(
+        *("post", "/api/stop", "Stop the robot, latched. From every role.", 200, Delivered),
+        errors=(Silenced, PressUsed, LinkDown, Unconfirmed, *WITH_JSON),
+        body=StopRequest,
+    ),
+    Operation(
+        *("post", "/api/reset", "Release the latched stop that the body names.", 200, Released),
+        errors=(
+            *(NotAllowed, NoSeat, StaleReset, ResetTooSoon, LockedOut, LinkDown, Unconfirmed, ResetNotKept),
+            *WITH_JSON,
+        ),
+        body=ResetRequest,
+    ),
+    Operation("post", "/api/scene", "A ticket for the 3D scene.", 200, ScenePath, (SceneUnavailable,)),
+    Operation("get", "/api/invitations", "Whom one has invited.", 200, InvitationList, (NotAllowed,)),
+    Operation(
+        *("post", "/api/invitations", "Invite a person.", 201, NewInvitation),
+        errors=(NotAllowed, BadParameter, TooManyInvitations, StateUnavailable, *WITH_JSON),
+        body=InvitationRequest,
+    ),
+    Operation(
+        *("delete", "/api/invitations/{invitation_id}", "Revoke, and end whoever came with it.", 200, InvitationList),
+        errors=(NotAllowed, NotFound, StateUnavailable),
+        parameters=(INVITATION,),
+    ),
+    Operation(
+        *("get", "/api/audit", "Who did what.", 200, AuditPage),
+        errors=(NotAllowed, BadParameter),
+        parameters=(AFTER, BEFORE, LIMIT),
+    ),
+    Operation(
+        *("get", "/api/recordings", "Whether the session is recorded, and what was.", 200, RecordingList),
+        errors=(BadParameter, RecordingUnreadable, RecordingFailed),
+        parameters=(BEFORE, LISTED),
+    ),
+    Operation(
+        *("post", "/api/recordings", "Record from now on.", 201, RecordingState),
+        errors=(NotAllowed, AlreadyRecording, TooManyRequests, RecordingFailed, *WITH_JSON),
+        body=RecordingRequest,
+    ),
+    Operation("post", "/api/recordings/stop", "End the recording.", 200, RecordingState, (NotAllowed,)),
+    Operation(
+        *("get", "/api/recordings/{recording_id}", "One recording with its index.", 200, RecordingDetails),
+        errors=(NotFound, BadParameter, RecordingUnreadable, RecordingFailed),
+        parameters=(RECORDING, AFTER_CHUNK),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/chunks/{number}", "The records of a chunk.", 200, OCTETS),
+        errors=(NotFound, BadParameter, RecordingUnreadable, RecordingFailed),
+        parameters=(RECORDING, CHUNK),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/records", "The records of a range of events.", 200, OCTETS),
+        errors=(NotFound, BadParameter, RecordingUnreadable, RecordingFailed),
+        parameters=(RECORDING, FROM, TO, TOPIC, DECODABLE),
+    ),
+    Operation(
+        *("post", "/api/recordings/{recording_id}/ticket", "A path to download it from.", 200, FileTicket),
+        errors=(NotAllowed, NotFound, RecordingUnreadable, RecordingFailed),
+        parameters=(RECORDING,),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/file", "The file; with Range.", 200, MCAP),
+        errors=(NotAllowed, NotFound, RecordingUnreadable, RecordingFailed),
+        parameters=(RECORDING, TICKET),
+        also=(206, 416),
+    ),
+    Operation(
+        *("delete", "/api/recordings/{recording_id}", "Delete the file.", 200, RecordingList),
+        errors=(NotAllowed, NotFound, AlreadyRecording, RecordingFailed),
+        parameters=(RECORDING,),
+    ),
+    Operation("get", "/healthz", "Whether the console runs, and reaches its robot.", 200, Health, token=False),
+    Operation("get", "/metrics", "Prometheus.", 200, "text/plain", token=False),
+)
+
+
+def openapi_document(operations: Sequence[Operation] = OPERATIONS) -> dict[str, Any]:
+    """OpenAPI 3.1, in JSON's types alone."""
+    structs = {Problem} | {kind for each in operations for kind in (each.answer, each.body) if isinstance(kind, type)}
+    ordered = sorted(structs, key=lambda struct: struct.__name__)
+    _, components = msgspec.json.schema_components(ordered, ref_template="#/components/schemas/{name}")
+    paths: dict[str, dict[str, Any]] = {}
+    for operation in operations:
+        paths.setdefault(operation.path, {})[operation.method] = _operation(operation)
+    document = {
+        "openapi": "3.1.0",
+        "info": {"title": "Lockstep console", "version": "1", "description": "See docs/console-api.md."},
+        "paths": paths,
+        "components": {
+            "schemas": dict(sorted(components.items())),
+            "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
+        },
+    }
+    found: dict[str, Any] = json.loads(msgspec.json.encode(document))
+    return found
+
+
+def _operation(operation: Operation) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "operationId": operation_id(operation),
+        "tags": [_tag(operation.path)],
+        "summary": operation.summary,
+        "responses": _responses(operation),
+    }
+    if operation.token:
+        found["security"] = [{"token": []}]
+    if operation.parameters:
+        found["parameters"] = [
+            {"name": each.name, "in": each.where, "required": each.required, "schema": each.schema}
+            for each in operation.parameters
+        ]
+    if operation.body is not None:
+        found["requestBody"] = {"required": isinstance(operation.body, str), "content": _content(operation.body)}
+    return found
+
+
+def operation_id(operation: Operation) -> str:
+    """For generated clients: the method and the words of the path, `post_api_stop`."""
+    words = [re.sub(r"\W+", "_", each).strip("_") for each in operation.path.split("/")]
+    return "_".join([operation.method, *filter(None, words)])
+
+
+def _tag(path: str) -> str:
+    """The group that documentation shows an operation in: "recordings" of /api/recordings/{id}."""
+    words = [each for each in path.split("/") if each and not each.startswith("{") and each != "api"]
+    return words[0] if words else "console"
+
+
+def _responses(operation: Operation) -> dict[str, Any]:
+    good: dict[str, Any] = {"description": HTTPStatus(operation.status).phrase}
+    if operation.answer is not None:
+        good["content"] = _content(operation.answer)
+    if operation.headers:
+        good["headers"] = {name: {"required": True, "schema": {"type": "string"}} for name in operation.headers}
+    responses = {str(operation.status): good}
+    responses |= {str(status): {"description": HTTPStatus(status).phrase} for status in operation.also}
+    for status, entries in sorted(_errors(operation).items()):
+        responses[str(status)] = _error(status, entries)
+    return responses
+
+
+def _errors(operation: Operation) -> dict[int, list[HttpError]]:
+    """By status: what this operation can raise, and what anything can."""
+    errors = (*operation.errors, *EVERYWHERE, *(WITH_TOKEN if operation.token else ()))
+    if operation.method != "get":
+        errors += (OriginRefused,)
+    by_status: dict[int, list[HttpError]] = {}
+    for error in errors:
+        entry = HTTP_ERRORS[error]
+        known = by_status.setdefault(entry.status, [])
+        if entry.name not in [each.name for each in known]:
+            known.append(entry)
+    return by_status
+
+
+def _error(status: int, entries: list[HttpError]) -> dict[str, Any]:
+    names = sorted(entry.name for entry in entries)
+    schema = {"allOf": [_reference(Problem), {"properties": {"error": {"enum": names}}}]}
+    always = set.intersection(*({*entry.headers} for entry in entries)) - {"Connection"}
+    found: dict[str, Any] = {"description": ", ".join(names), "content": {PROBLEM_JSON: {"schema": schema}}}
+    if always:
+        found["headers"] = {name: {"required": True, "schema": {"type": "string"}} for name in sorted(always)}
+    return found
+
+
+def _content(kind: type[msgspec.Struct] | str) -> dict[str, Any]:
+    if isinstance(kind, str):
+        return {kind: {"schema": {"type": "string"}}}
+    return {JSON: {"schema": _reference(kind)}}
+
+
+def _reference(struct: type[msgspec.Struct]) -> dict[str, str]:
+    return {"$ref": f"#/components/schemas/{struct.__name__}"}

@@ -1,0 +1,230 @@
+"""WHEP signalling (draft-ietf-wish-whep): POST an offer, PATCH candidates, DELETE to end."""
+
+import asyncio
+import gzip
+from collections import Counter
+from collections.abc import Callable
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
+
+from lockstep.rtc.endpoint import TooManyPeers
+from lockstep.rtc.peer import PeerSettings
+from lockstep.rtc.sctp import SctpSettings
+from lockstep.rtc.sdp import SdpError, SessionDescription, write_description, write_fragment
+from lockstep.server.auth.tokens import Identity, Right
+from lockstep.server.errors import (
+    BadSdp,
+    BadSdpFragment,
+    ConsoleError,
+    InternalFault,
+    NotConnected,
+    NotFound,
+    PreconditionFailed,
+    PreconditionRequired,
+    RobotUnreachable,
+    TooFewSections,
+    TooManyRequests,
+)
+from lockstep.server.http.request_body import read_text
+from lockstep.server.http.static_files import takes_coding
+from lockstep.server.peers.agreed_channels import agreed_channels
+from lockstep.server.peers.webrtc_peer import WebRtcPeer
+from lockstep.server.routes.ice import servers_for
+from lockstep.server.state.dependencies import Dependencies, authorized, services
+from lockstep.server.webrtc.ice_servers import link_headers
+from lockstep.server.webrtc.ice_session import IceSession
+from lockstep.server.webrtc.sdp_offer import MAX_SECTIONS, parse_fragment, parse_offer
+
+__all__ = [
+    "FRAGMENT",
+    "NEGOTIATION_TIMEOUT",
+    "SDP",
+    "patched",
+    "router",
+]
+
+SDP = "application/sdp"
+FRAGMENT = "application/trickle-ice-sdpfrag"
+FURTHER_SECTIONS = 2  # besides one for each stream: the data channels, and the operator's voice
+NEGOTIATION_TIMEOUT = 10.0  # s until STUN and TURN servers have told their addresses
+
+# The welcome has the robot's description, which of an arm with many bodies is longer than 16 KiB.
+LARGEST_MESSAGE = 64 * 1024  # bytes, that every browser takes
+OF_OBSERVERS = PeerSettings(sctp=SctpSettings(max_send_message=LARGEST_MESSAGE))
+# Whoever drives hears soon what has come, with the feedback in most cases: no repeat waits for it.
+OF_DRIVERS = PeerSettings(sctp=SctpSettings(max_send_message=LARGEST_MESSAGE, acknowledgement_delay=0.01))
+
+router = APIRouter()
+
+
+@router.post("/whep")
+async def create(
+    request: Request,
+    caller: Annotated[Right, Depends(authorized)],
+    stamp: Literal["trailer"] | None = None,
+    relay: Annotated[str, Query(pattern=r"^\d{0,3}$")] = "",
+    view: Literal["thumbnail"] | None = None,
+    sections: Literal["all"] | None = None,
+) -> Response:
+    """An offer in, an answer out; the peer lives on until DELETE, or until its connection ends.
+
+    `relay`: an observer has its media from that relay, and offers data channels alone.
+    `view`: a thumbnail is a small picture of the main camera on an overview, and takes part in nothing, whatever the
+    role of who asks.
+    `sections`: an offer with fewer media sections than there are streams is refused, for the peer to make a larger one.
+    """
+    here = services(request)
+    if here.console.robot.description is None:
+        raise RobotUnreachable(here.console.robot.detail)
+    here.guard.offer(caller.token_id)  # before it costs anything
+    text = await read_text(request, SDP, here.settings.max_sdp_bytes)
+    offer = parse_offer(text, max(MAX_SECTIONS, len(here.media.offers) + FURTHER_SECTIONS))
+    if sections == "all":
+        _check_sections(here, offer)
+    identity = caller.identity
+    ice = servers_for(here.settings, identity)
+    thumbnail = view == "thumbnail"
+    if thumbnail:
+        identity = identity._replace(role="observer")
+    relayed = bool(relay) and not thumbnail and identity.role == "observer" and here.relays.arrived(relay)
+    with here.console.peers.place(identity, relayed=relayed, thumbnail=thumbnail):
+        peer, answer = await _negotiate(here, caller, identity, offer, trailer=stamp == "trailer", thumbnail=thumbnail)
+        peer.relay = relay if relayed else ""
+        here.console.peers.admit(peer)
+    headers = {
+        "Location": f"{request.scope.get('root_path', '')}/whep/{peer.resource}",
+        "Accept-Patch": FRAGMENT,
+        "Cache-Control": "no-store",
+        "ETag": peer.ice.tag,
+    }
+    if ice.ice_servers:
+        headers["Link"] = ", ".join(link_headers(ice))
+    body = write_description(answer).encode()
+    if takes_coding(request.headers.get("accept-encoding", ""), "gzip"):  # sections repeat each other
+        body, headers = gzip.compress(body, mtime=0), headers | {"Content-Encoding": "gzip"}
+    return Response(body, status_code=201, media_type=SDP, headers=headers | {"Vary": "Accept-Encoding"})
+
+
+@router.options("/whep", include_in_schema=False)
+async def options() -> Response:
+    """What may be posted here (draft-ietf-wish-whep 4.2); a browser's preflight is answered before it comes here."""
+    return Response(status_code=204, headers={"Accept-Post": SDP, "Allow": "OPTIONS, POST"})
+
+
+@router.get("/whep", include_in_schema=False)
+async def nothing_to_get() -> Response:
+    raise HTTPException(405, "offers are posted here", {"Allow": "OPTIONS, POST"})
+
+
+@router.patch("/whep/{resource}")
+async def patch(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
+    """More candidates (RFC 8840), or an ICE restart, which says `If-Match: *` (RFC 9725 4.3.1, 4.3.3)."""
+    here = services(request)
+    peer = _own(here, resource, caller)
+    peer.take_request()
+    return await patched(request, here, peer.ice, lambda: _own(here, resource, caller))
+
+
+async def patched(request: Request, here: Dependencies, ice: IceSession, still_there: Callable[[], object]) -> Response:
+    """What a PATCH does, of WHEP and of WHIP. `still_there` raises when the session has ended."""
+    expected = _precondition(request, ice.tag)
+    text = await read_text(request, FRAGMENT, here.settings.max_sdp_bytes)
+    still_there()  # it may have ended while the body came
+    kind, mid = ice.section
+    fragment = parse_fragment(text, mid)
+    if fragment.ufrag in ("", ice.username):
+        ice.add(fragment.candidates)
+        return Response(status_code=204)
+    if expected != "*" or not fragment.password:
+        raise BadSdpFragment("another ice-ufrag: a restart says If-Match: * and has an ice-pwd")
+    if not ice.connected:
+        raise NotConnected("there is no ICE session that could be restarted")
+    body = write_fragment(ice.restart(fragment), kind, mid)
+    headers = {"ETag": ice.tag, "Cache-Control": "no-store"}
+    return Response(body, status_code=200, media_type=FRAGMENT, headers=headers)
+
+
+def _precondition(request: Request, tag: str) -> str:
+    """What the request expects of the ICE session: `*` (any), or its tag (RFC 9110 13.1.1)."""
+    expected = request.headers.get("if-match", "").strip()
+    if not expected:
+        raise PreconditionRequired("a PATCH needs If-Match: the ETag of the ICE session, or * to restart it")
+    if expected != "*" and tag not in [each.strip() for each in expected.split(",")]:
+        raise PreconditionFailed("that is not the newest ICE session")
+    return expected
+
+
+@router.delete("/whep/{resource}")
+async def delete(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
+    _own(services(request), resource, caller).end("deleted")
+    return Response(status_code=200)
+
+
+def _own(here: Dependencies, resource: str, caller: Right) -> WebRtcPeer:
+    """The peer of this resource; somebody else's is as good as none."""
+    peer = here.console.peers.by_resource(resource)
+    if peer.identity.token_id != caller.token_id:
+        raise NotFound("no such WHEP resource")
+    return peer
+
+
+def _check_sections(here: Dependencies, offer: SessionDescription) -> None:
+    kinds = Counter(stream.kind for stream in here.media.offers)
+    wanted = Counter(each.kind for each in offer.accepted if each.direction in ("recvonly", "sendrecv"))
+    if any(wanted[kind] < count for kind, count in kinds.items()):
+        raise TooFewSections(f"{kinds['video']} of video and {kinds['audio']} of audio are needed for all streams")
+
+
+async def _negotiate(
+    here: Dependencies, caller: Right, identity: Identity, offer: SessionDescription, *, trailer: bool, thumbnail: bool
+) -> tuple[WebRtcPeer, SessionDescription]:
+    """The peer, and its answer. `identity`: as whom `caller` takes part."""
+    # The console's own candidates are a setting, and a peer's address is learnt from its checks: no server is asked.
+    servers = servers_for(here.settings, identity).ice_servers if here.settings.relay_console else []
+    channels = agreed_channels([each for section in offer.accepted for each in section.channel_maps])
+    observes = identity.role == "observer"
+    turns = here.media.turns_of(waits=observes)
+    try:
+        async with asyncio.timeout(NEGOTIATION_TIMEOUT):
+            connection = await here.house.endpoint.connect(
+                turns=turns, servers=servers, settings=OF_OBSERVERS if observes else OF_DRIVERS
+            )
+    except TimeoutError as error:
+        raise BadSdp("the offer cannot be answered in time") from error
+    except TooManyPeers as error:
+        raise TooManyRequests("too many connections at this console") from error
+    try:
+        line = here.voice.line(identity.role)
+        plan = here.media.plan(offer, trailer=trailer, thumbnail=thumbnail, voice=line is not None)
+        answer = connection.answer(offer, plan.media)
+        media = here.media.attach(connection, plan, priority=identity.role == "operator", turns=turns)
+        ice = IceSession(connection, offer.transport.ufrag)
+        peer = WebRtcPeer(
+            connection,
+            media,
+            ice,
+            identity,
+            here.console,
+            here.settings,
+            take_voice=None if line is None else line.take,
+        )
+        peer.thumbnail = thumbnail
+        if line is not None:
+            line.peer = peer
+        try:
+            peer.agree_on(channels)
+            caller.identity  # noqa: B018  raises when the link has ended meanwhile
+        except BaseException:
+            await peer.abandon()
+            raise
+        connection.listen(peer.heard)
+    except BaseException as error:
+        connection.close()
+        if isinstance(error, SdpError):
+            raise BadSdp(str(error)) from error
+        if isinstance(error, Exception) and not isinstance(error, ConsoleError):
+            here.metrics.faults.caught("peer offer", error)
+            raise InternalFault("the console could not answer; it has written down why") from error
+        raise
+    return peer, answer

@@ -1,0 +1,197 @@
+"""WHIP signalling (RFC 9725): somebody with an operator's link publishes a camera of the console's own."""
+
+import asyncio
+from dataclasses import replace
+from typing import Annotated, cast
+
+from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
+
+from lockstep.rtc.endpoint import TooManyPeers
+from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SdpError, SessionDescription, write_description
+from lockstep.rtc.sdp.codecs import common_codecs, is_same_format
+from lockstep.server.auth.tokens import Right
+from lockstep.server.errors import (
+    BadSdp,
+    ConsoleError,
+    InternalFault,
+    NotAcceptable,
+    NotAllowed,
+    NotFound,
+    RobotUnreachable,
+    TooManyRequests,
+)
+from lockstep.server.http.request_body import read_text
+from lockstep.server.media.published.depacketise import PictureCodec
+from lockstep.server.media.published.published_camera import PublishedCamera
+from lockstep.server.publishing.publisher import Publisher
+from lockstep.server.routes.ice import servers_for
+from lockstep.server.routes.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, patched
+from lockstep.server.state.dependencies import Dependencies, authorized, services
+from lockstep.server.webrtc.ice_servers import link_headers
+from lockstep.server.webrtc.sdp_offer import parse_offer
+
+__all__ = ["router"]
+
+FEEDBACK = ("nack", "nack pli", "goog-remb")
+H264 = {"packetization-mode": "1", "level-asymmetry-allowed": "1"}
+PROFILES = ("42001f", "42e01f", "4d001f", "64001f", "640c1f")  # baseline, main and high; all of them can be decoded
+PICTURES = (
+    Codec(96, "VP8", 90_000, feedback=FEEDBACK),
+    Codec(97, "rtx", 90_000, parameters={"apt": "96"}),
+    *(
+        Codec(number, "H264", 90_000, parameters=H264 | {"profile-level-id": profile}, feedback=FEEDBACK)
+        for number, profile in enumerate(PROFILES, 98)
+    ),
+)
+SOUND = (Codec(111, "opus", 48_000, 2), Codec(0, "PCMU", 8000), Codec(8, "PCMA", 8000))
+
+ENDPOINT_METHODS, SESSION_METHODS = "OPTIONS, POST", "DELETE, OPTIONS, PATCH"
+
+router = APIRouter()
+
+
+@router.post("/whip")
+async def create(
+    request: Request,
+    caller: Annotated[Right, Depends(authorized)],
+    camera: Annotated[str, Query(max_length=32)] = "",
+) -> Response:
+    """An offer in, an answer out; the publication lives on until DELETE, or until its connection or its link ends.
+
+    `camera`: its name; "" is the first that nobody publishes.
+    """
+    here = _enabled(request)
+    if caller.identity.role == "observer":
+        raise NotAllowed("observers publish nothing")
+    if here.console.robot.description is None:
+        raise RobotUnreachable(here.console.robot.detail)
+    here.guard.offer(caller.token_id)  # before it costs anything
+    text = await read_text(request, SDP, here.settings.max_sdp_bytes)
+    offer = _parsed(text)
+    section = _pictures(offer)
+    ice = servers_for(here.settings, caller.identity)
+    with here.publishers.place(caller.identity, camera) as wanted:
+        publisher, answer = await _negotiate(here, caller, offer, section, wanted)
+        here.publishers.admit(publisher)
+    headers = {
+        "Location": f"{request.scope.get('root_path', '')}/whip/{publisher.resource}",
+        "Accept-Patch": FRAGMENT,
+        "Cache-Control": "no-store",
+        "ETag": publisher.ice.tag,
+    }
+    if ice.ice_servers:
+        headers["Link"] = ", ".join(link_headers(ice))
+    return Response(answer, status_code=201, media_type=SDP, headers=headers)
+
+
+@router.options("/whip", include_in_schema=False)
+async def options(request: Request) -> Response:
+    """What may be posted here (RFC 9725 4.2); a browser's preflight is answered before it comes here."""
+    _enabled(request)
+    return Response(status_code=204, headers={"Accept-Post": SDP, "Allow": ENDPOINT_METHODS})
+
+
+@router.options("/whip/{resource}", include_in_schema=False)
+async def session_options(resource: str, request: Request) -> Response:
+    """The same for every resource: nobody learns which there are."""
+    _enabled(request)
+    return Response(status_code=204, headers={"Accept-Patch": FRAGMENT, "Allow": SESSION_METHODS})
+
+
+@router.api_route("/whip", methods=["GET", "HEAD", "PUT", "PATCH", "DELETE"], include_in_schema=False)
+async def nothing_to_get(request: Request) -> Response:
+    _enabled(request)
+    raise HTTPException(405, "offers are posted here", {"Allow": ENDPOINT_METHODS})
+
+
+@router.api_route("/whip/{resource}", methods=["GET", "HEAD", "PUT", "POST"], include_in_schema=False)
+async def nothing_of_a_session(resource: str, request: Request) -> Response:
+    _enabled(request)
+    raise HTTPException(405, "a WHIP session is patched and deleted", {"Allow": SESSION_METHODS})
+
+
+@router.patch("/whip/{resource}")
+async def patch(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
+    """More candidates, or an ICE restart, which says `If-Match: *` (RFC 9725 4.3.1, 4.3.3)."""
+    here = _enabled(request)
+    publisher = _own(here, resource, caller)
+    publisher.take_request()
+    return await patched(request, here, publisher.ice, lambda: _own(here, resource, caller))
+
+
+@router.delete("/whip/{resource}")
+async def delete(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
+    here = _enabled(request)
+    here.publishers.end(_own(here, resource, caller), "deleted")
+    return Response(status_code=200)
+
+
+def _parsed(text: str) -> SessionDescription:
+    offer = parse_offer(text)
+    if any(section.sctp_port is not None for section in offer.sections):
+        raise BadSdp("a publisher has no data channels")
+    return offer
+
+
+def _pictures(offer: SessionDescription) -> MediaSection:
+    """The first section that sends pictures that can be taken, with its best-liked codec and what repairs that."""
+    for section in offer.sections:
+        if section.kind == "video" and section.direction in ("sendonly", "sendrecv"):
+            common = {each.payload_type for each in common_codecs(section.codecs, PICTURES)}
+            best = next((each for each in section.codecs if each.payload_type in common and each.repairs is None), None)
+            if best is not None:
+                repair = section.repair_of(best)
+                return replace(section, codecs=(best,) if repair is None else (best, repair))
+    raise NotAcceptable("no section that sends pictures in H.264 or VP8")
+
+
+def _enabled(request: Request) -> Dependencies:
+    """Raises NotFound where nobody may publish anything."""
+    here = services(request)
+    if not here.publishers.enabled:
+        raise NotFound("nothing can be published to this console: LOCKSTEP_WHIP names no camera")
+    return here
+
+
+def _own(here: Dependencies, resource: str, caller: Right) -> Publisher:
+    """The publisher of this session; somebody else's is as good as none."""
+    publisher = here.publishers.by_resource(resource)
+    if publisher.identity.token_id != caller.token_id:
+        raise NotFound("no such WHIP session")
+    return publisher
+
+
+async def _negotiate(
+    here: Dependencies, caller: Right, offer: SessionDescription, section: MediaSection, camera: PublishedCamera
+) -> tuple[Publisher, str]:
+    """`section`: the one whose pictures are taken; others are answered inactive."""
+    servers = servers_for(here.settings, caller.identity).ice_servers if here.settings.relay_console else []
+    publisher = Publisher(camera, caller.identity, here.settings)
+    try:
+        async with asyncio.timeout(NEGOTIATION_TIMEOUT):
+            connection = await here.house.endpoint.connect(publisher.heard, turns=here.media.turns, servers=servers)
+    except TimeoutError as error:
+        raise BadSdp("the offer cannot be answered in time") from error
+    except TooManyPeers as error:
+        raise TooManyRequests("too many connections at this console") from error
+    try:
+        answer = connection.answer(offer, {each.mid: _answered(each, section) for each in offer.sections})
+        codec = "VP8" if section.codecs[0].name.lower() == "vp8" else "H264"
+        publisher.receives(connection, offer.transport.ufrag, section.mid, cast(PictureCodec, codec))
+        caller.identity  # noqa: B018  raises when the link has ended meanwhile
+    except BaseException as error:
+        connection.close()
+        if isinstance(error, SdpError):
+            raise BadSdp(str(error)) from error
+        if isinstance(error, Exception) and not isinstance(error, ConsoleError):
+            here.metrics.faults.caught("publisher offer", error)
+            raise InternalFault("the console could not answer; it has written down why") from error
+        raise
+    return publisher, write_description(answer)
+
+
+def _answered(offered: MediaSection, taken: MediaSection) -> LocalMedia:
+    if offered.mid != taken.mid:
+        return LocalMedia(PICTURES if offered.kind == "video" else SOUND, "inactive")
+    known = [each for each in PICTURES if each.repairs is not None or is_same_format(each, taken.codecs[0])]
+    return LocalMedia(known, "recvonly", (MID_URI,))

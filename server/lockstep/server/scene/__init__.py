@@ -1,0 +1,1 @@
+"""The 3D scene, made from the robot's feedback."""

@@ -1,0 +1,164 @@
+"""Where the commands of the last moments would have brought the robot, by its description alone. No I/O.
+
+Beside the measured robot this shows what came between: slew, slip, a limit, an obstacle. Commands are what the console
+forwarded under each event; each counts from its own feedback until the next one, by the bridge's clock, and no longer
+than the robot holds a command. At rest nothing counts.
+"""
+
+import copy
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Self
+
+from lockstep.protocol.description import BodyTwist, PlanarBase, RobotDescription
+from lockstep.protocol.messages import Feedback
+from lockstep.server.scene.kinematics import Pose, about, inverse, joined, product, rotate, world_poses
+
+__all__ = ["CommandedPath"]
+
+MAX_RECORDS = 256  # more than a hold of 5 s has at any event rate that makes sense
+MAX_COMMANDS = 512
+Vector = tuple[float, float, float]
+
+
+class _Record(NamedTuple):
+    event: int
+    time: float  # s, the bridge's
+    joints: tuple[float, ...]
+    at_rest: bool
+
+
+class _Span(NamedTuple):
+    """Values that were commanded for some time."""
+
+    offsets: Mapping[str, float]  # of each axis from its rest value
+    seconds: float
+
+
+class CommandedPath:
+    """`command` takes what is forwarded, `feedback` what comes back; `poses` says where the bodies would be."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.seconds = min(max(description.hold, 0.0), 5.0)
+        self._description = description
+        self._axes = [(axis.name, axis.rest) for axis in description.axes]
+        self._joints = [joint.name for joint in description.joints]
+        self._gains = _gains(description)
+        known = set(self._joints)
+        base = description.planar_base
+        self._base = base if base is not None and {base.x, base.y, base.yaw} <= known else None
+        bodies = {body.name for body in description.bodies}
+        self._twists = [each for each in description.body_twists if {each.body, each.frame} <= bodies | {""}]
+        self._commands: dict[int, tuple[float, ...]] = {}
+        self._records: deque[_Record] = deque(maxlen=MAX_RECORDS)
+
+    @property
+    def known(self) -> bool:
+        """Whether the description says what any axis moves."""
+        return bool(self._gains or self._base or self._twists)
+
+    def command(self, event: int, values: Sequence[float]) -> None:
+        self._commands.pop(event, None)
+        self._commands[event] = tuple(values)
+        while len(self._commands) > MAX_COMMANDS:
+            del self._commands[next(iter(self._commands))]
+
+    def feedback(self, feedback: Feedback) -> None:
+        if not all(map(math.isfinite, feedback.joints)) or not math.isfinite(feedback.time):
+            return
+        if self._records and feedback.time < self._records[-1].time:
+            self._records.clear()
+        at_rest = feedback.at_rest or feedback.stop.stopped
+        self._records.append(_Record(feedback.event, feedback.time, tuple(feedback.joints), at_rest))
+        while len(self._records) > 1 and self._records[1].time <= feedback.time - self.seconds:
+            self._records.popleft()
+
+    def as_of_now(self) -> Self:
+        """To be asked for `poses` in another thread: for a robot of many parts that takes a while."""
+        found = copy.copy(self)
+        found._commands, found._records = dict(self._commands), self._records.copy()
+        return found
+
+    def poses(self) -> dict[str, Pose] | None:
+        """In the world, of every body; None where nothing was commanded, or the description does not say enough."""
+        spans = list(self._spans())
+        if not self.known or not any(any(span.offsets.values()) for span in spans):
+            return None
+        began = dict(zip(self._joints, self._records[0].joints, strict=False))
+        joints = dict(zip(self._joints, self._records[-1].joints, strict=False))
+        joints |= self._moved_joints(began, spans)
+        poses = world_poses(self._description, joints)
+        before = world_poses(self._description, began)
+        for twist in self._twists:
+            if twist.body in poses:
+                poses[twist.body] = _moved_body(twist, before, poses, spans)
+        return poses
+
+    def _spans(self) -> list[_Span]:
+        """What was commanded between one feedback and the next."""
+        records = list(self._records)
+        return [
+            _Span(self._offsets(record), min(after.time - record.time, self.seconds))
+            for record, after in zip(records, records[1:], strict=False)
+        ]
+
+    def _offsets(self, record: _Record) -> dict[str, float]:
+        values = self._commands.get(record.event)
+        if record.at_rest or values is None:
+            return {}
+        return {name: value - rest for (name, rest), value in zip(self._axes, values, strict=False)}
+
+    def _moved_joints(self, began: Mapping[str, float], spans: list[_Span]) -> dict[str, float]:
+        moved = {joint: began.get(joint, 0.0) for joint in self._gains}
+        base = self._base
+        place = None if base is None else tuple(began.get(name, 0.0) for name in (base.x, base.y, base.yaw))
+        for offsets, seconds in spans:
+            for joint, gains in self._gains.items():
+                moved[joint] += seconds * sum(gain * offsets.get(axis, 0.0) for axis, gain in gains.items())
+            if base is not None and place is not None:
+                place = _moved_base(base, place, offsets, seconds)
+        if base is not None and place is not None:
+            moved |= dict(zip((base.x, base.y, base.yaw), place, strict=True))
+        return moved
+
+
+def _gains(description: RobotDescription) -> dict[str, dict[str, float]]:
+    """The axes of each joint whose gain does not change with the posture."""
+    joints = {joint.name for joint in description.joints}
+    return {
+        limit.joint: {each.axis: each.gain for each in limit.axes if each.gain is not None}
+        for limit in description.position_limits
+        if limit.joint in joints and all(each.gain is not None for each in limit.axes)
+    }
+
+
+def _moved_base(
+    base: PlanarBase, place: tuple[float, ...], offsets: Mapping[str, float], seconds: float
+) -> tuple[float, ...]:
+    x, y, yaw = place
+    forward, left, turn = (offsets.get(name, 0.0) * seconds for name in (base.forward, base.left, base.turn))
+    heading = yaw + turn / 2  # of the arc's chord, nearly
+    cos, sin = math.cos(heading), math.sin(heading)
+    return (x + cos * forward - sin * left, y + sin * forward + cos * left, yaw + turn)
+
+
+def _moved_body(twist: BodyTwist, before: Mapping[str, Pose], after: Mapping[str, Pose], spans: list[_Span]) -> Pose:
+    """From where the body was in its frame when the commands began, to where its frame would be now."""
+    here = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    pose = joined(inverse(before.get(twist.frame, here)), before[twist.body])
+    point = joined(pose, Pose(twist.point, here.orientation)).position
+    orientation = pose.orientation
+    for offsets, seconds in spans:
+        way = _vector(twist.linear, offsets, seconds)
+        turn = _vector(twist.angular, offsets, seconds)
+        point = (point[0] + way[0], point[1] + way[1], point[2] + way[2])
+        orientation = product(about(turn, math.hypot(*turn)), orientation)
+    x, y, z = rotate(orientation, twist.point)
+    moved = Pose((point[0] - x, point[1] - y, point[2] - z), orientation)
+    return joined(after.get(twist.frame, here), moved)
+
+
+def _vector(axes: tuple[str, str, str], offsets: Mapping[str, float], seconds: float) -> Vector:
+    x, y, z = (offsets.get(name, 0.0) * seconds for name in axes)
+    return (x, y, z)

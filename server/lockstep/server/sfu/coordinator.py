@@ -1,0 +1,319 @@
+"""Brings the session into the relays while somebody watches there, and tells observers where to watch."""
+
+import asyncio
+import math
+import secrets
+import time
+from collections.abc import Callable, Iterable
+from typing import NamedTuple, Protocol
+
+import structlog
+
+from lockstep.protocol.console import encode_console_message
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Media, Pong
+from lockstep.server.auth.tokens import Identity
+from lockstep.server.media.errors import MediaError
+from lockstep.server.sfu.assignment import Assignment
+from lockstep.server.sfu.errors import RelayError
+from lockstep.server.sfu.publication import Engine, Publication
+from lockstep.server.sfu.settings import RelaySettings
+from lockstep.server.sfu.sfu_server import SfuServer
+from lockstep.server.sfu.tickets import RelayTicket
+from lockstep.server.util.backoff import Backoff
+from lockstep.server.util.uncancelled import attempt
+
+__all__ = ["SfuCoordinator", "RelayedMedia", "RelayedPeer"]
+
+log = structlog.get_logger(__name__)
+
+WAIT_SECONDS = 3.0  # that an observer waits for a relay before it is served directly
+LINGER_SECONDS = 20.0  # that the session stays in the relays without an observer there
+HEARTBEAT_SECONDS = 0.4  # between two messages on the feedback channel, also while the robot link is down
+BACKOFF, BACKOFF_CAP = 0.1, 2.0  # s
+DISTRUST_SECONDS = 30.0  # that a relay which failed is tried after the others
+HEALTHY_SECONDS = 10.0
+LOOK_SECONDS = 0.25  # between two looks at who may still watch
+STRAY_SECONDS = 60.0  # after which whoever has a key and no line to the console is thought to watch on without it
+RENEW_SECONDS = 600.0  # between two publications for the sake of those
+NEW_EPOCH, ENDED, UNWATCHED, STRAY = "new epoch", "a link ended", "nobody watches", "somebody left with a key"
+OWN_REASONS = (NEW_EPOCH, ENDED, UNWATCHED, STRAY)  # to end a publication; no relay's fault
+HEARTBEAT = encode_console_message(Pong(id=0))
+
+
+class RelayedPeer(Protocol):
+    """What it needs of a peer."""
+
+    @property
+    def relay(self) -> str: ...
+    @property
+    def role(self) -> str: ...
+    @property
+    def identity(self) -> Identity: ...
+
+
+class _Holder(NamedTuple):
+    """Somebody who was handed the key of the present publication."""
+
+    expires: float  # their link, s since 1970
+    seen_at: float  # when one of their peers was here last, s on the monotonic clock
+
+
+class SfuCoordinator:
+    """Run `run` as a task. Everything else is called on the same loop and returns at once, but for `ticket`."""
+
+    def __init__(
+        self,
+        settings: RelaySettings,
+        engine: Engine,
+        peers: Callable[[], Iterable[RelayedPeer]],
+        has_ended: Callable[[str, float], bool],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`has_ended`: whether the link of this id, which expires then, is good no more."""
+        self.stations = [
+            SfuServer(str(number), url, settings.relay_public[number] if settings.relay_public else url.address)
+            for number, url in enumerate(settings.relay_urls)
+        ]
+        self._engine = engine
+        self._peers = peers
+        self._has_ended = has_ended
+        self._clock = clock
+        self._handout = Assignment(settings.observers_direct)
+        self._publication: Publication | None = None
+        self._wanted = asyncio.Event()
+        self._asked_at = float("-inf")  # when somebody last asked for a relay
+        self._changed = asyncio.Event()  # replaced whenever a station became live or was lost
+        self._holders: dict[str, _Holder] = {}  # of the present publication's key, by link
+        self._published_at = float("-inf")
+
+    # What the console tells
+
+    def epoch_began(self) -> None:
+        """Media of another epoch are another publication."""
+        self._restart(NEW_EPOCH)
+
+    def _restart(self, why: str) -> None:
+        """Publish anew: another feed with other keys, so that who may not watch any more does not."""
+        if self._publication is not None:
+            self._publication.end(why)
+
+    def send_feedback(self, text: str) -> None:
+        """A receiver among the observers; all that watch through relays at once."""
+        if self._publication is not None:
+            self._publication.send_feedback(text)
+
+    # What observers ask
+
+    async def ticket(self, peer: RelayedPeer | None, lost: str) -> RelayTicket | None:
+        """Where one more observer watches; None: directly. It holds a key, see `key`.
+
+        Args:
+            peer: who asks again, because what it watched is gone
+            lost: "RELAY-FEED" that it lost; the same is not given out again
+        """
+        now = self._clock()
+        direct = sum(not each.relay and each.role == "observer" for each in self._peers())
+        if not self.stations or (peer is None and not self._handout.full(now, direct)):
+            self._handout.choose(now, direct, {})
+            return None
+        self._asked_at = now
+        self._wanted.set()
+        usable = await self._usable(lost)
+        watching = {station.name: 0 for station in usable}
+        for each in self._peers():
+            if each.relay in watching and each is not peer:
+                watching[each.relay] += 1
+        choice = self._handout.choose(now, direct, watching)
+        station = next((each for each in usable if each.name == choice), None)
+        return None if station is None else self._engine.ticket(station)
+
+    def key(self, peer: RelayedPeer) -> RelayTicket | None:
+        """What lets `peer` into the relay that it was admitted for; None: that does not carry the session now.
+
+        Its link is remembered: when that ends, the key is good no more.
+        """
+        station = next((each for each in self.stations if each.live and each.name == peer.relay), None)
+        if station is None:
+            return None
+        self._holders[peer.identity.token_id] = _Holder(peer.identity.expires, self._clock())
+        return self._engine.ticket(station)
+
+    def arrived(self, relay: str) -> bool:
+        """A peer that watches there is connected to the console; False: there is no such relay."""
+        self._handout.arrived(relay)
+        return any(station.name == relay for station in self.stations)
+
+    async def _usable(self, lost: str) -> list[SfuServer]:
+        """Stations that carry the session, waited for a while."""
+        deadline = self._clock() + WAIT_SECONDS
+        while True:
+            found = [each for each in self.stations if each.live and f"{each.name}-{each.feed}" != lost]
+            if found or self._clock() >= deadline:
+                return found
+            try:
+                async with asyncio.timeout(deadline - self._clock()):
+                    await self._changed.wait()
+            except TimeoutError:
+                continue
+
+    # Its own life
+
+    async def run(self) -> None:
+        """Until cancelled. Without relays it has nothing to do."""
+        backoff = Backoff(BACKOFF, BACKOFF_CAP)
+        while self.stations:
+            await self._wanted.wait()
+            if not self._in_demand():
+                self._wanted.clear()
+                continue
+            began = self._clock()
+            origin = min(self.stations, key=self._order)
+            try:
+                await attempt(self._carry(origin))
+            except (RelayError, MediaError, OSError, ConnectionError) as error:
+                self._lost(origin, str(error))
+            except Exception as error:
+                # A fault of the console's own; a relay never ends the console.
+                log.exception("publishing failed", relay=origin.url.address)
+                self._lost(origin, type(error).__name__)
+            if self._clock() - began > HEALTHY_SECONDS:
+                backoff.healthy()
+            await asyncio.sleep(backoff.next())
+
+    def _order(self, station: SfuServer) -> tuple[float, int]:
+        """Those that failed lately come last, and of those the one that failed just now: it may be dead."""
+        distrusted = self._clock() - station.failed_at < DISTRUST_SECONDS
+        return station.failed_at if distrusted else -math.inf, int(station.name)
+
+    def _in_demand(self) -> bool:
+        now = self._clock()
+        waiting = now - self._asked_at < WAIT_SECONDS or self._handout.expected(now)
+        return waiting or any(each.relay for each in self._peers())
+
+    async def _carry(self, origin: SfuServer) -> None:
+        """From here into one relay, and from there into the others; returns when it ended or nobody watches."""
+        async with self._engine.publish(origin, secrets.randbits(52) | 1) as publication:
+            self._publication = publication
+            self._holders.clear()
+            self._published_at = self._clock()
+            self._live(origin, publication)
+            try:
+                await self._while_wanted(publication, origin)
+            finally:
+                self._publication = None
+                for station in self.stations:
+                    self._gone(station, publication.why)
+        if publication.why in OWN_REASONS:
+            log.info("no longer published", relay=origin.url.address, why=publication.why)
+        else:
+            self._lost(origin, publication.why)
+
+    async def _while_wanted(self, publication: Publication, origin: SfuServer) -> None:
+        loop = asyncio.get_running_loop()
+        tasks = [
+            loop.create_task(self._extend(origin, station, publication), name=f"relay {station.name}")
+            for station in self.stations
+            if station is not origin
+        ]
+        tasks += [loop.create_task(self._watch(publication)), loop.create_task(self._beat(publication))]
+        try:
+            await publication.ended.wait()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _watch(self, publication: Publication) -> None:
+        """Ends it when nobody watches any more, or when somebody who has its key may not watch any more."""
+        quiet_since = self._clock()
+        while True:
+            await asyncio.sleep(LOOK_SECONDS)
+            if any(self._has_ended(link, each.expires) for link, each in self._holders.items()):
+                publication.end(ENDED)
+            if self._has_strays():
+                publication.end(STRAY)
+            if self._in_demand():
+                quiet_since = self._clock()
+            elif self._clock() - quiet_since > LINGER_SECONDS:
+                self._wanted.clear()
+                publication.end(UNWATCHED)
+
+    def _has_strays(self) -> bool:
+        """Whether somebody may watch without being a participant; not more often than once in a while."""
+        now = self._clock()
+        here = {each.identity.token_id for each in self._peers() if each.relay}
+        for link in here & self._holders.keys():
+            self._holders[link] = self._holders[link]._replace(seen_at=now)
+        gone = any(now - each.seen_at > STRAY_SECONDS for each in self._holders.values())
+        return gone and now - self._published_at > RENEW_SECONDS
+
+    async def _beat(self, publication: Publication) -> None:
+        """Observers tell a relay that hangs from a robot that is silent."""
+        while True:
+            await asyncio.sleep(HEARTBEAT_SECONDS)
+            publication.send_feedback(HEARTBEAT)
+
+    async def _extend(self, origin: SfuServer, station: SfuServer, publication: Publication) -> None:
+        """Keep one more relay fed from the first, until cancelled."""
+        backoff = Backoff(BACKOFF, BACKOFF_CAP)
+        while True:
+            began = self._clock()
+            try:
+                await attempt(self._feed(origin, station, publication))
+            except RelayError as error:
+                self._lost(station, str(error))
+            finally:
+                self._gone(station, "")
+            if self._clock() - began > HEALTHY_SECONDS:
+                backoff.healthy()
+            await asyncio.sleep(backoff.next())
+
+    async def _feed(self, origin: SfuServer, station: SfuServer, publication: Publication) -> None:
+        async with self._engine.pass_on(origin, station, publication) as link:
+            self._live(station, publication)
+            await link.ended.wait()
+            self._lost(station, link.why)
+
+    def _live(self, station: SfuServer, publication: Publication) -> None:
+        station.feed, station.streams, station.trouble = publication.feed, tuple(publication.streams), ""
+        log.info("relay carries the session", relay=station.url.address, room=station.url.room)
+        self._tell()
+
+    def _lost(self, station: SfuServer, trouble: str) -> None:
+        station.failed_at = self._clock()
+        if trouble != station.trouble:
+            log.warning("relay does not carry the session", relay=station.url.address, why=trouble)
+        station.trouble = trouble
+        self._gone(station, trouble)
+
+    def _gone(self, station: SfuServer, trouble: str) -> None:
+        if station.live:
+            station.feed, station.trouble = 0, trouble or station.trouble
+            self._tell()
+
+    def _tell(self) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+
+class FedMedia(Protocol):
+    """The console's media."""
+
+    def configure(self, description: RobotDescription) -> None: ...
+    def feed(self, media: Media, now: float) -> None: ...
+
+
+class RelayedMedia:
+    """The console's media, of which the relays hear when an epoch begins."""
+
+    def __init__(self, media: FedMedia, relays: SfuCoordinator) -> None:
+        self._media = media
+        self._relays = relays
+
+    def configure(self, description: RobotDescription) -> None:
+        self._media.configure(description)
+        self._relays.epoch_began()
+
+    def feed(self, media: Media, now: float) -> None:
+        self._media.feed(media, now)

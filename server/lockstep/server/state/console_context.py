@@ -1,0 +1,170 @@
+"""What all robots of one console have in common: who may come in, how often anybody may ask, and how many fit."""
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Mapping
+from typing import Protocol
+
+import structlog
+from prometheus_client import Counter as Metric
+
+from lockstep.server.audit.records import Actor
+from lockstep.server.auth.invitations import Invitation
+from lockstep.server.auth.silenced_links import SilencedLinks
+from lockstep.server.auth.tokens import Identity
+from lockstep.server.http.request_rate_limits import RequestRateLimits
+from lockstep.server.peers.peer_places import check_place
+from lockstep.server.peers.token_revocation import TokenRevocation
+from lockstep.server.state.persistent_state import ConsoleState
+from lockstep.server.telemetry.faults import Faults
+from lockstep.server.util.state_dir import StateDirUnusable
+from lockstep.server.util.uncancelled import in_thread
+from lockstep.server.webrtc.media_endpoint import MediaEndpoint
+
+__all__ = ["ConsoleContext", "ContextMetrics"]
+
+log = structlog.get_logger(__name__)
+
+COMMAND_LINE = Actor("command line")
+CONSOLE = Actor("console")
+CHECK_SECONDS = 0.5  # how long a link that was revoked by another process, or has expired, still works at most
+RETRY_SECONDS = 5.0  # until what the disk did not take is written again
+KEEP_SECONDS = 60.0  # between two times that the time is written down
+
+
+class ContextMetrics(Protocol):
+    """Where it counts what concerns no robot."""
+
+    @property
+    def bad_input(self) -> Metric: ...
+    @property
+    def faults(self) -> Faults: ...
+
+
+class ConsoleContext:
+    """Every robot's session brings its warden. Run `run` as a task; call `enforce` after inviting or revoking here.
+
+    Args:
+        max_peers: of all robots together; None: each robot's own bound is all there is
+        reserved: of those, that observers do not get
+    """
+
+    def __init__(
+        self,
+        state: ConsoleState,
+        guard: RequestRateLimits,
+        metrics: ContextMetrics,
+        endpoint: MediaEndpoint,
+        max_peers: int | None = None,
+        reserved: int = 0,
+    ) -> None:
+        self.endpoint = endpoint
+        self._dropped: Counter[str] = Counter()  # datagrams, as far as the metrics know
+        self.state = state
+        self.guard = guard
+        self.metrics = metrics
+        self.wardens: list[TokenRevocation] = []
+        self.silenced = SilencedLinks(state.invitations.invited_with)
+        self._max_peers = max_peers
+        self._reserved = reserved
+
+    async def run(self) -> None:
+        """Until cancelled: act on what other processes have changed about the links, and on links that expire."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._look_on(), name="links end")
+            tasks.create_task(self._keep_time(), name="newest time")  # a disk that hangs holds up no end of a link
+            tasks.create_task(self._keep_ended(), name="revocations")
+
+    def close(self) -> None:
+        """After all sessions have ended."""
+        self.endpoint.close()
+
+    def collect(self) -> None:
+        """Bring into the metrics what is counted elsewhere."""
+        dropped = self.endpoint.dropped
+        for name, count in (dropped - self._dropped).items():
+            self.metrics.bad_input.labels("transport", name).inc(count)
+        self._dropped = dropped
+
+    async def _look_on(self) -> None:
+        while True:
+            await asyncio.sleep(CHECK_SECONDS)
+            try:
+                self._end_silences()
+                self.enforce(self.state.invitations.refresh(), COMMAND_LINE)
+            except Exception as error:
+                self.metrics.faults.caught("links", error)
+
+    async def _keep_time(self) -> None:
+        """Once in a while, and whenever a link has expired."""
+        store, loop = self.state.invitations, asyncio.get_running_loop()
+        looked = store.now()
+        keep_at = loop.time()
+        while True:
+            await asyncio.sleep(CHECK_SECONDS)
+            try:
+                now = store.now()
+                expired = any(looked < each.expires <= now for each in store.known.all)
+                looked = now
+                if expired or loop.time() >= keep_at:
+                    keep_at = loop.time() + KEEP_SECONDS
+                    await in_thread(store.keep_time)
+            except StateDirUnusable as error:
+                log.error("what time it is cannot be written down", detail=str(error))
+            except Exception as error:
+                self.metrics.faults.caught("links", error)
+
+    async def _keep_ended(self) -> None:
+        """What the disk did not take when a link was revoked is written as soon as it does."""
+        store = self.state.invitations
+        while True:
+            await asyncio.sleep(RETRY_SECONDS)
+            if not store.unwritten:
+                continue
+            try:
+                self.enforce(await in_thread(store.keep_ended), CONSOLE)
+            except StateDirUnusable as error:
+                log.error("links that were revoked cannot be written down", detail=str(error))
+            except Exception as error:
+                self.metrics.faults.caught("links", error)
+
+    def enforce(self, changed: list[Invitation], by: Actor) -> None:
+        """Act, at every robot, on what `by` has invited or revoked, and on what has expired."""
+        now = self.state.invitations.now()
+        for warden in self.wardens:
+            warden.enforce(changed, by, now)
+
+    def connected(self) -> Counter[str]:
+        """Peers that are here, at any robot, by the ids of their links."""
+        return Counter(peer.identity.token_id for warden in self.wardens for peer in warden.peers)
+
+    # silence
+
+    def is_silenced(self, link: str) -> bool:
+        """Whether a supervisor has silenced the stops of this link, or of one that it was invited with."""
+        return self.silenced.holds(link, time.monotonic())
+
+    def silences(self) -> dict[str, float]:
+        """The links that other consoles have to silence too, and until when, in s since 1970."""
+        now, ahead = time.monotonic(), self.state.invitations.now() - time.monotonic()
+        known = [each.id for each in self.state.invitations.known.all]
+        return {link: until + ahead for link, until in self.silenced.to_tell(known, now).items()}
+
+    def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
+        """Another console's `silences`; all that it has now."""
+        now, ahead = time.monotonic(), self.state.invitations.now() - time.monotonic()
+        self.silenced.told_elsewhere(console, {link: until - ahead for link, until in links.items()}, now)
+
+    def _end_silences(self) -> None:
+        for link in self.silenced.ended(time.monotonic()):
+            for warden in self.wardens:
+                warden.silence_ended(link)
+
+    def check_room(self, identity: Identity) -> None:
+        """Raises TooManyPeers when there is no place for another peer at any robot."""
+        if self._max_peers is None:
+            return
+        held = sum(warden.peers.taken_by(identity.token_id) for warden in self.wardens)
+        taken = sum(warden.peers.taken for warden in self.wardens)
+        check_place(identity.role, held, taken, self._max_peers, self._reserved)

@@ -1,0 +1,128 @@
+"""What the routes of one robot need, made by its session."""
+
+import math
+import shutil
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from fastapi import Request
+from starlette.requests import HTTPConnection
+
+from lockstep.server.audit.audit_log import AuditLog
+from lockstep.server.auth.tokens import Access, Right
+from lockstep.server.control.console import Console
+from lockstep.server.control.stop_service import StopAnswer
+from lockstep.server.errors import RobotFailed, SceneUnavailable
+from lockstep.server.http.request_rate_limits import RequestRateLimits
+from lockstep.server.media.hub import MediaHub
+from lockstep.server.peers.token_revocation import TokenRevocation
+from lockstep.server.publishing.publishers import Publishers
+from lockstep.server.recording.service import RecordingService
+from lockstep.server.recording.writing.recorder import Recorder
+from lockstep.server.scene.view import SceneView
+from lockstep.server.settings import Settings
+from lockstep.server.sfu.coordinator import SfuCoordinator
+from lockstep.server.state.console_context import ConsoleContext
+from lockstep.server.state.persistent_state import ConsoleState
+from lockstep.server.stop.stop_presses import Press
+from lockstep.server.talkback.talkback import Talkback
+from lockstep.server.telemetry.metrics import Metrics
+
+__all__ = ["Dependencies", "TakesStops", "authorized", "known_caller", "services", "takes_stops"]
+
+
+class TakesStops(Protocol):
+    """Whom a STOP of one robot is said to."""
+
+    @property
+    def access(self) -> Access: ...
+
+    async def stop(self, press: Press) -> StopAnswer:
+        """Latched at once; returns when the robot has answered, or that it has not. Raises Silenced."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dependencies:
+    robot: str  # its name in a fleet; "" is the only robot of a console
+    settings: Settings
+    metrics: Metrics
+    console: Console
+    media: MediaHub
+    house: ConsoleContext
+    access: Access
+    audit: AuditLog
+    warden: TokenRevocation
+    scene: SceneView | None  # None when it is switched off or could not start
+    recorder: Recorder
+    relays: SfuCoordinator
+    voice: Talkback
+    publishers: Publishers
+    recordings: RecordingService
+
+    @property
+    def state(self) -> ConsoleState:
+        return self.house.state
+
+    @property
+    def guard(self) -> RequestRateLimits:
+        return self.house.guard
+
+    async def stop(self, press: Press) -> StopAnswer:
+        """Latched at once; returns when the robot has answered, or that it has not. Raises Silenced."""
+        self.console.stops.stop(press)
+        outcome = await self.console.stops.outcome(press.id)
+        return StopAnswer(outcome, self.console.clock.event, self.console.robot.up)
+
+    def collect(self) -> None:
+        """Bring into the metrics what is counted elsewhere."""
+        self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
+        self.metrics.links_unreadable.set(bool(self.state.invitations.trouble))
+        self.metrics.collect_audit(self.audit.lost, self.audit.failures)
+        self.house.collect()
+        self.publishers.collect()
+        self.metrics.recording_failed.set(self.recorder.state().state == "failed")
+        self.metrics.free_bytes.set(free_bytes(self.recorder.shelf.directory))
+
+    def scene_or_error(self) -> SceneView:
+        """Raises SceneUnavailable when there is no 3D scene."""
+        if self.scene is None:
+            raise SceneUnavailable("the 3D scene is switched off")
+        return self.scene
+
+
+def free_bytes(directory: Path) -> float:
+    """Where `directory` is, or is to be made; NaN when that cannot be known."""
+    for place in (directory, *directory.parents):
+        with suppress(OSError):
+            return float(shutil.disk_usage(place).free)
+    return math.nan
+
+
+def services(connection: HTTPConnection) -> Dependencies:
+    """Raises RobotFailed while the session has failed and is started again."""
+    found = connection.app.state.services
+    if found is None:
+        raise RobotFailed("the console's session of this robot has failed; it is started again")
+    if not isinstance(found, Dependencies):
+        raise TypeError("the app is not running")
+    return found
+
+
+def takes_stops(connection: HTTPConnection) -> TakesStops:
+    """In a fleet there is somebody also while the session has failed."""
+    keeper: TakesStops | None = getattr(connection.app.state, "stop_keeper", None)
+    return services(connection) if keeper is None else keeper
+
+
+async def authorized(request: Request) -> Right:
+    """What whoever asks may do. Raises AccessError, StateUnavailable."""
+    return known_caller(request, services(request).access.bearer(request.headers.get("authorization")))
+
+
+def known_caller(request: Request, caller: Right) -> Right:
+    """Whoever asks, on a route whose refusals are in the audit."""
+    request.state.actor = caller.actor
+    return caller

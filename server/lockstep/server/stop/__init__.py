@@ -1,0 +1,1 @@
+"""STOP and reset: kept until the robot has answered, over every restart."""

@@ -1,0 +1,144 @@
+"""What one robot's stops need to outlive: the link, the session, the console. Owns the presses and their files."""
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import structlog
+
+from lockstep.server.stop.kept_stops import KeptStops, kept_stops_place
+from lockstep.server.stop.stop_presses import Press, StopPresses
+from lockstep.server.util.uncancelled import in_thread
+
+__all__ = ["KEPT", "KEPT_IN_MEMORY", "StopKeeper"]
+
+log = structlog.get_logger(__name__)
+
+RETRY_SECONDS = 2.0  # after a write that failed
+KEPT = "the stop is kept and sent first when the link is back"
+KEPT_IN_MEMORY = "the stop is kept until this console ends and sent first when the link is back"
+WRITE_PATIENCE = 0.5  # s that whoever pressed waits for the disk
+
+
+class StopKeeper:
+    """Call `load`, then run `run` as a task. All else is called on the loop and returns at once, but for `written`.
+
+    Attributes:
+        lasts: whether stops that are written outlive this console
+        trouble: why stops cannot be written at present; "" when they can
+        on_trouble: called with `trouble` whenever it changes
+    """
+
+    def __init__(self, directory: Path, robot: str, *, lasts: bool = True) -> None:
+        """`directory`: of the robot, within the state directory. `robot`: the bridge's address.
+
+        `lasts`: whether what is in the directory outlives this console.
+        """
+        self.presses = StopPresses()
+        self.lasts = lasts
+        self.trouble = ""
+        self.on_trouble: Callable[[str], None] = _ignore
+        self._files = KeptStops(kept_stops_place(directory, robot))
+        self._wanted: dict[str, Press] = {}  # that belong on the disk
+        self._written: set[str] = set()
+        self._wake = asyncio.Event()
+        self._news = asyncio.Event()  # something was written, or could not be; replaced each time
+
+    async def load(self) -> None:
+        """Presses that an earlier run has kept are pending again."""
+        try:
+            found = await asyncio.to_thread(self._files.load)
+        except OSError as error:
+            self._tell(error.strerror or str(error))
+            return
+        for press in found:
+            self.presses.again(press)
+            self._wanted[press.id] = press
+            self._written.add(press.id)
+        if found:
+            log.warning("kept stops", count=len(found))
+
+    def keep(self, *presses: Press) -> None:
+        """Write those to disk: the robot cannot be told now."""
+        self._wanted.update((press.id, press) for press in presses if self.presses.is_pending(press.id))
+        self._wake.set()
+
+    def settled(self, press: str) -> None:
+        """The robot has answered it, or another press has taken its place."""
+        if self._wanted.pop(press, None) is not None or press in self._written:
+            self._wake.set()
+
+    async def kept_words(self, press: str) -> str:
+        """Returns when a press that is kept is on the disk, or soon: how it is kept, for whoever pressed."""
+        unwritten = await self.written(press)
+        if unwritten:
+            return f"{KEPT_IN_MEMORY}; it is not on the console's disk ({unwritten})"
+        return KEPT if self.lasts else f"{KEPT_IN_MEMORY}; its state directory is a temporary one"
+
+    async def written(self, press: str) -> str:
+        """Returns when a press that is kept is on the disk, or soon: why it is not; "" when it is."""
+        try:
+            async with asyncio.timeout(WRITE_PATIENCE):
+                while press in self._wanted and press not in self._written and not self.trouble:
+                    await self._news.wait()
+        except TimeoutError:
+            return "the disk has not answered"
+        return "" if press not in self._wanted or press in self._written else self.trouble
+
+    async def run(self) -> None:
+        """Until cancelled; then what no answer has come to is written, whatever the link did."""
+        try:
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                while not await self._settle():  # noqa: ASYNC110 - a disk has no event
+                    await asyncio.sleep(RETRY_SECONDS)
+        finally:
+            self._write_last()
+
+    async def _settle(self) -> bool:
+        """Make the disk what it should be. False: try again later. What fails for one press keeps no other from it."""
+        missing = [press for press in self._wanted.values() if press.id not in self._written]
+        over = [press for press in self._written if press not in self._wanted]
+        trouble = ""
+        for press in missing:
+            try:
+                await in_thread(partial(self._files.keep, press))
+            except OSError as error:
+                trouble = error.strerror or str(error)
+                self._tell(trouble)
+            else:
+                self._written.add(press.id)
+                self._tell(trouble)
+        for id_ in over:
+            try:
+                await in_thread(partial(self._files.drop, id_))
+            except OSError as error:
+                trouble = error.strerror or str(error)
+            else:
+                self._written.discard(id_)
+        self._tell(trouble)
+        return not trouble
+
+    def _write_last(self) -> None:
+        """Nothing else runs any more that a slow disk could hold up."""
+        for press in self.presses.pending:
+            if press.id not in self._written:
+                try:
+                    self._files.keep(press)
+                except OSError as error:
+                    log.error("stops cannot be kept on disk", error="stops_unwritable", detail=str(error))
+
+    def _tell(self, trouble: str) -> None:
+        changed, self.trouble = trouble != self.trouble, trouble
+        self._news.set()
+        self._news = asyncio.Event()
+        if changed:
+            if trouble:
+                log.error("stops cannot be kept on disk", error="stops_unwritable", detail=trouble)
+            self.on_trouble(trouble)
+
+
+def _ignore(trouble: str) -> None:
+    pass

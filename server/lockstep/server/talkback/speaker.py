@@ -1,0 +1,100 @@
+"""The loudspeaker as the console sees it: a process that plays, and how it does."""
+
+import asyncio
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+import msgspec
+import structlog
+
+from lockstep.server.media.sources.source_wire import Trouble, decode_said
+from lockstep.server.talkback.player import HEAD
+from lockstep.server.talkback.speaker_url import SpeakerSpec
+from lockstep.server.util.backoff import Backoff
+
+__all__ = ["Speaker"]
+
+log = structlog.get_logger(__name__)
+
+COMMAND = (sys.executable, "-m", "lockstep.server.talkback.player")
+HEALTHY = 10.0  # s
+MAX_WORDS = 4096  # bytes
+
+
+class Speaker:
+    """Await `run`; `play` at any time. What the process does not take at once is left out."""
+
+    def __init__(self, spec: SpeakerSpec, changed: Callable[[], None], command: tuple[str, ...] = COMMAND) -> None:
+        """`changed` is called on the loop when `trouble` changed."""
+        self.trouble = ""  # why nothing is heard, in words
+        self.dropped = 0  # packets that the process did not take
+        self.failures = 0
+        self._spec = spec
+        self._changed = changed
+        self._command = command
+        self._writer: asyncio.StreamWriter | None = None
+
+    def play(self, packet: bytes) -> bool:
+        """An Opus packet that just came; whether it was handed on."""
+        writer = self._writer
+        if writer is None or writer.transport.is_closing() or writer.transport.get_write_buffer_size() > 0:
+            self.dropped += 1
+            return False
+        writer.write(HEAD.pack(len(packet), time.monotonic()) + packet)
+        return True
+
+    async def run(self) -> None:
+        """Until cancelled. A process that dies is started again."""
+        backoff = Backoff(0.5, 10.0)
+        loop = asyncio.get_running_loop()
+        while True:
+            began = loop.time()
+            await self._run_process()
+            self._enter("its process ended")
+            if loop.time() - began > HEALTHY:
+                backoff.healthy()
+            await asyncio.sleep(backoff.next())
+
+    async def _run_process(self) -> None:
+        process = await asyncio.create_subprocess_exec(
+            *self._command,
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+            limit=MAX_WORDS,
+        )
+        try:
+            if process.stdin is None or process.stdout is None:
+                raise RuntimeError("the process has no pipes")
+            process.stdin.write(msgspec.json.encode(self._spec) + b"\n")
+            self._writer = process.stdin
+            await self._hear(process.stdout)
+        finally:
+            self._writer = None
+            with suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+
+    async def _hear(self, output: asyncio.StreamReader) -> None:
+        with suppress(asyncio.IncompleteReadError, ConnectionError):
+            while True:
+                length = int.from_bytes(await output.readexactly(4), "big")
+                if length > MAX_WORDS:
+                    return
+                said = decode_said(await output.readexactly(length))
+                if said is None:
+                    return
+                self._enter(said.detail if isinstance(said, Trouble) else "")
+
+    def _enter(self, trouble: str) -> None:
+        if trouble == self.trouble:
+            return
+        self.trouble = trouble
+        if trouble:
+            self.failures += 1
+            log.warning("speaker failed", detail=trouble)
+        else:
+            log.info("speaker works", kind=self._spec.scheme)
+        self._changed()

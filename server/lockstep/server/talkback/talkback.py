@@ -1,0 +1,104 @@
+"""The voice of who drives, from the media section it comes in to the loudspeaker at the robot."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from prometheus_client import CollectorRegistry, Counter, Gauge
+
+from lockstep.protocol.console import Role, Voice
+from lockstep.server.talkback.speaker import Speaker
+from lockstep.server.talkback.speaker_url import SpeakerSpec
+from lockstep.server.talkback.talkback_arbiter import SPEAKS_FOR, TalkbackArbiter, VoicePacket
+
+if TYPE_CHECKING:
+    from lockstep.server.peers.peer import Peer
+
+__all__ = ["VoiceLine", "Talkback"]
+
+
+class VoiceLine:
+    """One peer's way to the loudspeaker; made before the peer is, and useless until it is known."""
+
+    def __init__(self, service: "Talkback") -> None:
+        self.peer: Peer | None = None
+        self._service = service
+
+    def take(self, packet: VoicePacket) -> None:
+        if self.peer is not None and not self.peer.ended:
+            with self.peer.contained("voice"):
+                self._service.heard(self.peer, packet)
+
+
+class Talkback:
+    """Await `run`. Without a loudspeaker nobody's voice is taken."""
+
+    def __init__(
+        self,
+        spec: SpeakerSpec | None,
+        holds: Callable[[str], bool],
+        registry: CollectorRegistry,
+        tell: Callable[[Voice], None],
+    ) -> None:
+        self._speaker = None if spec is None else Speaker(spec, self._speaker_changed)
+        self._desk = TalkbackArbiter(holds)
+        self._tell = tell
+        self._told = Voice()
+        self._timer: asyncio.TimerHandle | None = None
+        self._packets = Counter(
+            "lockstep_voice_packets", "Opus packets of peers, by what became of them", ["outcome"], registry=registry
+        )
+        self._speaking = Gauge("lockstep_voice_speaking", "1 while somebody is heard at the robot", registry=registry)
+        self._works = Gauge("lockstep_voice_speaker_works", "1 while the loudspeaker works", registry=registry)
+        self._works.set(spec is not None)
+
+    @property
+    def enabled(self) -> bool:
+        return self._speaker is not None
+
+    def line(self, role: Role) -> VoiceLine | None:
+        """For a peer that may hold the seat; None: its voice is not taken."""
+        return VoiceLine(self) if self.enabled and role != "observer" else None
+
+    def state(self) -> Voice:
+        return self._desk.state(time.monotonic())
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        if self._speaker is None:
+            return
+        try:
+            await self._speaker.run()
+        finally:
+            if self._timer is not None:
+                self._timer.cancel()
+
+    def heard(self, peer: "Peer", packet: VoicePacket) -> None:
+        now = time.monotonic()
+        outcome: str = self._desk.packet(peer.id, peer.name, packet, now)
+        if outcome == "played" and self._speaker is not None and not self._speaker.play(packet.payload):
+            outcome = "speaker_busy"
+        self._packets.labels(outcome).inc()
+        if self._timer is None and self._desk.speaks(now):
+            self._look()
+
+    def _speaker_changed(self) -> None:
+        if self._speaker is not None:
+            self._desk.trouble = self._speaker.trouble
+            self._works.set(not self._speaker.trouble)
+        self._announce()
+
+    def _look(self) -> None:
+        """Whether somebody still speaks; again and again while so."""
+        self._timer = None
+        self._announce()
+        if self._desk.speaks(time.monotonic()):
+            self._timer = asyncio.get_running_loop().call_later(SPEAKS_FOR / 2, self._look)
+
+    def _announce(self) -> None:
+        state = self.state()
+        self._speaking.set(bool(state.peer))
+        if state != self._told:
+            self._told = state
+            self._tell(state)

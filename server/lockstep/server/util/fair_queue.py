@@ -1,0 +1,131 @@
+"""Requests wait for their turn: a salvo of them must not stand before the operator's messages."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+
+from lockstep.server.util.token_bucket import TokenBucket
+
+__all__ = ["FairQueue"]
+
+OTHERS = 2  # pieces of work between two beginnings, where both wait
+
+Work = Callable[[], None]
+
+
+class FairQueue:
+    """One piece of work in each turn of the loop; addresses take turns, and each one's work keeps its order.
+
+    Work that is `first` comes before all other, by turns among itself. The other has a pace, if there is one, and
+    beginnings have every third turn of it. The bound of what waits is that of connections, since each has one thing
+    under way.
+    """
+
+    def __init__(self, pace: Callable[[float], TokenBucket] | None = None) -> None:
+        """`pace`: makes the budget of work that is not `first`, from the time on the loop's clock."""
+        self._is_free = True  # in this turn of the loop
+        self._make_pace = pace
+        self._pace: TokenBucket | None = None
+        self._first: dict[str, deque[Work]] = {}  # by address, the next first
+        self._others: dict[str, deque[Work]] = {}
+        self._beginnings: deque[Work] = deque()
+        self._since = 0  # others that had their turn since the last beginning
+        self._timer: asyncio.TimerHandle | None = None  # while the pace holds others back
+
+    async def take(self, address: str, *, first: bool = False) -> None:
+        """Returns when it is this request's turn: at once if there was no other in this turn of the loop."""
+        if self._may_begin(first):
+            return
+        turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._queue(address, lambda: _settle(turn), first)
+        await turn
+
+    async def begin(self) -> None:
+        """As `take`, for a new connection: every third turn is one's, however much other work waits.
+
+        The two turns between are for connections that have begun, so that they are served before newer ones need their
+        places.
+        """
+        if self._may_begin(False):
+            return
+        turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._beginnings.append(lambda: _settle(turn))
+        self._come_back_soon()
+        await turn
+
+    def ask(self, address: str, work: Work, *, first: bool = False) -> None:
+        """Call `work` in its turn, perhaps before this returns."""
+        if self._may_begin(first):
+            work()
+        else:
+            self._queue(address, work, first)
+
+    def _may_begin(self, first: bool) -> bool:
+        loop = asyncio.get_running_loop()
+        if not self._is_free or not (first or (not self._waits and self._paced(loop.time()))):
+            return False
+        self._is_free = False
+        loop.call_soon(self._pass_on)
+        return True
+
+    def _queue(self, address: str, work: Work, first: bool) -> None:
+        (self._first if first else self._others).setdefault(address, deque()).append(work)
+        self._come_back_soon()
+
+    def _come_back_soon(self) -> None:
+        if self._is_free:  # nothing would come back for what waits
+            self._is_free = False
+            asyncio.get_running_loop().call_soon(self._pass_on)
+
+    def _paced(self, now: float) -> bool:
+        if self._make_pace is None:
+            return True
+        if self._pace is None:
+            self._pace = self._make_pace(now)
+        return self._pace.take(now)
+
+    def _pass_on(self) -> None:
+        loop = asyncio.get_running_loop()
+        if self._first:
+            work = _next(self._first)
+        elif self._waits and self._paced(loop.time()):
+            work = self._next_other()
+        else:
+            self._is_free = True
+            if self._waits and self._timer is None and self._pace is not None:
+                self._timer = loop.call_later(self._pace.wait(loop.time()), self._come_back)
+            return
+        loop.call_soon(self._pass_on)
+        work()
+
+    @property
+    def _waits(self) -> bool:
+        """Work that is not `first`."""
+        return bool(self._others or self._beginnings)
+
+    def _next_other(self) -> Work:
+        if self._beginnings and (self._since >= OTHERS or not self._others):
+            self._since = 0
+            return self._beginnings.popleft()
+        self._since += 1
+        return _next(self._others)
+
+    def _come_back(self) -> None:
+        self._timer = None
+        if self._is_free:
+            self._is_free = False
+            self._pass_on()
+
+
+def _next(queues: dict[str, deque[Work]]) -> Work:
+    address = next(iter(queues))
+    queue = queues.pop(address)
+    work = queue.popleft()
+    if queue:
+        queues[address] = queue  # behind the others
+    return work
+
+
+def _settle(turn: "asyncio.Future[None]") -> None:
+    if not turn.done():  # who waited for it may be gone
+        turn.set_result(None)

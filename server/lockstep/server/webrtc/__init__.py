@@ -1,0 +1,1 @@
+"""The console's WebRTC endpoint and its addresses."""

@@ -1,0 +1,88 @@
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lockstep.client.control.command_gate import CommandGate
+from lockstep.protocol.serial import MAX_EVENT, event_after, event_gap
+from tests.client.vectors import load_vectors
+
+CASES: list[dict[str, Any]] = load_vectors("pacing.json")["cases"]
+
+
+def do(gate: CommandGate, action: dict[str, Any], now: float) -> None:
+    match action:
+        case {"feedback": [event, issue]}:
+            gate.feedback(event, issue)
+        case {"sent": True}:
+            gate.sent(now)
+        case {"refused": event}:
+            gate.refused(event)
+        case {"shown": stamp}:
+            gate.shown(stamp)
+        case _:
+            assert action == {}, f"the table has an action that this test does not know: {action}"
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
+def test_the_gate_goes_through_the_shared_table(case: dict[str, Any]) -> None:
+    gate = CommandGate(case["pacing"], case["tolerance"], case["min_interval_ms"] / 1000)
+    for number, step in enumerate(case["steps"]):
+        now = step["at"] / 1000
+        do(gate, step["do"], now)
+        assert gate.state(now) == step["then"], f"step {number}"
+        if "next" in step:
+            assert gate.next()._asdict() == step["next"], f"step {number}"
+
+
+def test_there_is_no_next_command_before_the_first_feedback() -> None:
+    with pytest.raises(RuntimeError):
+        CommandGate("feedback", 4, 0).next()
+
+
+def test_the_first_command_does_not_wait_for_the_event_rate() -> None:
+    gate = CommandGate("feedback", 4, 10.0)
+    gate.feedback(1, 1)
+    assert gate.opens_at() < 0
+    assert gate.state(0.0) == "open"
+
+
+actions = st.lists(
+    st.one_of(
+        st.tuples(st.just("feedback"), st.integers(-3, 3)),
+        st.tuples(st.just("send"), st.just(0)),
+        st.tuples(st.just("refuse"), st.integers(-1, 1)),
+    ),
+    max_size=80,
+)
+
+
+@given(actions, st.sampled_from([1, 100, MAX_EVENT - 1, MAX_EVENT]))
+def test_the_gate_never_sends_twice_without_an_answer_and_never_goes_back(
+    history: list[tuple[str, int]], first: int
+) -> None:
+    gate = CommandGate("feedback", 4, 0)
+    gate.feedback(first, 1)
+    newest, pending, last_sent = first, None, None
+    for kind, offset in history:
+        if kind == "feedback":
+            event = (newest + offset - 1) % MAX_EVENT + 1
+            gate.feedback(event, 1)
+            if event_gap(event, newest) > 0:
+                newest = event
+            if pending is not None and event_gap(newest, pending) >= 0:
+                pending = None
+        elif kind == "refuse":
+            event = (event_after(newest) + offset - 1) % MAX_EVENT + 1
+            gate.refused(event)
+            if event == pending:
+                pending = None
+        elif gate.state(0) == "open":
+            assert pending is None
+            pending = gate.next().event
+            assert pending == event_after(newest)
+            assert last_sent is None or event_gap(pending, last_sent) >= 0
+            last_sent = pending
+            gate.sent(0)
+        assert (gate.state(0) == "in_flight") == (pending is not None)

@@ -1,0 +1,219 @@
+"""The headless client's line to the console, and what it does where none can be opened."""
+
+import asyncio
+import datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import InvalidStatus
+
+from lockstep.client.connection import Connection, ConnectionOptions
+from lockstep.client.console_url import ConsoleLink, parse_link
+from lockstep.client.errors import ConnectFailed, SignallingRefused
+from lockstep.client.transport.observer_websocket import LineBlocked, ObserverWebSocket
+from lockstep.client.transport.webrtc_peer import Peer
+from lockstep.client.transport.whep import Whep
+from lockstep.protocol.console import Welcome, decode_server_message
+from lockstep.protocol.messages import Ping, Pong, Stop
+from lockstep.server.http.transport.tls import self_signed
+from tests.server.fleet.rig import running_fleet_rig
+from tests.server.rig import PATIENCE, eventually, running_bridge, running_console, running_rig
+from tests.server.watch_lines import NOWHERE
+
+RELAYED: dict[str, Any] = {"relay": NOWHERE, "observers_direct": 0}
+
+
+class _Heard:
+    def __init__(self) -> None:
+        self.messages: list[Any] = []
+
+    def take(self, data: str | bytes) -> None:
+        self.messages.append(decode_server_message(data))
+
+    def has(self, kind: type) -> bool:
+        return any(isinstance(each, kind) for each in self.messages)
+
+
+def _line(link: ConsoleLink, heard: _Heard) -> ObserverWebSocket:
+    return ObserverWebSocket(link, "0", None, heard.take, PATIENCE)
+
+
+async def test_a_line_is_welcomed_asks_stops_and_says_how_it_ended() -> None:
+    heard = _Heard()
+    async with running_rig(**RELAYED) as rig:
+        line = _line(parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}"), heard)
+        try:
+            assert await line.negotiate() == []
+            await line.connect(PATIENCE)
+            await eventually(lambda: heard.has(Welcome))
+            line.send("control", Ping(id=5))
+            await eventually(lambda: Pong(id=5) in heard.messages)
+            line.send("stop", Stop(reason="seen"))
+            await eventually(lambda: rig.services.console.clock.stop.stopped)
+            with pytest.raises(ConnectFailed, match="TCP"):
+                await line.restart_ice(1.0)
+            next(iter(rig.services.console.peers)).end("link revoked")
+            async with asyncio.timeout(PATIENCE):
+                await line.ended.wait()
+            assert line.why == "the console closed the connection (link revoked)"
+            line.send("control", Ping(id=6))
+        finally:
+            await line.close()
+            await line.close()
+
+
+async def test_a_refusal_is_no_blocked_line() -> None:
+    async with running_rig(**RELAYED, max_relayed=1, reserved_places=0) as rig:
+        link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
+        first, second = _line(link, _Heard()), _line(link, _Heard())
+        try:
+            await first.negotiate()
+            with pytest.raises(SignallingRefused) as refused:
+                await second.negotiate()
+            assert refused.value.error == "too_many_peers"
+        finally:
+            await first.close()
+            await second.close()
+
+
+async def test_where_no_websocket_passes_the_ticket_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    def blocked(*_: object, **__: object) -> None:
+        raise ConnectionRefusedError("a proxy")
+
+    monkeypatch.setattr("lockstep.client.transport.observer_websocket.connect", blocked)
+    async with running_rig(**RELAYED) as rig:
+        line = _line(parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}"), _Heard())
+        try:
+            with pytest.raises(LineBlocked, match="a proxy"):
+                await line.negotiate()
+            await eventually(lambda: len(rig.services.console.peers) == 0)
+            assert rig.count("lockstep_peers_ended_total", why="deleted") == 1
+        finally:
+            await line.close()
+
+
+@pytest.mark.parametrize("status", [404, 405])
+async def test_a_console_that_knows_no_lines_counts_as_blocked(monkeypatch: pytest.MonkeyPatch, status: int) -> None:
+    async def unknown(*_: object) -> str:
+        raise SignallingRefused(status, "", "")
+
+    monkeypatch.setattr(Whep, "watch", unknown)
+    line = _line(parse_link("http://127.0.0.1:9/#token=x"), _Heard())
+    with pytest.raises(LineBlocked):
+        await line.negotiate()
+    await line.close()
+
+
+async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def blocked(*_: object, **__: object) -> None:
+        raise ConnectionRefusedError("a proxy")
+
+    monkeypatch.setattr("lockstep.client.transport.observer_websocket.connect", blocked)
+    async with running_rig(**RELAYED) as rig:
+        link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
+        connection = Connection(_options(link))
+        connection._beside = "0"
+        await connection._peer.close()
+        connection._peer = ObserverWebSocket(link, "0", None, connection._received, PATIENCE)
+        try:
+            await connection._negotiate(asyncio.get_running_loop().time() + PATIENCE)
+            assert isinstance(connection._peer, Peer)
+            await connection._peer.connect(PATIENCE)
+            await eventually(lambda: connection.session.welcome is not None)
+            assert [peer.relay for peer in rig.services.console.peers] == ["0"]
+        finally:
+            connection._relay = None
+            await connection.close()
+
+
+async def test_a_console_that_answers_no_ping_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+
+    async def ticket(*_: object) -> str:
+        return "t"
+
+    async def listen(socket: ServerConnection) -> None:
+        async for _ in socket:
+            pass  # takes all, says nothing
+
+    monkeypatch.setattr(Whep, "watch", ticket)
+    async with serve(listen, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        line = ObserverWebSocket(parse_link(f"http://127.0.0.1:{port}/#token=x"), "0", None, _Heard().take, 0.05)
+        try:
+            await line.negotiate()
+            await line.connect(PATIENCE)
+            line.send("control", Ping(id=1))
+            async with asyncio.timeout(PATIENCE):
+                await line.ended.wait()
+            assert line.why.startswith("the console did not answer")
+        finally:
+            await line.close()
+
+
+async def test_a_line_goes_by_the_address_of_its_robot_in_a_fleet_and_opens_no_other_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lockstep.server.sfu.coordinator.SfuCoordinator.arrived", lambda *_: True)
+    heard = _Heard()
+    async with running_fleet_rig("left", "right") as rig:
+        token = rig.state.access.issue("observer", "ann")
+        whep = Whep(parse_link(f"{rig.url}/robots/right/#token={token}"))
+        line = _line(parse_link(f"{rig.url}/robots/left/#token={token}"), heard)
+        try:
+            await line.negotiate()
+            await line.connect(PATIENCE)
+            await eventually(lambda: heard.has(Welcome))
+            ticket = await whep.watch("0")
+            with pytest.raises(InvalidStatus):
+                async with connect(f"{rig.url.replace('http', 'ws', 1)}/robots/left/watch/{ticket}", proxy=None):
+                    pass
+        finally:
+            await line.close()
+            await whep.aclose()
+
+
+async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate_is_trusted(tmp_path: Path) -> None:
+    certificate = self_signed(tmp_path, {"127.0.0.1"}, datetime.datetime.now(datetime.UTC))
+    heard = _Heard()
+    async with (
+        running_bridge() as bridge,
+        running_console(bridge.address[1], certificate=certificate, **RELAYED) as rig,
+    ):
+        await eventually(lambda: rig.services.console.robot.description is not None)
+        link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
+        line = ObserverWebSocket(link, "0", certificate.chain, heard.take, PATIENCE)
+        doubting = ObserverWebSocket(link, "0", None, heard.take, PATIENCE)
+        try:
+            await line.negotiate()
+            await line.connect(PATIENCE)
+            await eventually(lambda: heard.has(Welcome))
+            with pytest.raises(ConnectFailed):
+                await doubting.negotiate()
+        finally:
+            await line.close()
+            await doubting.close()
+
+
+def _options(link: ConsoleLink) -> ConnectionOptions:
+    return ConnectionOptions(
+        link=link,
+        pacing="feedback",
+        tolerance={"video": 4, "audio": 6},
+        gate="event",
+        carrier="trailer",
+        video=0,
+        audio=False,
+        decode=False,
+        codec=None,
+        sound_codec=None,
+        event_rate=None,
+        name="ann",
+        connect_seconds=PATIENCE,
+        silence_seconds=PATIENCE,
+        route=None,
+    )

@@ -1,0 +1,33 @@
+import pytest
+
+from lockstep.robot_bridge.control.ticker import Ticker
+
+
+def test_beats_do_not_drift_when_each_wait_ends_late() -> None:
+    metronome = Ticker(0.01, 0.0)
+    now, waits = 0.0, []
+    for _ in range(5):
+        wait = metronome.wait(now)
+        waits.append(wait)
+        now += wait + 0.002
+    assert waits == pytest.approx([0.01, 0.008, 0.008, 0.008, 0.008])
+
+
+def test_missed_beats_within_the_catch_up_are_made_good_at_once() -> None:
+    metronome = Ticker(0.01, 0.0, catch_up=3)
+    assert [metronome.wait(0.035) for _ in range(4)] == pytest.approx([0.0, 0.0, 0.0, 0.005])
+    assert metronome.skipped == 0
+
+
+def test_more_missed_beats_are_skipped_and_counted() -> None:
+    metronome = Ticker(0.01, 0.0, catch_up=3)
+    waits = [metronome.wait(1.0001) for _ in range(6)]
+    assert waits[:4] == [0.0, 0.0, 0.0, 0.0]
+    assert waits[4] == pytest.approx(0.0099)
+    assert metronome.skipped == 96
+
+
+def test_without_catch_up_the_beat_that_is_due_comes_at_once_and_the_grid_stays() -> None:
+    metronome = Ticker(0.01, 0.0)
+    assert metronome.wait(0.057) == 0.0
+    assert metronome.wait(0.057) == pytest.approx(0.003)

@@ -1,0 +1,43 @@
+"""Who goes when too many connections wait to be admitted."""
+
+import pytest
+
+from lockstep.robot_bridge.link.applicants import Applicants, address_group
+
+
+@pytest.mark.parametrize(
+    ("address", "group"),
+    [
+        ("192.0.2.7", "192.0.2.7"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("2001:db8:1:2::1", "2001:db8:1:2::/64"),
+        ("fe80::1%eth0", "fe80::/64"),
+        ("", ""),
+    ],
+)
+def test_an_ipv6_address_counts_with_the_64_bits_that_one_customer_has(address: str, group: str) -> None:
+    assert address_group(address) == group
+
+
+def test_the_busiest_address_loses_its_oldest() -> None:
+    applicants: Applicants[int] = Applicants(3)
+    assert [applicants.add(1, "console"), applicants.add(2, "other"), applicants.add(3, "other")] == [None] * 3
+    assert [applicants.add(number, "other") for number in range(4, 100)] == list(range(2, 98))
+    assert 1 in applicants
+    assert len(applicants) == 3
+
+
+def test_addresses_of_one_network_count_together() -> None:
+    applicants: Applicants[int] = Applicants(2)
+    applicants.add(1, "2001:db8::1")
+    applicants.add(2, "2001:db8:0:0:ffff::2")
+    assert applicants.add(3, "192.0.2.7") == 1
+
+
+def test_who_is_admitted_makes_room() -> None:
+    applicants: Applicants[int] = Applicants(1)
+    applicants.add(1, "a")
+    applicants.remove(1)
+    applicants.remove(1)
+    assert applicants.add(2, "a") is None

@@ -1,0 +1,52 @@
+"""The lock-out topic without a ROS: silence locks as well as the word does."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, cast
+
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
+from lockstep.robot_bridge.robots.ros2.sensing.sensors import LockoutTopic
+from lockstep.robot_bridge.robots.ros2.settings import Lockout
+
+TOPIC = "/key_switch"
+
+
+class OneTopic:
+    """Stands for the side of ROS: keeps what would be called with a message."""
+
+    def message(self, package: str, name: str) -> str:
+        return f"{package}/{name}"
+
+    def subscribe(self, message: str, topic: str, take: Callable[[Any], None]) -> None:
+        assert (message, topic) == ("std_msgs/Bool", TOPIC)
+        self.take = take
+
+    def says(self, *, locked: bool) -> None:
+        self.take(SimpleNamespace(data=locked))
+
+
+def lockout() -> tuple[OneTopic, LockoutTopic]:
+    ros = OneTopic()
+    return ros, LockoutTopic(cast(RosSide, ros), Lockout(topic=TOPIC, timeout=1.0))
+
+
+def test_before_the_first_word_of_the_lockout_topic_the_robot_is_locked() -> None:
+    _, topic = lockout()
+    assert TOPIC in topic.reason(clock.now())
+
+
+def test_the_lockout_topic_locks_and_lets_in_by_its_newest_word() -> None:
+    ros, topic = lockout()
+    ros.says(locked=True)
+    assert topic.reason(clock.now()) == f"locked at the robot ({TOPIC})"
+    ros.says(locked=False)
+    topic.wait()
+    assert topic.reason(clock.now()) == ""
+
+
+def test_a_lockout_topic_that_falls_silent_locks() -> None:
+    ros, topic = lockout()
+    ros.says(locked=False)
+    assert topic.reason(clock.now()) == ""
+    assert topic.reason(clock.now() + 1.1) == f"nothing is heard of the lock-out ({TOPIC})"

@@ -1,0 +1,43 @@
+"""The console's process: it lives as long as what it runs."""
+
+import asyncio
+import os
+import sys
+from asyncio.subprocess import DEVNULL, PIPE
+from pathlib import Path
+
+from tests.server.rig import PATIENCE
+
+FAILS_WHEN_TOLD = """
+import asyncio, sys
+from lockstep.server.control.console import Console
+
+async def run(self):
+    await asyncio.to_thread(sys.stdin.readline)
+    raise OSError("planted")
+
+Console.run = run
+from lockstep.server.cli.entry import main
+main()
+"""
+
+
+async def test_a_console_whose_session_has_failed_ends_and_says_so(tmp_path: Path) -> None:
+    """Whoever supervises it starts it again; else it would answer every STOP with a failure for ever."""
+    command = [sys.executable, "-c", FAILS_WHEN_TOLD, "serve", "--robot", "tcp://127.0.0.1:1", "--port", "0"]
+    environment = os.environ | {"XDG_STATE_HOME": str(tmp_path)}
+    process = await asyncio.create_subprocess_exec(*command, env=environment, stdin=PIPE, stdout=DEVNULL, stderr=PIPE)
+    assert process.stdin is not None
+    assert process.stderr is not None
+    try:
+        async with asyncio.timeout(2 * PATIENCE):
+            while b"waiting for the robot" not in await process.stderr.readline():
+                pass
+            process.stdin.write(b"\n")
+            _, said = await process.communicate()
+    finally:
+        if process.returncode is None:
+            process.kill()
+    assert process.returncode == 1, said.decode()
+    assert "planted" in said.decode()
+    assert "the console has failed" in said.decode()

@@ -1,0 +1,187 @@
+"""The seat with the desk behind it, in any order of inputs: never pinned, one driver, rest before the next."""
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+
+from lockstep.protocol.description import Axis, RobotDescription
+from lockstep.protocol.messages import Command, Feedback, Rest
+from lockstep.protocol.serial import event_after
+from lockstep.server.control.command_arbiter import CommandArbiter, Forward, ForwardRest
+from lockstep.server.control.seat import MAX_CLAIMS, ControlSeat, SeatOutcome, SeatTimes
+from lockstep.server.event_clock import EventClock
+
+TIMES = SeatTimes(heartbeat=3.0, idle=5.0, claim=6.0)
+ROBOT = RobotDescription(
+    name="r", label="R", axes=(Axis(name="x", label="x", unit="m/s", minimum=-1, maximum=1, slew=1, brake=1),)
+)
+PEERS = {"a": "operator", "b": "operator", "c": "supervisor", "d": "observer"}
+peers = st.sampled_from(sorted(PEERS))
+
+
+class SeatMachine(RuleBasedStateMachine):
+    """A bridge that executes what it is sent; `sent` is what it gets: (peer, command) or (None, rest)."""
+
+    @initialize()
+    def start(self) -> None:
+        self.now = 0.0
+        self.clock = EventClock()
+        self.seat = ControlSeat(TIMES)
+        self.desk = CommandArbiter(self.clock, self.seat)
+        self.clock.begin("epoch")
+        self.desk.link_up(ROBOT)
+        self.sent: list[tuple[str | None, Command | Rest]] = []
+        self.event = 0
+        self.answer()
+        self.heard = dict.fromkeys(PEERS, 0.0)
+        self.moved_at = 0.0
+        self.claimed: dict[str, float] = {}
+
+    def act(self, outcome: SeatOutcome) -> None:
+        """As the keeper does."""
+        if outcome.rest:
+            rest = self.desk.abandon()
+            if isinstance(rest, ForwardRest):
+                self.sent.append((None, rest.rest))
+
+    def watched(self, before: str) -> None:
+        """Whenever the holder changed, and somebody held it, the robot was told to rest since."""
+        if before and self.seat.holder != before:
+            last_rest = max((i for i, (peer, _) in enumerate(self.sent) if peer is None), default=-1)
+            assert all(peer is None for peer, _ in self.sent[last_rest:])
+            assert last_rest >= 0
+        if before != self.seat.holder:
+            self.heard[self.seat.holder] = self.moved_at = self.now
+
+    @rule(peer=peers, only_if_free=st.booleans())
+    def request(self, peer: str, only_if_free: bool) -> None:
+        before = self.seat.holder
+        self.act(self.seat.request(peer, PEERS[peer], self.now, only_if_free=only_if_free))  # type: ignore[arg-type]
+        assert before in ("", self.seat.holder), "a request deposes nobody"
+        if before == peer and not only_if_free:
+            self.moved_at = self.now
+        self.watched(before)
+
+    @rule(peer=peers)
+    def take(self, peer: str) -> None:
+        before = self.seat.holder
+        self.act(self.seat.take(peer, PEERS[peer], self.now))  # type: ignore[arg-type]
+        if PEERS[peer] == "supervisor":
+            assert self.seat.holder == peer
+            self.moved_at = self.now
+        else:
+            assert self.seat.holder == before
+        self.watched(before)
+
+    @rule(peer=peers, claimant=peers, grant=st.booleans())
+    def answer_claim(self, peer: str, claimant: str, grant: bool) -> None:
+        before, claims = self.seat.holder, self.seat.claims(self.now)
+        self.act(self.seat.answer(peer, claimant, self.now, grant=grant))
+        if self.seat.holder != before:
+            assert (peer, grant) == (before, True)
+            assert claimant in claims
+        self.watched(before)
+
+    @rule(peer=peers, gone=st.booleans())
+    def leave(self, peer: str, gone: bool) -> None:
+        before, claims = self.seat.holder, list(self.seat.claims(self.now))
+        self.act(self.seat.gone(peer, self.now) if gone else self.seat.release(peer, self.now))
+        assert not self.seat.holds(peer)
+        assert peer not in self.seat.claims(self.now)
+        if before == peer:
+            assert self.seat.holder == (claims[0] if claims else "")
+        self.watched(before)
+
+    @rule(seconds=st.floats(0.01, 4.0), alive=st.booleans())
+    def wait(self, seconds: float, alive: bool) -> None:
+        self.now += seconds
+        if alive:
+            self.hear(self.seat.holder)
+        before = self.seat.holder
+        for outcome in self.seat.expire(self.now):
+            self.act(outcome)
+        if before and self.seat.holder != before:
+            overdue = self.now - self.heard[before] >= TIMES.heartbeat or self.now - self.moved_at >= TIMES.idle
+            assert overdue
+        self.watched(before)
+
+    @rule(peer=peers)
+    def hear(self, peer: str) -> None:
+        self.seat.heard(peer, self.now)
+        self.heard[peer] = self.now
+
+    @rule(peer=peers, value=st.sampled_from([0.0, 0.5]), answered=st.booleans())
+    def command(self, peer: str, value: float, answered: bool) -> None:
+        outcome = self.desk.command(peer, Command(event=event_after(self.event), issue=1, values=[value]), self.now)
+        if isinstance(outcome, Forward):
+            assert self.seat.holder == peer
+            before = next((each for each in reversed(self.sent) if each[0] != peer), (None, None))
+            if before[0] is not None:
+                raise AssertionError(f"{peer} drives right after {before[0]}, without a rest between")
+            if value:
+                own = [message for sender, message in self.since_rest_of_hand_over() if sender == peer]
+                assert any(isinstance(each, Command) and each.values == [0.0] for each in own)
+                self.act(self.seat.moved(peer, self.now))
+                self.moved_at = self.now
+            self.sent.append((peer, outcome.command))
+            if answered:
+                self.answer()
+
+    @rule(value=st.sampled_from([0.0, 0.5]))
+    def drive(self, value: float) -> None:
+        if self.seat.holder:
+            self.command(self.seat.holder, value, answered=True)
+
+    def since_rest_of_hand_over(self) -> list[tuple[str | None, Command | Rest]]:
+        last = max((i for i, (peer, _) in enumerate(self.sent) if peer is None), default=-1)
+        return self.sent[last + 1 :]
+
+    @rule()
+    def answer(self) -> None:
+        commands = [message.event for _, message in self.sent if isinstance(message, Command)]
+        self.event = max([1, *commands])
+        feedback = self.clock.feedback
+        issue = 1 if feedback is None or feedback.event != self.event else feedback.issue + 1
+        feedback = Feedback(event=self.event, issue=issue, time=0.0, axes=[0.0])
+        self.clock.observe(feedback, self.now)
+        self.desk.feedback(feedback)
+
+    @invariant()
+    def the_seat_is_never_pinned(self) -> None:
+        """Neither by the silent nor by the idle, and nobody waits for a free one."""
+        if not hasattr(self, "seat"):
+            return
+        assert len(self.seat.claims(self.now)) <= MAX_CLAIMS
+        assert self.seat.holder or not self.seat.claims(self.now)
+        if self.seat.holder:
+            assert self.now - self.heard[self.seat.holder] < TIMES.heartbeat + 1e-6
+            assert self.now - self.moved_at < TIMES.idle + 1e-6
+
+    def teardown(self) -> None:
+        """If nobody says anything from now on it is free within bounded time, whoever waits for it."""
+        if not hasattr(self, "seat"):
+            return
+        claims = len(self.seat.claims(self.now))
+        for _ in range(claims + 1):
+            self.now += TIMES.heartbeat + 1e-6
+            list(self.seat.expire(self.now))
+        assert self.seat.holder == ""
+        assert not self.seat.claims(self.now)
+
+
+SeatMachine.TestCase.settings = settings(max_examples=80, stateful_step_count=30, deadline=None)
+TestSeatMachine = SeatMachine.TestCase
+
+
+def test_a_stick_that_is_held_through_a_hand_over_moves_nothing() -> None:
+    machine = SeatMachine()
+    machine.start()
+    machine.request("a", only_if_free=False)
+    for value in (0.0, 0.5):
+        machine.command("a", value, answered=True)
+    machine.take("c")
+    machine.command("c", 0.5, answered=True)
+    assert machine.sent[-1] == (None, Rest(event=4))
+    machine.command("c", 0.0, answered=True)
+    machine.command("c", 0.5, answered=True)
+    assert [peer for peer, _ in machine.sent] == ["a", "a", None, "c", "c"]

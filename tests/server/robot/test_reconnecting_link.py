@@ -1,0 +1,72 @@
+"""A robot link is kept until its keeper is cancelled."""
+
+import asyncio
+from typing import Any, Self
+
+import pytest
+
+from lockstep.protocol.messages import LinkRole
+from lockstep.server.robot.credentials import LinkCredentials
+from lockstep.server.robot.reconnecting_link import ReconnectingLink
+from lockstep.server.util.backoff import Backoff
+
+
+class Sink:
+    def __init__(self) -> None:
+        self.failed: list[Exception] = []
+
+    def link_opened(self, *_: Any) -> None:
+        raise AssertionError("it never opens")
+
+    def link_received(self, *_: Any) -> None:
+        raise AssertionError("it never opens")
+
+    def link_closed(self, role: LinkRole, detail: str) -> None:
+        pass
+
+    def link_failed(self, role: LinkRole, error: Exception) -> None:
+        self.failed.append(error)
+
+
+class FailsAsItEnds:
+    """A link whose clean-up raises, the first time."""
+
+    tried: "list[FailsAsItEnds]"
+    waiting: asyncio.Event
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        self.tried.append(self)
+
+    async def __aenter__(self) -> Self:
+        self.waiting.set()
+        try:
+            await asyncio.get_running_loop().create_future()
+        except asyncio.CancelledError:
+            if len(self.tried) > 1:
+                raise
+            raise RuntimeError("the handler is closed") from None
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        pass
+
+
+async def test_a_fault_in_ending_does_not_hide_that_it_was_cancelled(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    FailsAsItEnds.tried, FailsAsItEnds.waiting = [], asyncio.Event()
+    monkeypatch.setattr("lockstep.server.robot.reconnecting_link.RobotLink", FailsAsItEnds)
+    sink = Sink()
+    keeper = ReconnectingLink("127.0.0.1", 1, "operator", sink, Backoff(0.01, 0.01), LinkCredentials())
+    running = asyncio.ensure_future(keeper.run())
+    await FailsAsItEnds.waiting.wait()
+    FailsAsItEnds.waiting.clear()
+    running.cancel()
+    again = asyncio.ensure_future(FailsAsItEnds.waiting.wait())
+    await asyncio.wait([running, again], return_when=asyncio.FIRST_COMPLETED)
+    again.cancel()
+    running.cancel()
+    await asyncio.wait([running])
+    assert len(FailsAsItEnds.tried) == 1, "it connected again"
+    assert not sink.failed
+    assert "the handler is closed" in capsys.readouterr().out

@@ -1,0 +1,178 @@
+"""Where commands alone would have brought a robot, against motions that are known by hand."""
+
+import math
+
+import pytest
+
+from lockstep.protocol.description import (
+    Axis,
+    AxisGain,
+    Body,
+    BodyJoint,
+    BodyTwist,
+    Joint,
+    PlanarBase,
+    PositionLimit,
+    RobotDescription,
+)
+from lockstep.protocol.messages import Feedback, StopState
+from lockstep.server.scene.commanded_path import CommandedPath
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def _axis(name: str) -> Axis:
+    return Axis(name=name, label=name, unit="m/s", minimum=-2, maximum=2, slew=10, brake=20)
+
+
+BASE = RobotDescription(
+    name="r",
+    label="R",
+    axes=(_axis("vx"), _axis("vy"), _axis("wz")),
+    joints=(Joint(name="x", unit="m"), Joint(name="y", unit="m"), Joint(name="yaw", unit="rad")),
+    bodies=(
+        Body(
+            name="base",
+            parent="",
+            joints=(
+                BodyJoint(joint="x", kind="prismatic", axis=X),
+                BodyJoint(joint="y", kind="prismatic", axis=Y),
+                BodyJoint(joint="yaw", kind="revolute", axis=Z),
+            ),
+        ),
+        Body(name="tool", parent="base", position=(1.0, 0.0, 0.0)),
+    ),
+    planar_base=PlanarBase(x="x", y="y", yaw="yaw", forward="vx", left="vy", turn="wz"),
+    hold=0.3,
+)
+LIFT = RobotDescription(
+    name="r",
+    label="R",
+    axes=(_axis("up"),),
+    joints=(Joint(name="z", unit="m"),),
+    bodies=(Body(name="lift", parent="", joints=(BodyJoint(joint="z", kind="prismatic", axis=Z),)),),
+    position_limits=(
+        PositionLimit(name="l", label="L", joint="z", maximum=1, axes=(AxisGain(axis="up", gain=-2.0),)),
+        PositionLimit(name="m", label="M", joint="z", minimum=0, axes=(AxisGain(axis="up", gain=-2.0),)),
+    ),
+)
+
+
+def _fed(path: CommandedPath, event: int, time: float, joints: list[float], **values: object) -> None:
+    state = {"event": event, "issue": 1, "time": time, "axes": [], "joints": joints, "at_rest": False, **values}
+    path.feedback(Feedback(**state))  # type: ignore[arg-type]
+
+
+def _driven(description: RobotDescription, values: list[float], joints: list[float], steps: int = 4) -> CommandedPath:
+    """The robot is told to move and does not; a feedback every 0.1 s."""
+    path = CommandedPath(description)
+    for event in range(1, steps + 1):
+        path.command(event, values)
+        _fed(path, event, event * 0.1, joints)
+    return path
+
+
+def test_a_blocked_base_would_be_ahead_by_its_speed_for_as_long_as_a_command_is_held() -> None:
+    poses = _driven(BASE, [1.0, 0.0, 0.0], [2.0, 3.0, math.pi / 2], 9).poses()
+    assert poses is not None
+    assert poses["base"].position == pytest.approx((2.0, 3.3, 0.0))
+    assert poses["tool"].position == pytest.approx((2.0, 4.3, 0.0))
+
+
+def test_a_base_that_turns_drives_an_arc() -> None:
+    poses = _driven(BASE, [1.0, 0.0, 1.0], [0.0, 0.0, 0.0], 9).poses()
+    assert poses is not None
+    x, y, _ = poses["base"].position
+    assert (x, y) == pytest.approx((math.sin(0.3), 1 - math.cos(0.3)), abs=2e-4)
+
+
+def test_a_joint_moves_by_its_gain() -> None:
+    poses = _driven(LIFT, [0.5], [0.2]).poses()
+    assert poses is not None
+    assert poses["lift"].position == pytest.approx((0.0, 0.0, 0.2 - 0.3))
+
+
+def test_a_robot_that_follows_is_where_it_was_told_to_be() -> None:
+    path = CommandedPath(LIFT)
+    for event in range(1, 6):
+        path.command(event, [0.5])
+        _fed(path, event, event * 0.1, [1.0 - event * 0.1])
+    poses = path.poses()
+    assert poses is not None
+    assert poses["lift"].position == pytest.approx((0.0, 0.0, 0.5))
+
+
+def test_a_twist_moves_its_body_in_the_frame_that_it_is_given_in() -> None:
+    twist = BodyTwist(body="tool", frame="base", point=(0.5, 0, 0), linear=("vx", "", ""), angular=("", "", "wz"))
+    robot = RobotDescription(
+        name="r", label="R", axes=BASE.axes, joints=BASE.joints, bodies=BASE.bodies, body_twists=(twist,)
+    )
+    poses = _driven(robot, [1.0, 0.0, 0.0], [0.0, 0.0, math.pi / 2]).poses()
+    assert poses is not None
+    assert poses["base"].position == pytest.approx((0.0, 0.0, 0.0))
+    assert poses["tool"].position == pytest.approx((0.0, 1.3, 0.0))
+    turned = _driven(robot, [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]).poses()
+    assert turned is not None
+    # The point stays, the body turns about it.
+    assert turned["tool"].position == pytest.approx((1.5 - 0.5 * math.cos(0.3), -0.5 * math.sin(0.3), 0.0))
+
+
+@pytest.mark.parametrize("rest", [{"at_rest": True}, {"stop": StopState(stopped=True)}])
+def test_at_rest_nothing_is_commanded(rest: dict[str, object]) -> None:
+    path = CommandedPath(LIFT)
+    for event in range(1, 5):
+        path.command(event, [0.5])
+        _fed(path, event, event * 0.1, [0.0], **rest)
+    assert path.poses() is None
+
+
+def test_neutral_commands_and_events_of_nobody_here_are_none() -> None:
+    assert _driven(LIFT, [0.0], [0.0]).poses() is None
+    path = CommandedPath(LIFT)
+    _fed(path, 1, 0.1, [0.0])
+    _fed(path, 2, 0.2, [0.0])
+    assert path.poses() is None
+
+
+def test_a_command_counts_no_longer_than_the_robot_holds_it() -> None:
+    path = CommandedPath(LIFT)
+    path.command(1, [0.5])
+    _fed(path, 1, 0.1, [0.0])
+    _fed(path, 1, 9.0, [0.0])
+    poses = path.poses()
+    assert poses is None or poses["lift"].position[2] >= -0.3
+
+
+def test_a_description_that_says_nothing_about_its_axes_has_no_ghost() -> None:
+    robot = RobotDescription(name="r", label="R", axes=LIFT.axes, joints=LIFT.joints, bodies=LIFT.bodies)
+    path = _driven(robot, [1.0], [0.0])
+    assert (path.known, path.poses()) == (False, None)
+
+
+def test_feedback_that_makes_no_sense_is_left_out_and_a_clock_that_goes_back_begins_anew() -> None:
+    path = _driven(LIFT, [0.5], [0.0])
+    _fed(path, 5, 0.5, [math.nan])
+    _fed(path, 5, math.inf, [0.0])
+    _fed(path, 1, 0.0, [0.7])
+    assert path.poses() is None
+
+
+def test_what_is_kept_is_bounded() -> None:
+    path = CommandedPath(LIFT)
+    for event in range(1, 2000):
+        path.command(event, [0.5])
+        _fed(path, event, event * 1e-4, [0.0])
+    assert len(path._records) <= 256
+    assert len(path._commands) <= 512
+
+
+def test_what_it_is_now_stays_so_for_another_thread() -> None:
+    path = _driven(LIFT, [0.5], [0.2])
+    kept = path.as_of_now()
+    path.command(5, [-0.5])
+    _fed(path, 5, 0.5, [0.9])
+    poses, later = kept.poses(), path.poses()
+    assert poses is not None
+    assert later is not None
+    assert poses["lift"].position == pytest.approx((0.0, 0.0, 0.2 - 0.3))
+    assert later["lift"].position != poses["lift"].position

@@ -1,0 +1,44 @@
+import platform
+from collections import Counter
+from importlib.metadata import version
+
+from lockstep.server.telemetry.metrics import MAX_LIMITS, Metrics
+
+
+def test_what_the_links_count_is_added_once() -> None:
+    metrics = Metrics()
+    for total in (2, 2, 5):
+        metrics.collect(Counter(malformed=total), Counter(overview=total))
+    found = metrics.registry.get_sample_value
+    assert found("lockstep_bad_input_total", {"where": "robot", "reason": "malformed"}) == 5
+    assert found("lockstep_dropped_total", {"queue": "robot overview"}) == 5
+
+
+async def test_two_consoles_in_one_process_count_apart() -> None:
+    first, second = Metrics(), Metrics()
+    first.resets.inc()
+    assert b"lockstep_resets_total 1.0" in await first.exposition.text()
+    assert b"lockstep_resets_total 0.0" in await second.exposition.text()
+
+
+async def test_what_runs_is_said_once_and_no_series_says_when_it_was_made() -> None:
+    metrics = Metrics()
+    metrics.resets.inc()
+    text = (await metrics.exposition.text()).decode()
+    assert (
+        f'lockstep_build_info{{python="{platform.python_version()}",version="{version("lockstep-console")}"}} 1.0'
+        in text
+    )
+    assert "_created" not in text
+
+
+def test_a_robot_that_calls_its_limits_ever_new_names_makes_no_series_without_end() -> None:
+    metrics = Metrics()
+    for number in range(2 * MAX_LIMITS):
+        metrics.limits_acted([f"limit {number}", "limit 0"])
+    found_all = (sample for metric in metrics.limited.collect() for sample in metric.samples)
+    series = [each for each in found_all if each.name.endswith("_total")]
+    assert len(series) == MAX_LIMITS + 1
+    found = metrics.registry.get_sample_value
+    assert found("lockstep_limited_feedback_total", {"limit": "other"}) == MAX_LIMITS
+    assert found("lockstep_limited_feedback_total", {"limit": "limit 0"}) == 2 * MAX_LIMITS + 1
