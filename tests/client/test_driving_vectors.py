@@ -19,37 +19,37 @@ class Person:
     """Somebody with a program that drives whenever it may."""
 
     def __init__(self) -> None:
-        self.pilot = CommandSender(CommandGate("feedback", 4, 0.0), NEUTRAL)
-        self.pilot.seated()
+        self.sender = CommandSender(CommandGate("feedback", 4, 0.0), NEUTRAL)
+        self.sender.seated()
         self.wants: list[float] | None = None
         self._sent = 0
 
     def take(self, step: dict[str, Any], now: float) -> None:
-        pilot, do = self.pilot, step["do"]
+        sender, do = self.sender, step["do"]
         if do == "feedback":
             stop = StopState(stopped=step.get("stopped", False), number=step.get("stop_number", 0))
             needed = step.get("neutral_needed", False)
-            pilot.feedback(feedback(step["event"], step.get("issue", 1), stop=stop, neutral_needed=needed), now)
+            sender.feedback(feedback(step["event"], step.get("issue", 1), stop=stop, neutral_needed=needed), now)
         elif do == "refused":
-            pilot.refusal(refusal(step["event"], step["reason"]))
+            sender.refusal(refusal(step["event"], step["reason"]))
         elif do == "arm":
-            pilot.arm()
+            sender.arm()
         elif do == "seat":
-            pilot.seated()
+            sender.seated()
         elif do == "let_go":
             self.wants = None
-            pilot.rest(now)
+            sender.rest(now)
         else:
             self.wants = {"move": MOVING}[do]
 
     def leaving(self, now: float) -> list[list[object]]:
         """`Console.drive` asks for nothing before the robot may move."""
-        if self.wants is not None and self.pilot.ready:
-            self.pilot.intend(self.wants, now)
+        if self.wants is not None and self.sender.ready:
+            self.sender.intend(self.wants, now)
         found: list[list[object]] = []
-        for message in self.pilot.due(now):
-            if isinstance(message, Command) and len(self.pilot.sent_at) > self._sent:
-                self._sent = len(self.pilot.sent_at)
+        for message in self.sender.due(now):
+            if isinstance(message, Command) and len(self.sender.sent_at) > self._sent:
+                self._sent = len(self.sender.sent_at)
                 found.append([message.event, "neutral" if message.values == NEUTRAL else "moving"])
         return found
 

@@ -105,7 +105,7 @@ async def test_after_the_path_is_cut_a_restart_brings_commands_and_pictures_back
                 assert after.event > before.event, "events go on where they were"
                 assert console.peer == peer
                 assert console.seat.holder == peer, "and nobody else could drive meanwhile"
-                assert len(rig.services.console.peers) == 1
+                assert len(rig.dependencies.console.peers) == 1
                 await console.rest()
                 assert paths.forwarders[1].passed > 0
                 assert rig.count("lockstep_rests_total", why="disconnected") == 0
@@ -161,7 +161,7 @@ async def test_an_old_path_without_answers_ends_nothing_while_a_restart_is_under
                 await console.restart_ice()
                 after = await drive_on(console, values)
                 assert after.event > before.event
-                assert len(rig.services.console.peers) == 1
+                assert len(rig.dependencies.console.peers) == 1
                 assert rig.count("lockstep_rests_total", why="disconnected") == 0
         finally:
             paths.close()
@@ -175,7 +175,7 @@ async def test_a_restart_that_finds_no_path_ends_a_session_whose_old_path_gives_
             async with Console(_link(rig), route=paths, video=False, audio=False):
                 await _lapse(rig, paths)
                 async with asyncio.timeout(PATIENCE):
-                    await rig.services.console.peers.all_gone()
+                    await rig.dependencies.console.peers.all_gone()
         finally:
             paths.close()
 
@@ -194,9 +194,9 @@ async def test_the_path_can_be_changed_again_and_again_without_a_repeat() -> Non
 
 async def test_a_session_that_has_ended_is_not_restarted() -> None:
     async with running_rig() as rig, Console(_link(rig), video=False, audio=False) as console:
-        next(iter(rig.services.console.peers)).end("for the test")
+        next(iter(rig.dependencies.console.peers)).end("for the test")
         async with asyncio.timeout(PATIENCE):
-            await rig.services.console.peers.all_gone()
+            await rig.dependencies.console.peers.all_gone()
         with pytest.raises(SignallingRefused, match="not_found"):
             await console.restart_ice()
 

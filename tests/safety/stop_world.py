@@ -174,7 +174,7 @@ class ConsoleModel:
         self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
         self.keeper = MemoryKeeper(disk)
         world.loop.run_until_complete(self.keeper.load())
-        self.desk = CommandArbiter(self.clock, self.seat, self.keeper.presses)
+        self.arbiter = CommandArbiter(self.clock, self.seat, self.keeper.presses)
         self.service = StopService(
             self,
             self.keeper,
@@ -227,7 +227,7 @@ class ConsoleModel:
             self._seated(self.seat.release(self.seat.holder, self._world.now))
 
     def _seated(self, outcome: SeatOutcome) -> None:
-        if outcome.rest and isinstance(found := self.desk.abandon(), ForwardRest):
+        if outcome.rest and isinstance(found := self.arbiter.abandon(), ForwardRest):
             self.send(found.rest)
         person = self.people.by_id(self.seat.holder)
         self.holder, before = "" if person is None else person.name, self.holder
@@ -269,7 +269,7 @@ class ConsoleModel:
 
     def command(self, person: str, command: Command) -> None:
         who = self.people.all[person]
-        outcome = self.desk.command(who.id, command, self._world.now)
+        outcome = self.arbiter.command(who.id, command, self._world.now)
         if not isinstance(outcome, Forward):
             return
         assert person == self.holder, "somebody drives without the seat"
@@ -291,17 +291,17 @@ class ConsoleModel:
         if epoch != self.epoch:
             self.epoch = epoch
             self.service.epoch_ends(self.clock.stop)
-            self.desk.epoch_ends()
+            self.arbiter.epoch_ends()
             self.clock.begin(epoch)
 
     def link_up(self) -> None:
         self.up, self.proven, self._neutral = True, False, None
         self.service.link_up()
-        self.desk.link_up(ROBOT)
+        self.arbiter.link_up(ROBOT)
 
     def link_down(self) -> None:
         self.up, self.detail, self.proven, self._neutral = False, "lost", False, None
-        self.desk.link_down()
+        self.arbiter.link_down()
         self.service.link_down("lost")
 
     def hear(self, message: LinkMessage) -> None:
@@ -311,15 +311,15 @@ class ConsoleModel:
                 if not self.clock.observe(message, self._world.now):
                     return
                 self._note(message, shown)
-                self.desk.feedback(message)
+                self.arbiter.feedback(message)
                 self.service.feedback(message.stop)
             case Refusal():
                 if not self.service.refused(message):
-                    self.desk.refused(message)
+                    self.arbiter.refused(message)
                     self._neutral = None
             case StopTaken():
                 self._told(message)  # if nobody waits for it any more, the audit is told
-                self.desk.stop_taken(message)
+                self.arbiter.stop_taken(message)
                 self.service.taken(message)
 
     def _note(self, feedback: Feedback, shown: int) -> None:

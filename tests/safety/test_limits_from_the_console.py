@@ -77,7 +77,7 @@ async def test_a_geofence_that_acts_is_fed_back_to_everyone_and_counted() -> Non
         running_console(bridge.address[1]) as rig,
     ):
         async with asyncio.timeout(PATIENCE):
-            await rig.services.console.robot.reached.wait()
+            await rig.dependencies.console.robot.reached.wait()
         async with rig.peer("operator") as peer, rig.peer("observer") as other:
             await take_seat(peer)
             while "charger" not in peer.newest_feedback().limits:

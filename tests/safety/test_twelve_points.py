@@ -52,19 +52,19 @@ DT = 0.004
 
 def pilot_after_driving() -> tuple[CommandSender, float]:
     """A client's pilot that has driven event 2 and got its feedback, and now."""
-    pilot = CommandSender(CommandGate("feedback", 4, 0.0), NEUTRAL)
-    pilot.feedback(Feedback(event=1, issue=1, time=0.0, axes=NEUTRAL), 0.0)
-    pilot.ready = True
-    pilot.intend(DRIVE, 0.0)
-    assert [message.values for message in pilot.due(0.0) if isinstance(message, Command)] == [DRIVE]
-    pilot.feedback(Feedback(event=2, issue=1, time=0.0, axes=DRIVE, at_rest=False), 0.05)
-    return pilot, 0.05
+    sender = CommandSender(CommandGate("feedback", 4, 0.0), NEUTRAL)
+    sender.feedback(Feedback(event=1, issue=1, time=0.0, axes=NEUTRAL), 0.0)
+    sender.ready = True
+    sender.intend(DRIVE, 0.0)
+    assert [message.values for message in sender.due(0.0) if isinstance(message, Command)] == [DRIVE]
+    sender.feedback(Feedback(event=2, issue=1, time=0.0, axes=DRIVE, at_rest=False), 0.05)
+    return sender, 0.05
 
 
 def test_point_01_hold_to_run_a_script_that_stops_commanding_lets_go() -> None:
     """The page's deadman is tested in web/test/drive/arming.test.ts. Without one, silence is letting go."""
-    pilot, now = pilot_after_driving()
-    sent = [message for step in range(60) for message in pilot.due(now + step * 0.01)]
+    sender, now = pilot_after_driving()
+    sent = [message for step in range(60) for message in sender.due(now + step * 0.01)]
     assert sent
     assert all(message.values == NEUTRAL for message in sent if isinstance(message, Command))
     shaper = AxisShaper(DESCRIPTION.axes, hold=DESCRIPTION.hold)
@@ -75,14 +75,14 @@ def test_point_01_hold_to_run_a_script_that_stops_commanding_lets_go() -> None:
 
 
 def test_point_02_one_zero_at_release_then_silence() -> None:
-    pilot, now = pilot_after_driving()
-    pilot.rest(now)
-    released = pilot.due(now)
+    sender, now = pilot_after_driving()
+    sender.rest(now)
+    released = sender.due(now)
     assert [type(message) for message in released] == [Rest, Command]
     assert isinstance(released[1], Command)
     assert released[1].values == NEUTRAL
-    pilot.feedback(Feedback(event=3, issue=1, time=0.0, axes=NEUTRAL, at_rest=True), now + 0.05)
-    later = [message for step in range(1000) for message in pilot.due(now + 0.05 + step * 0.01)]
+    sender.feedback(Feedback(event=3, issue=1, time=0.0, axes=NEUTRAL, at_rest=True), now + 0.05)
+    later = [message for step in range(1000) for message in sender.due(now + 0.05 + step * 0.01)]
     assert later == []
 
 

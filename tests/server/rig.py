@@ -59,14 +59,14 @@ class Rig:
     http: httpx.AsyncClient
 
     @property
-    def services(self) -> Dependencies:
-        found = self.app.state.services
+    def dependencies(self) -> Dependencies:
+        found = self.app.state.dependencies
         assert isinstance(found, Dependencies)
         return found
 
     @property
     def webrtc_peers(self) -> list[WebRtcPeer]:
-        return [peer for peer in self.services.console.peers if isinstance(peer, WebRtcPeer)]
+        return [peer for peer in self.dependencies.console.peers if isinstance(peer, WebRtcPeer)]
 
     def token(self, role: Role) -> dict[str, str]:
         return {"Authorization": f"Bearer {self.access.issue(role, role)}"}
@@ -78,7 +78,7 @@ class Rig:
 
     def count(self, name: str, **labels: str) -> float:
         """A metric's value; 0 when it was never touched."""
-        return self.services.metrics.registry.get_sample_value(name, labels) or 0.0
+        return self.dependencies.metrics.registry.get_sample_value(name, labels) or 0.0
 
     @asynccontextmanager
     async def peer(self, role: Role, *channels: str) -> AsyncIterator["TestPeer"]:
@@ -256,5 +256,5 @@ async def running_rig(**settings: Any) -> AsyncIterator[Rig]:
     """Bridge and console, connected."""
     async with running_bridge() as bridge, running_console(bridge.address[1], **settings) as rig:
         async with asyncio.timeout(PATIENCE):
-            await rig.services.console.robot.reached.wait()
+            await rig.dependencies.console.robot.reached.wait()
         yield rig

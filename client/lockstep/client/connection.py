@@ -290,7 +290,7 @@ class Connection:
             case Pong(id=number):
                 round_trip = self._pings.answered(number, self._heard_at)
                 if round_trip is not None and self._driver is not None:
-                    self._driver.pilot.ping_answered(round_trip)
+                    self._driver.sender.ping_answered(round_trip)
                 if round_trip is not None:
                     self.media.round_trip(round_trip)
             case RobotState():
@@ -332,10 +332,10 @@ class Connection:
         description = robot.description
         rate = min(description.max_event_rate, self.options.event_rate or description.max_event_rate)
         gate = CommandGate(self.options.pacing, self.options.tolerance["video"], 1 / rate)
-        pilot = CommandSender(gate, [axis.rest for axis in description.axes])
-        self._driver = Driver(pilot, lambda message: self._peer.send("control", message))
-        self.session.seated, self.session.unseated = pilot.seated, pilot.unseated
-        pilot.holds_seat = self.session.holds_seat
+        sender = CommandSender(gate, [axis.rest for axis in description.axes])
+        self._driver = Driver(sender, lambda message: self._peer.send("control", message))
+        self.session.seated, self.session.unseated = sender.seated, sender.unseated
+        sender.holds_seat = self.session.holds_seat
         if self._early_feedback is not None:
             self._take_feedback(self._early_feedback)
 
@@ -370,33 +370,33 @@ class Connection:
 
     def statistics(self) -> ConsoleStatistics:
         now = self._loop.time()
-        pilot, delays = self.driver.pilot, self.driver.picture_delay.samples
+        sender, delays = self.driver.sender, self.driver.picture_delay.samples
         delay = percentiles(delays, 1000)
         return ConsoleStatistics(
             peer=self.session.peer,
             epoch=self.robot.epoch,
-            event=pilot.newest.event if pilot.newest is not None else 0,
-            armed=pilot.armed,
-            gate=pilot.gate.state(now),
+            event=sender.newest.event if sender.newest is not None else 0,
+            armed=sender.armed,
+            gate=sender.gate.state(now),
             streams=self.media.statistics(),
             picture_delay_ms=delays[-1] * 1000 if delays else None,
             picture_delay_p50_ms=delay.median,
             picture_delay_p95_ms=delay.p95,
             command_to_picture_ms=delay,
             round_trip_ms=self._pings.round_trip * 1000 if self._pings.round_trip is not None else None,
-            command_to_feedback_ms=percentiles(pilot.samples, 1000),
+            command_to_feedback_ms=percentiles(sender.samples, 1000),
             event_rate=self._event_rate.rate(now),
             bad_messages=self.malformed,
-            repeats=pilot.repeats,
-            echoes=pilot.echoes,
+            repeats=sender.repeats,
+            echoes=sender.echoes,
         )
 
     def _report(self, ping: int) -> Report:
-        pilot, round_trip = self.driver.pilot, self._pings.round_trip
+        sender, round_trip = self.driver.sender, self._pings.round_trip
         delay = self.driver.picture_delay.known(asyncio.get_running_loop().time())
         return Report(
-            event=pilot.newest.event if pilot.newest is not None else 0,
-            armed=pilot.armed,
+            event=sender.newest.event if sender.newest is not None else 0,
+            armed=sender.armed,
             streams=[stream.report() for stream in self.media.statistics()],
             picture_delay_ms=delay * 1000 if delay is not None else None,
             round_trip_ms=round_trip * 1000 if round_trip is not None else None,

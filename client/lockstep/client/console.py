@@ -149,12 +149,12 @@ class Console:
     @property
     def feedback(self) -> Feedback | None:
         """The newest one; None before the first."""
-        return self._live().driver.pilot.newest
+        return self._live().driver.sender.newest
 
     @property
     def gate_state(self) -> GateState:
         """Whether a command could leave now, and if not, why."""
-        return self._live().driver.pilot.gate.state(asyncio.get_running_loop().time())
+        return self._live().driver.sender.gate.state(asyncio.get_running_loop().time())
 
     @property
     def seat(self) -> Seat:
@@ -237,7 +237,7 @@ class Console:
         await self._arm_if_possible(connection)
 
     async def _arm_if_possible(self, connection: Connection) -> None:
-        newest = connection.driver.pilot.newest
+        newest = connection.driver.sender.newest
         if newest is None or newest.stop.stopped or connection.robot.link == "down":
             return
         with suppress(CommandRefused):
@@ -282,7 +282,7 @@ class Console:
             ConsoleLost: the connection ended.
         """
         connection = self._live()
-        command, pilot = self._command(values), connection.driver.pilot
+        command, pilot = self._command(values), connection.driver.sender
         if connection.session.holds_seat and not pilot.ready:
             if pilot.newest is not None and pilot.newest.stop.stopped:
                 raise CommandRefused("stopped", pilot.newest.stop.reason)

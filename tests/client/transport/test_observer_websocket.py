@@ -52,10 +52,10 @@ async def test_a_line_is_welcomed_asks_stops_and_says_how_it_ended() -> None:
             line.send("control", Ping(id=5))
             await eventually(lambda: Pong(id=5) in heard.messages)
             line.send("stop", Stop(reason="seen"))
-            await eventually(lambda: rig.services.console.clock.stop.stopped)
+            await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
             with pytest.raises(ConnectFailed, match="TCP"):
                 await line.restart_ice(1.0)
-            next(iter(rig.services.console.peers)).end("link revoked")
+            next(iter(rig.dependencies.console.peers)).end("link revoked")
             async with asyncio.timeout(PATIENCE):
                 await line.ended.wait()
             assert line.why == "the console closed the connection (link revoked)"
@@ -89,7 +89,7 @@ async def test_where_no_websocket_passes_the_ticket_is_given_back(monkeypatch: p
         try:
             with pytest.raises(LineBlocked, match="a proxy"):
                 await line.negotiate()
-            await eventually(lambda: len(rig.services.console.peers) == 0)
+            await eventually(lambda: len(rig.dependencies.console.peers) == 0)
             assert rig.count("lockstep_peers_ended_total", why="deleted") == 1
         finally:
             await line.close()
@@ -125,7 +125,7 @@ async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
             assert isinstance(connection._peer, Peer)
             await connection._peer.connect(PATIENCE)
             await eventually(lambda: connection.session.welcome is not None)
-            assert [peer.relay for peer in rig.services.console.peers] == ["0"]
+            assert [peer.relay for peer in rig.dependencies.console.peers] == ["0"]
         finally:
             connection._relay = None
             await connection.close()
@@ -184,7 +184,7 @@ async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate
         running_bridge() as bridge,
         running_console(bridge.address[1], certificate=certificate, **RELAYED) as rig,
     ):
-        await eventually(lambda: rig.services.console.robot.description is not None)
+        await eventually(lambda: rig.dependencies.console.robot.description is not None)
         link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
         line = ObserverWebSocket(link, "0", certificate.chain, heard.take, PATIENCE)
         doubting = ObserverWebSocket(link, "0", None, heard.take, PATIENCE)

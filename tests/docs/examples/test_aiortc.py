@@ -22,6 +22,6 @@ async def test_plain_aiortc_drives_and_decodes_pictures() -> None:
         found = json.loads(printed.splitlines()[-1])
         assert found["event"] > 10
         assert found["pictures"] > 10
-        assert rig.services.console.clock.event == found["event"]
+        assert rig.dependencies.console.clock.event == found["event"]
         assert any(axis > 0 for axis in json.loads(printed.splitlines()[-2].split(b"axes ")[1].split(b"]")[0] + b"]"))
-        assert not list(rig.services.console.peers)
+        assert not list(rig.dependencies.console.peers)

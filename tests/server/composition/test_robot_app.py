@@ -20,7 +20,7 @@ async def test_a_console_that_ends_with_peers_connected_ends_them_and_rests_the_
         try:
             async with running_console(bridge.address[1], scene=True) as rig:
                 async with asyncio.timeout(PATIENCE):
-                    await rig.services.console.robot.reached.wait()
+                    await rig.dependencies.console.robot.reached.wait()
                 for peer, role in zip(peers, ("operator", "observer"), strict=True):
                     await peer.join(rig, rig.token(role), ("control", "session", "stop"))  # type: ignore[arg-type]
                 driver = peers[0]
@@ -37,7 +37,7 @@ async def test_a_console_that_ends_with_peers_connected_ends_them_and_rests_the_
                     await peer.closed.wait()
             assert rig.count("lockstep_peers_ended_total", why="shutdown") == 2
             assert rig.count("lockstep_rests_total", why="disconnected") == 1
-            assert len(rig.services.console.peers) == 0
+            assert len(rig.dependencies.console.peers) == 0
         finally:
             for peer in peers:
                 await peer.close()
@@ -48,7 +48,7 @@ async def test_one_process_can_run_several_consoles_one_after_the_other() -> Non
         for _ in range(2):
             async with running_console(bridge.address[1]) as rig:
                 async with asyncio.timeout(PATIENCE):
-                    await rig.services.console.robot.reached.wait()
+                    await rig.dependencies.console.robot.reached.wait()
 
 
 def test_an_app_is_made_without_touching_anything() -> None:

@@ -27,7 +27,7 @@ async def test_commands_that_answer_each_feedback_at_once_execute_at_the_robots_
                 peer.send("control", command)
             feedback = await answer_after(peer, before)
             answers.append(feedback)
-        description = rig.services.console.robot.description
+        description = rig.dependencies.console.robot.description
         assert description is not None
         took = answers[-1].time - answers[0].time
         assert took >= (COMMANDS - 1 - BURST) / description.max_event_rate - CLOCKS

@@ -26,5 +26,5 @@ async def test_notes_of_a_session_that_is_over_are_told_to_no_newcomer_though_th
             peer.send("session", Note(text=CODE))
             await peer.until(lambda each: isinstance(each, SharedNote))
             assert await _told_to_a_newcomer(rig, "one") == [CODE], "while somebody is there"
-        await eventually(lambda: not list(rig.services.console.peers))
+        await eventually(lambda: not list(rig.dependencies.console.peers))
         assert await _told_to_a_newcomer(rig, "two") == told

@@ -61,8 +61,8 @@ async def test_a_claim_that_nobody_answers_counts_as_declined() -> None:
         assert [(claim.peer, claim.name) for claim in claimed.claims] == [(await _id(second), "operator 2")]
         assert 0 < claimed.claims[0].seconds_left <= 0.4
         assert (await _refused(second, "declined")).detail == "no answer"
-        assert rig.services.console.seat.message().holder == holder
-        assert not rig.services.console.seat.message().claims
+        assert rig.dependencies.console.seat.message().holder == holder
+        assert not rig.dependencies.console.seat.message().claims
 
 
 async def test_an_idle_driver_is_counted_down_for_everyone_and_loses_the_seat() -> None:
@@ -89,7 +89,7 @@ async def test_who_drives_is_not_idle() -> None:
         while loop.time() - begun < 2.2:
             await driver.drive([moving] + [0.0] * (len(driver.newest_feedback().axes) - 1))
             moving = 0.1
-        assert rig.services.console.seat.rules.holder == await _id(driver)
+        assert rig.dependencies.console.seat.rules.holder == await _id(driver)
 
 
 async def test_a_moving_command_of_a_new_driver_is_refused_until_a_neutral_one_came() -> None:
@@ -144,10 +144,10 @@ async def test_a_note_reaches_everyone_with_its_event_and_newcomers_read_it() ->
         note = await reader.until(lambda each: isinstance(each, SharedNote))
         assert isinstance(note, SharedNote)
         assert (note.text, note.name, note.peer) == ("mind the step", "observer", await _id(writer))
-        assert (note.epoch, note.event) == (rig.services.console.clock.epoch, rig.services.console.clock.event)
+        assert (note.epoch, note.event) == (rig.dependencies.console.clock.epoch, rig.dependencies.console.clock.event)
         async with rig.peer("observer") as late:
             await late.until(lambda each: each == note)
-        kept = [record for record in rig.services.audit if record.kind == "note"]
+        kept = [record for record in rig.dependencies.audit if record.kind == "note"]
         assert [(record.who, record.detail, record.event) for record in kept] == [
             ("observer", "mind the step", note.event)
         ]
@@ -175,7 +175,7 @@ async def test_the_first_to_come_keeps_the_name_and_who_leaves_makes_room() -> N
                 ] == ["Ada"]
 
             await second_name.until(one)
-        renamed = [record.who for record in rig.services.audit if record.kind == "renamed"]
+        renamed = [record.who for record in rig.dependencies.audit if record.kind == "renamed"]
         assert renamed == ["Ada", "Ada 2"]
 
 

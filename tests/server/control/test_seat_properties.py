@@ -27,9 +27,9 @@ class SeatMachine(RuleBasedStateMachine):
         self.now = 0.0
         self.clock = EventClock()
         self.seat = ControlSeat(TIMES)
-        self.desk = CommandArbiter(self.clock, self.seat)
+        self.arbiter = CommandArbiter(self.clock, self.seat)
         self.clock.begin("epoch")
-        self.desk.link_up(ROBOT)
+        self.arbiter.link_up(ROBOT)
         self.sent: list[tuple[str | None, Command | Rest]] = []
         self.event = 0
         self.answer()
@@ -40,7 +40,7 @@ class SeatMachine(RuleBasedStateMachine):
     def act(self, outcome: SeatOutcome) -> None:
         """As the keeper does."""
         if outcome.rest:
-            rest = self.desk.abandon()
+            rest = self.arbiter.abandon()
             if isinstance(rest, ForwardRest):
                 self.sent.append((None, rest.rest))
 
@@ -112,7 +112,7 @@ class SeatMachine(RuleBasedStateMachine):
 
     @rule(peer=peers, value=st.sampled_from([0.0, 0.5]), answered=st.booleans())
     def command(self, peer: str, value: float, answered: bool) -> None:
-        outcome = self.desk.command(peer, Command(event=event_after(self.event), issue=1, values=[value]), self.now)
+        outcome = self.arbiter.command(peer, Command(event=event_after(self.event), issue=1, values=[value]), self.now)
         if isinstance(outcome, Forward):
             assert self.seat.holder == peer
             before = next((each for each in reversed(self.sent) if each[0] != peer), (None, None))
@@ -144,7 +144,7 @@ class SeatMachine(RuleBasedStateMachine):
         issue = 1 if feedback is None or feedback.event != self.event else feedback.issue + 1
         feedback = Feedback(event=self.event, issue=issue, time=0.0, axes=[0.0])
         self.clock.observe(feedback, self.now)
-        self.desk.feedback(feedback)
+        self.arbiter.feedback(feedback)
 
     @invariant()
     def the_seat_is_never_pinned(self) -> None:

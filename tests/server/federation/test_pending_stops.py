@@ -17,60 +17,60 @@ def reply(number: int, *outcomes: tuple[str, bool]) -> StopReply:
 
 
 def test_a_request_is_complete_when_every_robot_was_answered_for() -> None:
-    desk = PendingStops()
-    asked = desk.ask(request(1, "left", "right"))
-    desk.replied(reply(1, ("left", True)))
+    pending = PendingStops()
+    asked = pending.ask(request(1, "left", "right"))
+    pending.replied(reply(1, ("left", True)))
     assert not asked.complete.is_set()
-    desk.replied(reply(2, ("right", True)))
-    desk.replied(reply(1, ("unasked", True)))
+    pending.replied(reply(2, ("right", True)))
+    pending.replied(reply(1, ("unasked", True)))
     assert not asked.complete.is_set()
-    desk.replied(reply(1, ("right", False)))
+    pending.replied(reply(1, ("right", False)))
     assert asked.complete.is_set()
     assert asked.answers["left"].delivered
     assert asked.answers["right"].detail
 
 
 def test_of_two_answers_for_one_robot_the_worse_counts() -> None:
-    desk = PendingStops()
-    asked = desk.ask(request(1, "left"))
-    desk.replied(reply(1, ("left", True)))
-    desk.replied(reply(1, ("left", False)))
-    desk.replied(reply(1, ("left", True)))
+    pending = PendingStops()
+    asked = pending.ask(request(1, "left"))
+    pending.replied(reply(1, ("left", True)))
+    pending.replied(reply(1, ("left", False)))
+    pending.replied(reply(1, ("left", True)))
     assert not asked.answers["left"].delivered
 
 
 def test_a_request_that_nobody_waits_for_any_more_is_forgotten() -> None:
-    desk = PendingStops()
-    asked = desk.ask(request(1, "left", "right"))
-    assert desk.waiting == 1
-    desk.end(asked)
-    desk.end(asked)
-    assert desk.waiting == 0
-    desk.replied(reply(1, ("left", True)))
+    pending = PendingStops()
+    asked = pending.ask(request(1, "left", "right"))
+    assert pending.waiting == 1
+    pending.end(asked)
+    pending.end(asked)
+    assert pending.waiting == 0
+    pending.replied(reply(1, ("left", True)))
 
 
 def test_a_repeat_is_answered_and_not_obeyed_again_as_long_as_it_is_remembered() -> None:
-    desk, first = PendingStops(), request(1, "left")
+    pending, first = PendingStops(), request(1, "left")
     outcomes = (Outcome(robot="left", delivered=True, event=1, number=4, kept=True),)
-    assert desk.is_new(first)
-    assert not desk.is_new(first)
-    assert desk.outcomes(first) == (), "it is being carried out"
-    desk.obeyed(first, outcomes)
-    assert not desk.is_new(first)
-    assert desk.outcomes(first) == outcomes
+    assert pending.is_new(first)
+    assert not pending.is_new(first)
+    assert pending.outcomes(first) == (), "it is being carried out"
+    pending.obeyed(first, outcomes)
+    assert not pending.is_new(first)
+    assert pending.outcomes(first) == outcomes
     for number in range(2, MAX_REMEMBERED + 2):
-        assert desk.is_new(request(number, "left"))
-    assert desk.is_new(first)
+        assert pending.is_new(request(number, "left"))
+    assert pending.is_new(first)
 
 
 def test_the_number_of_a_stop_and_why_it_was_not_delivered_come_from_its_console() -> None:
-    desk = PendingStops()
-    asked = desk.ask(request(1, "left", "right"))
+    pending = PendingStops()
+    asked = pending.ask(request(1, "left", "right"))
     outcomes = (
         Outcome(robot="left", delivered=True, event=1, number=4, kept=True),
         Outcome(robot="right", delivered=False, event=0, detail="silenced"),
     )
-    desk.replied(StopReply(console=ID, request=asked.request.request, robots=outcomes))
+    pending.replied(StopReply(console=ID, request=asked.request.request, robots=outcomes))
     assert asked.answers == {
         "left": StopAnswer(True, True, 1, "", 4, kept=True),
         "right": StopAnswer(True, False, 0, "silenced"),

@@ -37,7 +37,7 @@ class FleetRig:
         return {"Authorization": f"Bearer {self.state.access.issue(role, role, robots)}"}
 
     def session(self, name: str) -> Dependencies:
-        found = self.fleet.sessions[name].services
+        found = self.fleet.sessions[name].dependencies
         assert found is not None
         return found
 

@@ -72,7 +72,7 @@ async def test_a_bridge_that_misbehaves_disturbs_no_other_robot(
                 assert not peer.closed.is_set()
             tiles = await rig.tiles()
             assert (tiles["bad"]["link"], tiles["good"]["link"]) == ("down", "up")
-            assert rig.fleet.sessions["bad"].services is not None
+            assert rig.fleet.sessions["bad"].dependencies is not None
     finally:
         bad.close()
         await bad.wait_closed()

@@ -43,12 +43,12 @@ class Faults:
         """Returns while there is no session, and there is none until `back`."""
         self.may_begin.clear()
         self._told[rig.session(name).console].set()
-        await eventually(lambda: rig.fleet.sessions[name].services is None)
+        await eventually(lambda: rig.fleet.sessions[name].dependencies is None)
 
     async def back(self, rig: FleetRig, name: str) -> None:
         """Until the next session has reached its robot."""
         self.may_begin.set()
-        await eventually(lambda: rig.fleet.sessions[name].services is not None)
+        await eventually(lambda: rig.fleet.sessions[name].dependencies is not None)
         await rig.all_reached()
 
 
@@ -66,8 +66,8 @@ def faults(monkeypatch: pytest.MonkeyPatch) -> Faults:
     @asynccontextmanager
     async def running(*arguments: Any) -> AsyncIterator[Dependencies]:
         await made.may_begin.wait()
-        async with running_session(*arguments) as services:
-            yield services
+        async with running_session(*arguments) as dependencies:
+            yield dependencies
 
     monkeypatch.setattr(Console, "run", run)
     monkeypatch.setattr(session, "running_session", running)
@@ -220,12 +220,12 @@ async def test_a_fault_while_a_session_ends_does_not_keep_the_console_from_endin
 ) -> None:
     close = MediaHub.close
 
-    async def fault(plane: MediaHub) -> None:
-        await close(plane)
+    async def fault(hub: MediaHub) -> None:
+        await close(hub)
         raise RuntimeError("a fault of ours")
 
     monkeypatch.setattr(MediaHub, "close", fault)
     async with asyncio.timeout(3 * PATIENCE):
         async with running_fleet_rig("left", "right") as rig:
             pass
-    assert all(each.services is None for each in rig.fleet.sessions.values())
+    assert all(each.dependencies is None for each in rig.fleet.sessions.values())

@@ -134,7 +134,7 @@ async def _console(certificate: Certificate | None = None) -> AsyncIterator[Rig]
         running_console(bridge.address[1], certificate=certificate, **given) as rig,
     ):
         async with asyncio.timeout(PATIENCE):
-            await rig.services.console.robot.reached.wait()
+            await rig.dependencies.console.robot.reached.wait()
         yield rig
 
 
@@ -171,7 +171,7 @@ async def _stops_get_through(rig: Rig, url: str, token: dict[str, str]) -> None:
             answer = await http.post(f"{url}/api/stop", headers=token, json={"reason": "a person"})
         assert answer.status_code == 200, answer.text
     assert len(rig.app.state.connection_places) <= PLACES
-    assert rig.services.console.peers.taken == 0
+    assert rig.dependencies.console.peers.taken == 0
 
 
 @pytest.mark.parametrize("kind", FLOODS)
@@ -185,7 +185,7 @@ async def test_a_stop_is_answered_in_every_flood(kind: str, encrypted: bool, tmp
         async with _flood(int(rig.url.rpartition(":")[2]), FLOODS[kind], tls) as begun:
             await _stops_get_through(rig, rig.url, rig.token("observer"))
             assert len(begun) >= HELD
-        assert not [each for family in rig.services.metrics.internal_errors.collect() for each in family.samples]
+        assert not [each for family in rig.dependencies.metrics.internal_errors.collect() for each in family.samples]
         await eventually(lambda: len(rig.app.state.connection_places) <= 1)
 
 

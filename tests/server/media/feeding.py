@@ -18,11 +18,11 @@ from tests.server.media.viewer import TIMEOUT, Received, Viewer
 Make = Callable[[int, float], Media]
 
 
-async def stream(plane: MediaHub, viewer: Viewer, kind: str, make: Make, count: int, first: int = 1) -> None:
+async def stream(hub: MediaHub, viewer: Viewer, kind: str, make: Make, count: int, first: int = 1) -> None:
     """Feed media one by one, each when the one before was received; event i is captured at i / 50 s."""
     for i in range(first, first + count):
         before = timestamps(viewer, kind)
-        plane.feed(make(i, i / 50), i / 50)
+        hub.feed(make(i, i / 50), i / 50)
         if kind == "video" or i > first + 1:  # a resampler keeps some of the first sound back
             await viewer.until(lambda before=before: timestamps(viewer, kind) > before)  # type: ignore[misc]
 
@@ -31,15 +31,15 @@ def timestamps(viewer: Viewer, kind: str) -> int:
     return len({received.packet.timestamp for received in viewer.of(kind) if received.packet.marker or kind == "audio"})
 
 
-def value(plane: MediaHub, name: str, **labels: str) -> float:
+def value(hub: MediaHub, name: str, **labels: str) -> float:
     """A metric of the plane; 0 before it first counted."""
-    registry = cast(Any, plane).registry
+    registry = cast(Any, hub).registry
     return registry.get_sample_value(f"lockstep_media_{name}", labels) or 0.0
 
 
-async def refused(plane: MediaHub, media: Media) -> None:
+async def refused(hub: MediaHub, media: Media) -> None:
     """Feed a medium and wait until the stream's worker is through with it."""
-    stream = cast(Any, plane)._streams[media.stream]
+    stream = cast(Any, hub)._streams[media.stream]
     finish, finished = stream._finish, asyncio.Event()
 
     def spy(encoded: Any) -> None:
@@ -47,7 +47,7 @@ async def refused(plane: MediaHub, media: Media) -> None:
         finished.set()
 
     stream._finish = spy
-    plane.feed(media, media.time)
+    hub.feed(media, media.time)
     async with asyncio.timeout(TIMEOUT):
         await finished.wait()
     stream._finish = finish

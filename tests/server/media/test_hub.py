@@ -17,9 +17,9 @@ from tests.server.media.viewer import TIMEOUT, description, noise, picture, runn
 @pytest.mark.parametrize("codec", ["H264", "VP8"])
 @pytest.mark.parametrize(("carrier", "uri"), [("native", EVENT_REFERENCE_URI), ("capture-time", CAPTURE_TIME_URI)])
 async def test_every_video_packet_carries_the_stamp_of_its_picture(codec: str, carrier: Carrier, uri: str) -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], codecs=[codec], uris={uri: 9}) as viewer:
+    async with running_plane() as hub, viewing(hub, ["video"], codecs=[codec], uris={uri: 9}) as viewer:
         assert [(s.codec, s.carrier) for s in viewer.media.streams] == [(codec, carrier)]
-        await stream(plane, viewer, "video", noise, 8)
+        await stream(hub, viewer, "video", noise, 8)
         received = viewer.of("video")
         by_picture: dict[int, set[int | None]] = {}
         for item in received:
@@ -34,9 +34,9 @@ async def test_every_video_packet_carries_the_stamp_of_its_picture(codec: str, c
 async def test_sound_packets_are_stamped_and_never_newer_than_their_sound(
     codec: str, carrier: Carrier, uri: str
 ) -> None:
-    async with running_plane() as plane, viewing(plane, ["audio"], codecs=[codec], uris={uri: 9}) as viewer:
+    async with running_plane() as hub, viewing(hub, ["audio"], codecs=[codec], uris={uri: 9}) as viewer:
         assert [(s.codec, s.carrier) for s in viewer.media.streams] == [(codec, carrier)]
-        await stream(plane, viewer, "audio", sound, 12)
+        await stream(hub, viewer, "audio", sound, 12)
         received = viewer.of("audio")
         stamps = [read_stamp(carrier, item) for item in received]
         assert None not in stamps
@@ -52,9 +52,9 @@ async def test_sound_packets_are_stamped_and_never_newer_than_their_sound(
 @pytest.mark.parametrize(("kind", "codec"), [("video", "H264"), ("video", "VP8"), ("audio", "opus"), ("audio", "PCMU")])
 async def test_every_frame_ends_with_the_trailer_when_it_is_asked_for(kind: str, codec: str) -> None:
     make = noise if kind == "video" else sound
-    async with running_plane() as plane, viewing(plane, [kind], codecs=[codec], trailer=True) as viewer:
+    async with running_plane() as hub, viewing(hub, [kind], codecs=[codec], trailer=True) as viewer:
         assert [s.carrier for s in viewer.media.streams] == ["trailer"]
-        await stream(plane, viewer, kind, make, 8)
+        await stream(hub, viewer, kind, make, 8)
         for i, frame in enumerate(viewer.frames(kind)):
             rest, trailer = split_trailer(frame)
             assert trailer is not None
@@ -65,12 +65,12 @@ async def test_every_frame_ends_with_the_trailer_when_it_is_asked_for(kind: str,
 async def test_a_peer_gets_only_what_its_offer_asked_for() -> None:
     everything = {EVENT_REFERENCE_URI: 9, CAPTURE_TIME_URI: 10, PLAYOUT_DELAY_URI: 11}
     async with AsyncExitStack() as stack:
-        plane = await stack.enter_async_context(running_plane())
-        plain = await stack.enter_async_context(viewing(plane, ["video"]))
-        native = await stack.enter_async_context(viewing(plane, ["video"], uris=everything))
-        trailer = await stack.enter_async_context(viewing(plane, ["video"], uris=everything, trailer=True))
+        hub = await stack.enter_async_context(running_plane())
+        plain = await stack.enter_async_context(viewing(hub, ["video"]))
+        native = await stack.enter_async_context(viewing(hub, ["video"], uris=everything))
+        trailer = await stack.enter_async_context(viewing(hub, ["video"], uris=everything, trailer=True))
         assert [v.media.streams[0].carrier for v in (plain, native, trailer)] == ["none", "native", "trailer"]
-        await stream(plane, plain, "video", noise, 3)
+        await stream(hub, plain, "video", noise, 3)
         for viewer in (native, trailer):
             await viewer.until(lambda viewer=viewer: timestamps(viewer, "video") == 3)  # type: ignore[misc]
         special = set(everything)
@@ -84,14 +84,14 @@ async def test_a_peer_gets_only_what_its_offer_asked_for() -> None:
 
 
 async def test_playout_delay_is_never_sent_for_sound() -> None:
-    async with running_plane() as plane, viewing(plane, ["audio"], uris={PLAYOUT_DELAY_URI: 9}) as viewer:
-        await stream(plane, viewer, "audio", sound, 4)
+    async with running_plane() as hub, viewing(hub, ["audio"], uris={PLAYOUT_DELAY_URI: 9}) as viewer:
+        await stream(hub, viewer, "audio", sound, 4)
         assert all(PLAYOUT_DELAY_URI not in received.extensions for received in viewer.of("audio"))
 
 
 async def test_surplus_sections_are_inactive_and_names_travel_in_the_answer() -> None:
     kinds = ["video", "audio", "video", "video", "audio"]
-    async with running_plane(description(cameras=2)) as plane, viewing(plane, kinds) as viewer:
+    async with running_plane(description(cameras=2)) as hub, viewing(hub, kinds) as viewer:
         assert [(s.stream, s.kind) for s in viewer.media.streams] == [
             ("camera0", "video"),
             ("microphone0", "audio"),
@@ -103,34 +103,34 @@ async def test_surplus_sections_are_inactive_and_names_travel_in_the_answer() ->
             assert f"a=msid:{name} " in viewer.answer
         mids = [t.mid for t in viewer.pc.getTransceivers()]
         assert [s.mid for s in viewer.media.streams] == mids[:3]
-        plane.feed(picture(1, 1.0, "camera1"), 1.0)
+        hub.feed(picture(1, 1.0, "camera1"), 1.0)
         await viewer.until(lambda: bool(viewer.received))
 
 
 @pytest.mark.parametrize("order", [["H264", "VP8"], ["VP8", "H264"]])
 async def test_the_offers_order_decides_the_codec(order: list[str]) -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], codecs=order) as viewer:
+    async with running_plane() as hub, viewing(hub, ["video"], codecs=order) as viewer:
         assert viewer.media.streams[0].codec == order[0]
 
 
 async def test_a_section_without_a_codec_in_common_is_inactive() -> None:
-    async with running_plane() as plane, viewing(plane, ["video", "audio"], codecs=["H264", "PCMA"]) as viewer:
+    async with running_plane() as hub, viewing(hub, ["video", "audio"], codecs=["H264", "PCMA"]) as viewer:
         assert [s.stream for s in viewer.media.streams] == ["camera0"]
 
 
 @pytest.mark.parametrize("codec", ["H264", "VP8"])
 async def test_pictures_are_decoded_by_the_peer(codec: str) -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], codecs=[codec]) as viewer:
+    async with running_plane() as hub, viewing(hub, ["video"], codecs=[codec]) as viewer:
         track = viewer.pc.getTransceivers()[0].receiver.track
-        await stream(plane, viewer, "video", picture, 5)
+        await stream(hub, viewer, "video", picture, 5)
         async with asyncio.timeout(TIMEOUT):
             frame = await track.recv()
         assert abs(int(cast(Any, frame).to_ndarray()[60, 80]) - 21) < 4
 
 
 async def test_sender_reports_reach_the_peer_and_its_answers_come_back() -> None:
-    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
-        await stream(plane, viewer, "video", picture, 2)
+    async with running_plane() as hub, viewing(hub, ["video"]) as viewer:
+        await stream(hub, viewer, "video", picture, 2)
         peer = cast(Any, viewer.pc.getTransceivers()[0].receiver)
         await viewer.until(lambda: bool(peer._RTCRtpReceiver__lsr))
         mid = viewer.media.streams[0].mid
@@ -140,14 +140,14 @@ async def test_sender_reports_reach_the_peer_and_its_answers_come_back() -> None
 
 
 async def test_a_new_epoch_gets_new_streams_and_starts_its_stamps_afresh() -> None:
-    async with running_plane() as plane:
-        async with viewing(plane, ["video"]) as viewer:
-            await stream(plane, viewer, "video", picture, 2, first=100)
-        plane.configure(description(cameras=2))
-        async with viewing(plane, ["video", "video"]) as viewer:
+    async with running_plane() as hub:
+        async with viewing(hub, ["video"]) as viewer:
+            await stream(hub, viewer, "video", picture, 2, first=100)
+        hub.configure(description(cameras=2))
+        async with viewing(hub, ["video", "video"]) as viewer:
             assert [s.stream for s in viewer.media.streams] == ["camera0", "camera1"]
-            await stream(plane, viewer, "video", picture, 2)
-            assert value(plane, "frames_dropped_total", stream="camera0", stage="stale_stamp") == 0
+            await stream(hub, viewer, "video", picture, 2)
+            assert value(hub, "frames_dropped_total", stream="camera0", stage="stale_stamp") == 0
 
 
 async def test_a_plane_that_was_never_configured_closes() -> None:
@@ -155,7 +155,7 @@ async def test_a_plane_that_was_never_configured_closes() -> None:
 
 
 async def test_bandwidth_estimates_are_kept_for_the_stream_they_are_about() -> None:
-    async with running_plane() as plane, viewing(plane, ["video"]) as viewer:
+    async with running_plane() as hub, viewing(hub, ["video"]) as viewer:
         for bitrate, ssrc in ((700_000, viewer.ssrc), (5, viewer.ssrc ^ 1)):
             fci = pack_remb_fci(bitrate, [ssrc])
             viewer.tell(bytes(RtcpPsfbPacket(fmt=15, ssrc=1, media_ssrc=0, fci=fci)))

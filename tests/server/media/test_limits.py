@@ -6,16 +6,16 @@ from tests.server.media.viewer import noise, running_plane, viewing
 
 async def test_sound_is_answered_with_the_codecs_that_the_settings_allow() -> None:
     async with (
-        running_plane(sound_codecs=("PCMU",)) as plane,
-        viewing(plane, ["audio"], codecs=("opus", "PCMU")) as viewer,
+        running_plane(sound_codecs=("PCMU",)) as hub,
+        viewing(hub, ["audio"], codecs=("opus", "PCMU")) as viewer,
     ):
         assert [info.codec for info in viewer.media.streams] == ["PCMU"]
 
 
 async def test_pictures_beyond_the_rate_are_left_out_and_counted() -> None:
-    async with running_plane(video_frames_per_second=10) as plane, viewing(plane, ["video"]) as viewer:
+    async with running_plane(video_frames_per_second=10) as hub, viewing(hub, ["video"]) as viewer:
         before = timestamps(viewer, "video")
         for number in range(1, 10):
-            plane.feed(noise(number, number / 50), number / 50)
+            hub.feed(noise(number, number / 50), number / 50)
         await viewer.until(lambda: timestamps(viewer, "video") > before)
-        assert value(plane, "frames_dropped_total", stream="camera0", stage="thinned") == 7
+        assert value(hub, "frames_dropped_total", stream="camera0", stage="thinned") == 7

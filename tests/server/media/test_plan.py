@@ -21,9 +21,9 @@ def video(codecs: str, mid: str = "0") -> str:
 
 
 async def answered(text: str, *, cameras: int = 1) -> SessionDescription:
-    async with running_plane(description(cameras=cameras)) as plane, Endpoint(["127.0.0.1"]) as endpoint:
+    async with running_plane(description(cameras=cameras)) as hub, Endpoint(["127.0.0.1"]) as endpoint:
         found = parse_offer(text)
-        return endpoint.connect(controlling=False).answer(found, plane.plan(found, trailer=False).media)
+        return endpoint.connect(controlling=False).answer(found, hub.plan(found, trailer=False).media)
 
 
 @pytest.mark.parametrize(

@@ -160,13 +160,13 @@ class Viewer:
 @asynccontextmanager
 async def running_plane(robot: RobotDescription | None = None, **settings: Any) -> AsyncIterator[MediaHub]:
     registry = CollectorRegistry()
-    plane = MediaHub(MediaSettings(**settings), registry)
-    cast(Any, plane).registry = registry  # for tests that read metrics
-    plane.configure(robot or description())
+    hub = MediaHub(MediaSettings(**settings), registry)
+    cast(Any, hub).registry = registry  # for tests that read metrics
+    hub.configure(robot or description())
     try:
-        yield plane
+        yield hub
     finally:
-        await plane.close()
+        await hub.close()
 
 
 def with_extensions(offer: str, uris: dict[str, int]) -> str:
@@ -204,7 +204,7 @@ def prefer(pc: RTCPeerConnection, codecs: Sequence[str]) -> None:
 
 @asynccontextmanager
 async def viewing(
-    plane: MediaHub,
+    hub: MediaHub,
     kinds: Sequence[str] = ("video", "audio"),
     *,
     codecs: Sequence[str] = ("H264", "opus"),
@@ -223,14 +223,14 @@ async def viewing(
         await pc.setLocalDescription(await pc.createOffer())
         offer = parse_description(with_extensions(pc.localDescription.sdp, uris or {}))
         async with Endpoint(["127.0.0.1"]) as endpoint:
-            turns = plane.turns_of(waits=not priority)
+            turns = hub.turns_of(waits=not priority)
             connection = endpoint.connect(controlling=False, turns=turns)
-            plan = plane.plan(offer, trailer=trailer, thumbnail=thumbnail)
+            plan = hub.plan(offer, trailer=trailer, thumbnail=thumbnail)
             answer = write_description(connection.answer(offer, plan.media))
             if relays:  # with what it asks for, and treated as a relay
-                media = plane.publish(connection, plan)
+                media = hub.publish(connection, plan)
             else:
-                media = plane.attach(connection, plan, priority=priority, turns=turns)
+                media = hub.attach(connection, plan, priority=priority, turns=turns)
             viewer = Viewer(pc, connection, media, answer)
             connection.listen(viewer.heard)
             _notify_of_server_input(viewer)

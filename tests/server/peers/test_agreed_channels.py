@@ -99,7 +99,7 @@ async def test_an_agreed_channel_is_told_everything_and_is_heard() -> None:
             served = rig.webrtc_peers[0]
             await peer.close()
             async with asyncio.timeout(PATIENCE):
-                await rig.services.console.peers.all_gone()
+                await rig.dependencies.console.peers.all_gone()
             assert served.ended
         finally:
             await peer.close()

@@ -125,7 +125,7 @@ def _rtcp(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _message_in(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    console = rig.services.console
+    console = rig.dependencies.console
     received = console.message_received
 
     def fail_for_it(who: Any, channel: Any, message: Any) -> None:
@@ -172,7 +172,7 @@ def _forgetting(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _seeing_off(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    people = rig.services.console.people
+    people = rig.dependencies.console.people
     left = people.left
 
     def fail_for_it(who: Any) -> None:
@@ -214,7 +214,7 @@ async def _nine_others() -> AsyncIterator[tuple[Rig, list[_Viewer]]]:
 def _faults(rig: Rig) -> dict[str, float]:
     return {
         sample.labels["where"]: sample.value
-        for family in rig.services.metrics.internal_errors.collect()
+        for family in rig.dependencies.metrics.internal_errors.collect()
         for sample in family.samples
         if sample.name.endswith("_total")
     }
@@ -230,9 +230,9 @@ async def _gone(rig: Rig, peer: WebRtcPeer) -> None:
 
 
 async def _everything_is_given_back(rig: Rig, others: list[_Viewer]) -> None:
-    await eventually(lambda: len(rig.services.console.peers) == len(others))
-    assert rig.services.console.peers.taken == len(others)
-    assert rig.services.house.endpoint.connections == len(others)
+    await eventually(lambda: len(rig.dependencies.console.peers) == len(others))
+    assert rig.dependencies.console.peers.taken == len(others)
+    assert rig.dependencies.context.endpoint.connections == len(others)
     for other in others:
         await other.goes_on()
 
@@ -266,7 +266,7 @@ async def test_a_fault_while_an_offer_is_answered_refuses_it_by_name_and_keeps_n
     async with running_rig() as rig, _watching(rig, "operator") as other:
         await other.goes_on()
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(rig.services.media, "attach", _raise)
+            patch.setattr(rig.dependencies.media, "attach", _raise)
             refused = _Viewer()
             try:
                 answer = await rig.http.post(

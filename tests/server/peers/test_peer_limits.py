@@ -25,7 +25,7 @@ LARGEST_MESSAGE = 64 * 1024  # bytes, that a peer may send
 
 def _dropped(rig: Rig, reason: str) -> int:
     """Datagrams that came to the console's port and went no further."""
-    return rig.services.house.endpoint.dropped[reason]
+    return rig.dependencies.context.endpoint.dropped[reason]
 
 
 async def test_a_message_that_never_ends_is_not_kept() -> None:
@@ -39,7 +39,7 @@ async def test_a_message_that_never_ends_is_not_kept() -> None:
             await sctp._send_chunk(chunk)
             await asyncio.sleep(0)
         async with asyncio.timeout(PATIENCE):
-            await rig.services.console.peers.all_gone()
+            await rig.dependencies.console.peers.all_gone()
         assert rig.count("lockstep_bad_input_total", where="transport", reason="message_too_large") == 1
         assert rig.count("lockstep_peers_ended_total", why="too much") == 1
         assert rig.count("lockstep_internal_errors_total", where="peer") == 0
@@ -62,7 +62,7 @@ async def test_an_observer_may_say_less_than_an_operator_but_always_stop() -> No
         for _ in range(20):
             peer.send_raw("control", '{"type":"ping","id":1}')
         peer.send_raw("control", '{"type":"stop","by":"","reason":"dog"}')
-        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
         assert rig.count("lockstep_bad_input_total", where="control", reason="flood") >= 15
 
 
@@ -72,8 +72,8 @@ async def test_a_malformed_stop_is_counted_and_stops_all_the_same_and_its_sender
         taken = await peer.until(lambda each: isinstance(each, StopTaken))
         assert isinstance(taken, StopTaken)
         assert taken.press == "my stop"
-        await eventually(lambda: rig.services.console.clock.stop.stopped)
-        stop = rig.services.console.clock.stop
+        await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
+        stop = rig.dependencies.console.clock.stop
         assert (stop.reason, len(stop.press)) == ("5", 32)
         assert rig.count("lockstep_bad_input_total", where="stop", reason="malformed") == 1
 
@@ -118,7 +118,7 @@ async def test_the_last_places_are_not_for_observers() -> None:
 async def test_one_link_cannot_take_all_places_and_leaves_a_supervisor_one() -> None:
     end = time.time() + 3600
     async with running_rig(max_peers=20, reserved_places=4) as rig:
-        peers = rig.services.console.peers
+        peers = rig.dependencies.console.peers
 
         def taken_by(identity: Identity, places: ExitStack) -> int:
             """So many places it gets."""
@@ -221,4 +221,4 @@ async def test_checks_with_false_credentials_are_not_answered_and_the_peer_goes_
             await peer.until(lambda each: each == Pong(id=3))
             with pytest.raises(BlockingIOError):
                 stranger.recv(100)
-        assert rig.services.house.endpoint.dropped.total() >= 1001
+        assert rig.dependencies.context.endpoint.dropped.total() >= 1001

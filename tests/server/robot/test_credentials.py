@@ -36,7 +36,7 @@ async def test_the_console_drives_a_bridge_with_a_secret_and_client_certificates
             link_tls_cert=authority.issue("console"),
         ) as rig:
             async with asyncio.timeout(PATIENCE):
-                await rig.services.console.robot.reached.wait()
+                await rig.dependencies.console.robot.reached.wait()
             assert bridge.links == 2  # commands and media
 
 
@@ -46,7 +46,7 @@ async def test_a_console_with_a_wrong_secret_says_so(secret: str) -> None:
         Bridge(create_robot("planar"), BridgeSettings(port=0, secret=SECRET)) as bridge,
         running_console(bridge.address[1], link_secret=secret) as rig,
     ):
-        robot = rig.services.console.robot
+        robot = rig.dependencies.console.robot
         await eventually(lambda: "unauthorised" in robot.detail)
         assert not robot.up
 

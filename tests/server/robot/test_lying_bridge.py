@@ -99,7 +99,7 @@ async def test_whatever_a_bridge_says_the_console_has_no_fault_and_keeps_the_lin
     bridge = await asyncio.start_server(_bridge, "127.0.0.1", 0)
     async with bridge, running_console(bridge.sockets[0].getsockname()[1]) as rig:
         answer = await rig.http.post("/api/recordings", headers=rig.token("operator"), json={})
-        console = rig.services.console
+        console = rig.dependencies.console
         ended: list[int] = []
         take = console.stop_taken
 
@@ -113,5 +113,7 @@ async def test_whatever_a_bridge_says_the_console_has_no_fault_and_keeps_the_lin
         assert console.robot.up
         assert console.robot.bad_input()["malformed"] > 0
         assert rig.count("lockstep_robot_link_losses_total") == 0
-        for sample in (each for metric in rig.services.metrics.internal_errors.collect() for each in metric.samples):
+        for sample in (
+            each for metric in rig.dependencies.metrics.internal_errors.collect() for each in metric.samples
+        ):
             assert not sample.name.endswith("_total") or sample.value == 0, sample

@@ -14,7 +14,7 @@ async def test_a_bridge_that_dies_shows_as_down_and_comes_back_by_itself() -> No
     async with running_bridge() as bridge:
         port, first_epoch = bridge.address[1], bridge.epoch
         async with running_console(port) as rig:
-            console = rig.services.console
+            console = rig.dependencies.console
             async with asyncio.timeout(PATIENCE):
                 await console.robot.reached.wait()
             async with rig.peer("observer") as peer:
@@ -48,7 +48,7 @@ async def test_a_stop_while_no_link_lives_is_sent_first_when_one_does() -> None:
         answer = await rig.http.post("/api/stop", headers=rig.token("observer"), json={"reason": "dog"})
         assert (answer.status_code, answer.json()["error"]) == (503, "link_down")
         async with running_bridge(port):
-            console = rig.services.console
+            console = rig.dependencies.console
             await eventually(lambda: console.clock.stop.stopped)
             assert stop_words(console.clock.stop) == ("observer", "dog")
 
@@ -58,7 +58,7 @@ async def test_a_restarted_bridge_is_stopped_again_if_the_last_one_was() -> None
         port = bridge.address[1]
         rig_context = running_console(port)
         rig = await rig_context.__aenter__()
-        console = rig.services.console
+        console = rig.dependencies.console
         async with asyncio.timeout(PATIENCE):
             await console.robot.reached.wait()
         await rig.http.post("/api/stop", headers=rig.token("observer"), json={"reason": "dog"})
@@ -75,13 +75,13 @@ async def test_a_restarted_bridge_is_stopped_again_if_the_last_one_was() -> None
 async def test_a_second_console_waits_until_the_operator_link_is_free() -> None:
     async with running_bridge() as bridge, running_console(bridge.address[1]) as first:
         async with asyncio.timeout(PATIENCE):
-            await first.services.console.robot.reached.wait()
+            await first.dependencies.console.robot.reached.wait()
         async with running_console(bridge.address[1]) as second:
-            console = second.services.console
+            console = second.dependencies.console
             await eventually(lambda: "taken" in console.robot.detail)
             answer = await second.http.post("/api/stop", headers=second.token("observer"))
             assert answer.status_code == 200, "a stop passes on the media link"
-            await eventually(lambda: first.services.console.clock.stop.stopped)
+            await eventually(lambda: first.dependencies.console.clock.stop.stopped)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ async def test_a_fault_at_what_comes_by_one_link_ends_that_one_by_name_and_leave
     failing: LinkRole, other: LinkRole, handler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with running_bridge() as bridge, running_console(bridge.address[1]) as rig:
-        console = rig.services.console
+        console = rig.dependencies.console
         keepers: Any = cast(Any, console.robot)._keepers
         await eventually(lambda: all(keeper._link is not None for keeper in keepers.values()))
         before = keepers[failing]._link, keepers[other]._link

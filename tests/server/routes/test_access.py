@@ -74,7 +74,7 @@ async def test_what_is_not_permitted_or_not_understood_is_refused(
     async with running_console(NOWHERE) as rig:
         answer = await _invite(rig, by, **wanted)
         assert (answer.status_code, answer.json()["error"]) == (status, error)
-        assert rig.services.state.invitations.known.all == []
+        assert rig.dependencies.state.invitations.known.all == []
 
 
 async def test_observers_see_no_invitations_and_revoke_none_and_only_supervisors_read_the_audit() -> None:
@@ -88,8 +88,8 @@ async def test_observers_see_no_invitations_and_revoke_none_and_only_supervisors
             answer = await rig.http.request(method, path, headers=rig.token(role))  # type: ignore[arg-type]
             assert (answer.status_code, answer.json()["error"]) == (403, "not_allowed")
             assert (await rig.http.request(method, path)).status_code == 401
-        rig.services.console.audit.flush()
-        refused = {(each.role, each.what, each.count) for each in rig.services.audit if each.kind == "refusal"}
+        rig.dependencies.console.audit.flush()
+        refused = {(each.role, each.what, each.count) for each in rig.dependencies.audit if each.kind == "refusal"}
         assert refused == {
             ("observer", "not_allowed: GET /api/invitations", 1),
             ("observer", "not_allowed: DELETE /api/invitations/{invitation_id}", 1),
@@ -111,7 +111,7 @@ async def test_of_links_that_have_ended_the_newest_are_listed_and_all_that_are_g
                 if number % 2:
                     known.revoke(None, made.id, now)
 
-        rig.services.state.invitations.update(fill)
+        rig.dependencies.state.invitations.update(fill)
         listed = (await rig.http.get("/api/invitations", headers=rig.token("supervisor"))).json()["invitations"]
         assert [each["name"] for each in listed] == ["n7", "n6", "n5", "n4", "n2", "n0"]
 
@@ -123,7 +123,7 @@ async def test_there_are_only_so_many() -> None:
             for _ in range(MAX_LIVE):
                 known.invite(None, "observer", "", 3600, time.time())
 
-        rig.services.state.invitations.update(fill)
+        rig.dependencies.state.invitations.update(fill)
         answer = await _invite(rig, "operator")
         assert (answer.status_code, answer.json()["error"]) == (409, "too_many_invitations")
 
@@ -137,8 +137,8 @@ async def test_the_audit_names_the_software_and_the_description_and_says_when_th
             Bridge(create_robot(robot), BridgeSettings(port=0)) as bridge,
             running_console(bridge.address[1], state_dir=tmp_path) as rig,
         ):
-            await rig.services.console.robot.reached.wait()
-            seen.append([each for each in rig.services.audit if each.kind in ("start", "epoch")][-2:])
+            await rig.dependencies.console.robot.reached.wait()
+            seen.append([each for each in rig.dependencies.audit if each.kind in ("start", "epoch")][-2:])
     (start, first), (_, again), (_, other) = seen
     assert start.what.startswith("console ")
     assert "page " in start.detail
@@ -158,7 +158,7 @@ async def test_a_full_disk_is_said_by_name_and_a_link_ends_all_the_same(
 
     async with running_console(NOWHERE) as rig:
         made = (await _invite(rig, "operator")).json()
-        monkeypatch.setattr(rig.services.state.directory, "write", full)
+        monkeypatch.setattr(rig.dependencies.state.directory, "write", full)
         refused = await _invite(rig, "operator")
         assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
         refused = await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
@@ -185,7 +185,7 @@ async def test_a_revocation_that_the_disk_did_not_take_is_written_as_soon_as_it_
             raise StateDirUnusable(Path("state"), "No space left on device")
 
         with monkeypatch.context() as disk:
-            disk.setattr(rig.services.state.directory, "write", full)
+            disk.setattr(rig.dependencies.state.directory, "write", full)
             answer = await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
             assert "the link has ended here" in answer.json()["detail"]
             assert "nothing was changed" not in answer.json()["detail"]
@@ -195,8 +195,8 @@ async def test_a_revocation_that_the_disk_did_not_take_is_written_as_soon_as_it_
             return {each.id for each in InvitationStore(StateDir(tmp_path)).known.all if each.revoked_at is not None}
 
         await eventually(lambda: revoked() == {made["id"], below.json()["id"]})
-        await eventually(lambda: not rig.services.state.invitations.unwritten)
-        said = [each.detail for each in rig.services.audit if each.kind == "revocation"]
+        await eventually(lambda: not rig.dependencies.state.invitations.unwritten)
+        said = [each.detail for each in rig.dependencies.audit if each.kind == "revocation"]
         assert made["id"] in said, "who tried, at once"
 
 
@@ -287,7 +287,7 @@ async def test_a_request_that_was_begun_before_its_link_was_revoked_has_no_effec
             asked = tasks.create_task(late.answer())
             await late.begun.wait()
             await eventually(lambda: rig.count("lockstep_bad_input_total") == 0)
-            known = len(rig.services.state.invitations.known.all)
+            known = len(rig.dependencies.state.invitations.known.all)
             await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
             late.go_on.set()
         answer = asked.result()
@@ -295,9 +295,9 @@ async def test_a_request_that_was_begun_before_its_link_was_revoked_has_no_effec
         if method == "PATCH":
             expected.add((404, "not_found"))  # its session ends with the link, at the same time
         assert (answer.status_code, answer.json()["error"]) in expected
-        assert len(rig.services.state.invitations.known.all) == known
-        assert not rig.services.console.clock.stop.stopped
-        await eventually(lambda: len(rig.services.console.peers) == 0)
+        assert len(rig.dependencies.state.invitations.known.all) == known
+        assert not rig.dependencies.console.clock.stop.stopped
+        await eventually(lambda: len(rig.dependencies.console.peers) == 0)
 
 
 async def test_a_link_that_another_process_has_just_revoked_invites_and_revokes_nobody(
@@ -323,10 +323,10 @@ async def test_an_expired_link_invites_nobody_though_its_request_began_before() 
         async with asyncio.TaskGroup() as tasks:
             asked = tasks.create_task(late.answer())
             await late.begun.wait()
-            await eventually(lambda: rig.services.state.invitations.now() > jwt_end(token))
+            await eventually(lambda: rig.dependencies.state.invitations.now() > jwt_end(token))
             late.go_on.set()
         assert asked.result().json()["error"] == "link_expired"
-        assert rig.services.state.invitations.known.all == []
+        assert rig.dependencies.state.invitations.known.all == []
 
 
 def jwt_end(token: str) -> float:
@@ -358,8 +358,8 @@ async def test_while_the_list_of_links_cannot_be_read_nobody_gets_in_and_everybo
     async with running_rig(state_dir=tmp_path) as rig, rig.peer("operator") as peer:
         await _invite(rig, "operator")
         good = (tmp_path / "invitations.json").read_bytes()
-        rig.services.state.directory.write("invitations.json", b"rubbish")
-        await eventually(lambda: bool(rig.services.state.invitations.trouble))
+        rig.dependencies.state.directory.write("invitations.json", b"rubbish")
+        await eventually(lambda: bool(rig.dependencies.state.invitations.trouble))
         refused = await rig.http.get("/api/session", headers=rig.token("supervisor"))
         assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
         assert "lockstep_links_unreadable 1.0" in (await rig.http.get("/metrics")).text
@@ -369,8 +369,8 @@ async def test_while_the_list_of_links_cannot_be_read_nobody_gets_in_and_everybo
         async with asyncio.timeout(PATIENCE):
             await peer.closed.wait()
         await eventually(lambda: rig.count("lockstep_peers_ended_total", why="links unreadable") == 1)
-        rig.services.state.directory.write("invitations.json", good)
-        await eventually(lambda: not rig.services.state.invitations.trouble)
+        rig.dependencies.state.directory.write("invitations.json", good)
+        await eventually(lambda: not rig.dependencies.state.invitations.trouble)
         assert (await rig.http.get("/api/session", headers=rig.token("observer"))).status_code == 200
         assert "lockstep_links_unreadable 0.0" in (await rig.http.get("/metrics")).text
 
@@ -389,7 +389,7 @@ async def test_what_another_process_revokes_ends_here_within_seconds_and_is_reco
         finally:
             await peer.close()
         assert not other.closed.is_set()
-        records = [each for each in rig.services.audit if each.kind in ("invitation", "revocation")]
+        records = [each for each in rig.dependencies.audit if each.kind in ("invitation", "revocation")]
         assert [(each.kind, each.who) for each in records] == [
             ("invitation", "command line"),
             ("revocation", "command line"),
@@ -484,10 +484,10 @@ async def test_the_audit_has_pages_and_the_event_references() -> None:
         peer.send("session", SeatTake())
         peer.send("stop", Stop(reason="a person came in"))
         observer = rig.token("observer")
-        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
         for _ in range(20):
             await rig.http.post("/api/stop", headers=observer, json={"press": "0123456789abcdef" * 2})
-        await eventually(lambda: any(record.what == "http, again" for record in rig.services.audit))
+        await eventually(lambda: any(record.what == "http, again" for record in rig.dependencies.audit))
         headers = rig.token("supervisor")
         page = (await rig.http.get("/api/audit?after=0&limit=2", headers=headers)).json()
         assert [record["n"] for record in page["records"]] == [1, 2]
@@ -501,7 +501,7 @@ async def test_the_audit_has_pages_and_the_event_references() -> None:
         assert (stop["who"], stop["role"], stop["detail"]) == ("supervisor", "supervisor", "a person came in")
         assert re.match(r"stop, stop \d+", stop["what"])
         assert stop["event"] >= 1
-        assert stop["epoch"] == rig.services.console.clock.epoch
+        assert stop["epoch"] == rig.dependencies.console.clock.epoch
         seat = next(record for record in rest["records"] if record["kind"] == "seat")
         assert (seat["who"], seat["what"]) == ("supervisor", "taken")
         for wrong in ("limit=0", "limit=501", "after=x"):
@@ -512,9 +512,9 @@ async def test_the_audit_goes_on_over_a_restart(tmp_path: Path) -> None:
     for run in (1, 2):
         async with running_console(NOWHERE, state_dir=tmp_path) as rig:
             await rig.http.post("/api/stop", headers=rig.token("observer"), json={"reason": str(run)})
-            stops = [record for record in rig.services.audit if record.kind == "stop"]
+            stops = [record for record in rig.dependencies.audit if record.kind == "stop"]
             assert [record.detail for record in stops] == [str(each) for each in range(1, run + 1)]
-    numbers = [record.n for record in rig.services.audit]
+    numbers = [record.n for record in rig.dependencies.audit]
     assert numbers == list(range(1, len(numbers) + 1))
 
 

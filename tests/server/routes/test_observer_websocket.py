@@ -45,7 +45,7 @@ async def test_a_line_tells_all_that_data_channels_tell_and_pictures_are_somebod
         assert (welcome.role, welcome.streams, welcome.voice) == ("observer", [], "")
         session = await rig.session()
         assert [(each["peer"], each["carrier"]) for each in session["participants"]] == [(welcome.peer, "trailer")]
-        assert next(iter(rig.services.console.peers)) not in rig.services.console.peers.observers()
+        assert next(iter(rig.dependencies.console.peers)) not in rig.dependencies.console.peers.observers()
 
 
 async def test_pings_reports_notes_names_and_stop_go_over_a_line_as_over_data_channels() -> None:
@@ -96,7 +96,7 @@ async def test_only_observers_get_a_ticket_and_only_for_a_relay_that_there_is() 
         assert (await rig.http.post("/api/watch?relay=0")).status_code == 401
         foreign = {**rig.token("observer"), "Origin": "https://evil.example"}
         assert (await rig.http.post("/api/watch?relay=0", headers=foreign)).status_code == 403
-        assert len(rig.services.console.peers) == 0
+        assert len(rig.dependencies.console.peers) == 0
 
 
 async def test_a_ticket_opens_one_line_and_a_made_up_or_returned_one_none() -> None:
@@ -105,7 +105,7 @@ async def test_a_ticket_opens_one_line_and_a_made_up_or_returned_one_none() -> N
         async with joined(address(rig, used)) as socket:
             await TestLine(socket, {}).until(lambda each: isinstance(each, Welcome))
             assert await _refused(address(rig, used)) == 403
-            assert len(rig.services.console.peers) == 1
+            assert len(rig.dependencies.console.peers) == 1
         for made_up in ("x", "a" * 22, "%00"):
             assert await _refused(address(rig, made_up)) == 403
         headers = rig.token("observer")
@@ -133,7 +133,7 @@ async def test_a_ticket_that_nobody_uses_gives_its_place_back(monkeypatch: pytes
         used = await ticket(rig)
         full = await rig.http.post("/api/watch?relay=0", headers=rig.token("observer"))
         assert (full.status_code, full.json()["error"]) == (503, "too_many_peers")
-        await eventually(lambda: len(rig.services.console.peers) == 0)
+        await eventually(lambda: len(rig.dependencies.console.peers) == 0)
         assert rig.count("lockstep_peers_ended_total", why="never connected") == 1
         assert await _refused(address(rig, used)) == 403
         await ticket(rig)
@@ -150,7 +150,7 @@ async def test_hundreds_of_tickets_cost_one_link_its_own_places_and_nobody_elses
         answers = [await rig.http.post("/api/watch?relay=0", headers=headers) for _ in range(300)]
         assert [each.status_code for each in answers].count(201) == 20
         assert {each.json()["error"] for each in answers if each.status_code != 201} == {"too_many_requests"}
-        assert len(rig.services.console.peers) == 20
+        assert len(rig.dependencies.console.peers) == 20
         async with open_line(rig) as line:
             await line.until(lambda each: isinstance(each, Welcome))
 
@@ -190,7 +190,7 @@ async def test_a_flood_is_not_answered_and_a_stop_in_it_is_heard() -> None:
 
 async def _until_too_much(rig: Rig, line: TestLine, name: str) -> None:
     await line.ended()
-    await eventually(lambda: len(rig.services.console.peers) == 0)
+    await eventually(lambda: len(rig.dependencies.console.peers) == 0)
     assert rig.count("lockstep_bad_input_total", where="transport", reason=name) == 1
     assert rig.count("lockstep_peers_ended_total", why="too much") == 1
 
@@ -252,7 +252,7 @@ async def test_a_remote_that_does_not_read_is_closed_and_costs_the_others_nothin
             address(rig, await ticket(rig, headers)), sock=small, proxy=None, ping_interval=None, close_timeout=0.1
         ) as deaf:
             deaf.transport.pause_reading()
-            console = rig.services.console
+            console = rig.dependencies.console
             peer = next(each for each in console.peers if each.identity.token_id != _token_of(reader, rig))
             await eventually(lambda: peer.connected)
             async with asyncio.TaskGroup() as tasks:
@@ -305,7 +305,7 @@ async def test_who_closes_the_line_leaves_at_once() -> None:
     async with running_rig(**RELAYED) as rig:
         async with open_line(rig) as line:
             await line.until(lambda each: isinstance(each, Welcome))
-        await eventually(lambda: len(rig.services.console.peers) == 0)
+        await eventually(lambda: len(rig.dependencies.console.peers) == 0)
         assert rig.count("lockstep_peers_ended_total", why="line closed") == 1
 
 

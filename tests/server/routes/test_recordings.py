@@ -119,9 +119,9 @@ async def test_a_link_reads_nothing_that_was_recorded_before_it_was_made_and_all
         supervisor = rig.token("supervisor")
         assert (await rig.http.get(f"{base}/chunks/0", headers=supervisor)).status_code == 200
         assert (await rig.http.delete(base, headers=supervisor)).status_code == 200
-        rig.services.console.audit.flush(beyond=True)
+        rig.dependencies.console.audit.flush(beyond=True)
         refused = Counter[str]()
-        for each in rig.services.audit:
+        for each in rig.dependencies.audit:
             if each.kind == "refusal":
                 assert each.link
                 refused[f"{each.role}, {each.what}"] += each.count
@@ -137,7 +137,7 @@ async def test_a_link_reads_nothing_that_was_recorded_before_it_was_made_and_all
             f"operator, {route}/file": 2,
             "operator, not_allowed: POST /api/recordings/{recording_id}/ticket": 1,
         }
-        audit = [each for each in rig.services.audit if each.kind in ("recording", "reading")]
+        audit = [each for each in rig.dependencies.audit if each.kind in ("recording", "reading")]
         done = [(each.role, each.what, each.detail) for each in audit if each.kind == "recording"]
         assert done == [*[("operator", "downloaded", "one")] * 2, ("supervisor", "deleted", "one")]
         read = Counter[str]()  # a busy machine needs more than one record of them
@@ -183,18 +183,18 @@ async def test_who_starts_and_ends_a_recording_is_audited_and_an_automatic_one_e
 ) -> None:
     settings = RecordingSettings(directory=tmp_path, free_bytes=0, automatic=True)
     async with running_rig(recording=settings) as rig, rig.peer("operator") as peer:
-        recorder = rig.services.recorder
+        recorder = rig.dependencies.recorder
         await eventually(lambda: recorder.state().state == "recording")
         refused = await rig.http.post("/api/recordings/stop", headers=rig.token("operator"))
         assert (refused.status_code, refused.json()["error"]) == (403, "not_allowed")
         assert recorder.state().state == "recording"
         peer.send("session", SeatRequest())
-        await eventually(lambda: bool(rig.services.console.seat.rules.holder))
+        await eventually(lambda: bool(rig.dependencies.console.seat.rules.holder))
         assert (await rig.http.post("/api/recordings/stop", headers=rig.token("operator"))).status_code == 403
         assert (await rig.http.post("/api/recordings/stop", headers=peer.headers)).json()["state"] == "off"
         started = (await rig.http.post("/api/recordings", headers=rig.token("operator"))).json()["recording"]
         assert (await rig.http.post("/api/recordings/stop", headers=rig.token("operator"))).status_code == 200
-        audit = [each for each in rig.services.audit if each.kind == "recording"]
+        audit = [each for each in rig.dependencies.audit if each.kind == "recording"]
         assert [(each.role, each.what) for each in audit] == [
             ("", "started by itself"),
             *[("operator", "ended"), ("operator", "started"), ("operator", "ended")],
@@ -342,12 +342,12 @@ async def test_what_records_by_itself_and_fails_does_not_begin_again_at_once(
     async with running_rig(recording=settings) as rig, rig.peer("observer", "session") as peer:
 
         def failures() -> list[str]:
-            return [each.what for each in rig.services.audit if each.kind == "recording" and each.what == "failed"]
+            return [each.what for each in rig.dependencies.audit if each.kind == "recording" and each.what == "failed"]
 
         await peer.until(lambda each: isinstance(each, RecordingState) and each.state == "failed")
         await eventually(lambda: len(failures()) == 1)
         await rig.http.post("/api/recordings", headers=rig.token("operator"))
         await eventually(lambda: len(failures()) >= 2)
-        begun = [each.what for each in rig.services.audit if each.kind == "recording" and "started" in each.what]
+        begun = [each.what for each in rig.dependencies.audit if each.kind == "recording" and "started" in each.what]
         assert begun == ["started by itself", "started"]
         assert not [each for each in os.listdir(tmp_path) if each.endswith(".mcap")]

@@ -59,7 +59,7 @@ async def test_an_observer_can_stop_and_only_the_holder_of_the_seat_or_a_supervi
         assert (answer.status_code, answer.json()["delivered"]) == (200, True)
         assert stop_words(await _stop_state(rig, stopped=True)) == ("observer", "dog in the room")
         assert (await rig.session())["stopped"] is True
-        number = rig.services.console.clock.stop.number
+        number = rig.dependencies.console.clock.stop.number
         assert answer.json()["number"] == number
         for token, error in ((rig.token("observer"), "not_allowed"), (rig.token("operator"), "no_seat")):
             refused = await rig.http.post("/api/reset", headers=token, json={"number": number})
@@ -75,7 +75,9 @@ async def test_an_observer_can_stop_and_only_the_holder_of_the_seat_or_a_supervi
         nameless = await rig.http.post("/api/reset", headers=headers)
         assert (nameless.status_code, nameless.json()["error"]) == (400, "bad_json")
         assert (await rig.session())["stopped"] is True
-        await reset_by_http(rig.http, "/api/reset", rig.token("supervisor"), lambda: rig.services.console.clock.stop)
+        await reset_by_http(
+            rig.http, "/api/reset", rig.token("supervisor"), lambda: rig.dependencies.console.clock.stop
+        )
         await _stop_state(rig, stopped=False)
         assert rig.count("lockstep_stops_total", where="http") == stops
 
@@ -86,7 +88,7 @@ async def test_whoever_stops_over_http_is_told_whether_the_stop_is_on_the_robots
 ) -> None:
     settings = BridgeSettings(port=0, state_dir=tmp_path if keeps else None)
     async with Bridge(create_robot("planar"), settings) as bridge, running_console(bridge.address[1]) as rig:
-        await eventually(lambda: rig.services.console.robot.up)
+        await eventually(lambda: rig.dependencies.console.robot.up)
         answer = await rig.http.post("/api/stop", headers=rig.token("observer"))
         assert (answer.json()["delivered"], answer.json()["kept"]) == (True, keeps)
 
@@ -99,7 +101,9 @@ async def test_a_press_whose_stop_was_reset_stops_nothing_and_says_so() -> None:
             answer = await rig.http.post("/api/stop", headers=headers, json={**wanted, "press": press})
             assert answer.status_code == 200
         await _stop_state(rig, stopped=True)
-        await reset_by_http(rig.http, "/api/reset", rig.token("supervisor"), lambda: rig.services.console.clock.stop)
+        await reset_by_http(
+            rig.http, "/api/reset", rig.token("supervisor"), lambda: rig.dependencies.console.clock.stop
+        )
         await _stop_state(rig, stopped=False)
         used = await rig.http.post("/api/stop", headers=headers, json={**wanted, "press": press})
         assert (used.status_code, used.json()["error"]) == (409, "press_used")

@@ -41,8 +41,8 @@ async def _real_offer(*, video: bool = False) -> str:
 
 async def _until_no_peers(rig: Rig) -> None:
     async with asyncio.timeout(PATIENCE):
-        await rig.services.console.peers.all_gone()
-    assert len(rig.services.console.peers) == 0
+        await rig.dependencies.console.peers.all_gone()
+    assert len(rig.dependencies.console.peers) == 0
 
 
 async def test_an_offer_is_answered_and_the_resource_can_be_deleted() -> None:
@@ -170,7 +170,7 @@ async def test_what_is_no_offer_is_refused_by_name(
         answer = await _post(rig, content, **headers)
         assert (answer.status_code, answer.json()["error"]) == (status, name)
         assert rig.count("lockstep_bad_input_total", where="http", reason=name) == 1
-        assert len(rig.services.console.peers) == 0
+        assert len(rig.dependencies.console.peers) == 0
 
 
 async def test_a_content_type_may_have_parameters_and_any_case() -> None:
@@ -231,7 +231,7 @@ async def test_a_player_without_channels_is_not_ended_for_its_silence() -> None:
                     await connected.wait()
             with pytest.raises(TimeoutError):
                 async with asyncio.timeout(0.5):
-                    await rig.services.console.peers.all_gone()
+                    await rig.dependencies.console.peers.all_gone()
         finally:
             await player.close()
 
@@ -280,13 +280,13 @@ async def test_only_what_an_observer_sends_waits_for_its_turn(
     """A supervisor may drive, and says STOP on a channel as an operator does."""
     async with running_rig() as rig:
         connected: list[dict[str, Any]] = []
-        connect = rig.services.house.endpoint.connect
+        connect = rig.dependencies.context.endpoint.connect
 
         async def noted(*arguments: Any, **named: Any) -> Any:
             connected.append(named)
             return await connect(*arguments, **named)
 
-        monkeypatch.setattr(rig.services.house.endpoint, "connect", noted)
+        monkeypatch.setattr(rig.dependencies.context.endpoint, "connect", noted)
         headers = {**rig.token(role), **SDP}
         assert (await rig.http.post("/whep", content=await _real_offer(), headers=headers)).status_code == 201
     (named,) = connected
@@ -331,14 +331,14 @@ async def test_a_refusal_names_the_section_and_what_it_lacks(line: str, words: s
 
 async def test_whoever_wants_all_streams_is_told_when_an_offer_has_too_few_sections_for_them() -> None:
     async with running_rig() as rig:
-        kinds = [stream.kind for stream in rig.services.media.offers]
+        kinds = [stream.kind for stream in rig.dependencies.media.offers]
         enough = offer(*(section(f"{number}", kind) for number, kind in enumerate(kinds)))
         missing = offer(
             *(section(f"{number}", kind) for number, kind in enumerate(kinds[:-1])), section("9", "application")
         )
         answer = await _post(rig, missing, "/whep?sections=all")
         assert (answer.status_code, answer.json()["error"]) == (409, "too_few_sections")
-        assert len(rig.services.console.peers) == 0
+        assert len(rig.dependencies.console.peers) == 0
         assert (await _post(rig, missing)).status_code == 201
         assert (await _post(rig, enough, "/whep?sections=all")).status_code == 201
         assert (await _post(rig, enough, "/whep?sections=some")).status_code == 422
@@ -354,7 +354,7 @@ async def test_an_offer_that_cannot_be_answered_in_time_leaves_no_connection(mon
             headers = {**rig.token("operator"), "Content-Type": "application/sdp"}
             answer = await rig.http.post("/whep", content=offer(section("0")), headers=headers)
             assert (answer.status_code, answer.json()["error"]) == (400, "bad_sdp")
-            assert len(rig.services.console.peers) == 0
+            assert len(rig.dependencies.console.peers) == 0
             monkeypatch.setattr("lockstep.server.routes.whep.NEGOTIATION_TIMEOUT", 10.0)
             answer = await rig.http.post("/whep", content=offer(section("0")), headers=headers)
             assert answer.status_code == 201, "what was given up holds nobody up"

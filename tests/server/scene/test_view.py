@@ -74,7 +74,7 @@ async def test_viser_is_started_once_for_the_first_who_open_the_scene(monkeypatc
 
     monkeypatch.setattr(server, "start_viser", count)
     async with running_rig(view=True) as rig:
-        view = rig.services.scene_or_error()
+        view = rig.dependencies.scene_or_error()
         assert (view.port, starts) == (0, [])
         await asyncio.gather(*(_scene_url(rig) for _ in range(5)))
         assert view.port
@@ -152,7 +152,7 @@ async def test_whoever_is_revoked_while_the_scene_starts_gets_no_page_ticket_or_
             waiting.release()
             await starts.wait()
 
-        monkeypatch.setattr(rig.services.scene_or_error(), "open", slow)
+        monkeypatch.setattr(rig.dependencies.scene_or_error(), "open", slow)
         connecting = connect(path.split("websocket=")[1].split("&")[0], subprotocols=[VERSION], proxy=None)
         stream = asyncio.create_task(connecting.__aenter__())
         asked = [asyncio.create_task(each) for each in (rig.http.get(path), rig.http.post("/api/scene", headers=token))]
@@ -190,7 +190,7 @@ async def test_a_scene_that_is_open_ends_when_its_link_expires_and_no_other_open
 async def test_the_page_of_the_scene_comes_from_memory_and_asks_nobody() -> None:
     async with running_rig(view=True) as rig:
         path, _ = await _scene_url(rig)
-        rig.services.scene_or_error().port = 1  # where nobody listens
+        rig.dependencies.scene_or_error().port = 1  # where nobody listens
         for encoding in ("gzip", "identity"):
             answer = await rig.http.get(path, headers={"Accept-Encoding": encoding})
             assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")

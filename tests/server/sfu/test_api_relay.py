@@ -17,14 +17,14 @@ async def test_operators_and_supervisors_are_never_sent_to_a_relay_and_wait_for_
         for role in ("operator", "supervisor"):
             answer = await rig.http.get("/api/relay", headers=rig.token(role))
             assert answer.json() == {"relay": None}
-        assert not rig.services.relays._wanted.is_set()
+        assert not rig.dependencies.relays._wanted.is_set()
 
 
 async def test_an_observer_is_served_directly_when_no_relay_can_be_reached() -> None:
     async with running_rig(relay=NOWHERE, observers_direct=0) as rig:
         answer = await rig.http.get("/api/relay", headers=rig.token("observer"), timeout=WAIT_SECONDS + 10)
         assert answer.json() == {"relay": None}
-        station = rig.services.relays.stations[0]
+        station = rig.dependencies.relays.stations[0]
         assert station.trouble.startswith("unreachable")
 
 
@@ -32,7 +32,7 @@ async def test_the_relay_is_asked_for_only_when_the_console_serves_enough_itself
     async with running_rig(relay=NOWHERE, observers_direct=5) as rig:
         answer = await rig.http.get("/api/relay", headers=rig.token("observer"))
         assert answer.json() == {"relay": None}
-        assert not rig.services.relays._wanted.is_set()
+        assert not rig.dependencies.relays._wanted.is_set()
 
 
 async def test_without_a_token_nobody_is_told_of_a_relay() -> None:
@@ -48,9 +48,9 @@ async def test_the_page_may_connect_to_its_relays_and_nowhere_else() -> None:
 
 async def test_an_observer_behind_a_relay_gets_no_feedback_from_the_console() -> None:
     async with running_rig(relay=NOWHERE) as rig, rig.peer("observer") as peer:
-        known = next(iter(rig.services.console.peers))
-        assert known in rig.services.console.peers.observers()
+        known = next(iter(rig.dependencies.console.peers))
+        assert known in rig.dependencies.console.peers.observers()
         known.relay = "0"
-        assert known not in rig.services.console.peers.observers()
-        assert rig.services.relays in rig.services.console.peers.observers()
+        assert known not in rig.dependencies.console.peers.observers()
+        assert rig.dependencies.relays in rig.dependencies.console.peers.observers()
         await peer.feedback()

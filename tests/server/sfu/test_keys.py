@@ -41,7 +41,7 @@ class _Hall:
         self.ended: set[str] = set()
         self.now = 100.0
         settings = RelaySettings(relay=("janus:ws://a.example/1",), observers_direct=0)
-        self.desk = SfuCoordinator(settings, self.relays, lambda: self.here, self.has_ended, lambda: self.now)
+        self.coordinator = SfuCoordinator(settings, self.relays, lambda: self.here, self.has_ended, lambda: self.now)
 
     def has_ended(self, link: str, expires: float) -> bool:
         return link in self.ended or self.now >= expires
@@ -54,7 +54,7 @@ class _Hall:
     async def another(self, known: Publication) -> Publication:
         """The publication that follows."""
         async with asyncio.timeout(20):
-            while self.relays.carrying.get("0", known) is known or not self.desk.stations[0].live:  # noqa: ASYNC110
+            while self.relays.carrying.get("0", known) is known or not self.coordinator.stations[0].live:  # noqa: ASYNC110
                 await asyncio.sleep(0)
         return self.relays.carrying["0"]
 
@@ -65,8 +65,8 @@ async def _hall(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[_Hall]:
     hall = _Hall()
     hall.watch("first")
     async with asyncio.TaskGroup() as tasks:
-        asked = tasks.create_task(hall.desk.ticket(None, ""))
-        running = tasks.create_task(hall.desk.run())
+        asked = tasks.create_task(hall.coordinator.ticket(None, ""))
+        running = tasks.create_task(hall.coordinator.run())
         await hall.relays.until_carried_by("0")
         await asked
         yield hall
@@ -77,7 +77,7 @@ async def test_when_the_link_of_anybody_who_has_the_key_ends_it_is_made_anew(mon
     async with _hall(monkeypatch) as hall:
         watcher = hall.watch("mallory")
         first = hall.relays.carrying["0"]
-        ticket = hall.desk.key(watcher)
+        ticket = hall.coordinator.key(watcher)
         assert isinstance(ticket, RelayTicket)
         assert ticket.pin == str(first.feed)
         hall.here.remove(watcher)  # the line is closed, the key is kept
@@ -92,7 +92,7 @@ async def test_when_the_link_of_somebody_who_has_the_key_expires_it_is_made_anew
 ) -> None:
     async with _hall(monkeypatch) as hall:
         first = hall.relays.carrying["0"]
-        hall.desk.key(hall.watch("mallory", expires=hall.now + 5))
+        hall.coordinator.key(hall.watch("mallory", expires=hall.now + 5))
         hall.now += 6
         second = await hall.another(first)
         assert first.why == coordinator.ENDED
@@ -103,7 +103,7 @@ async def test_the_end_of_a_link_whose_holder_never_had_the_key_disturbs_nobody(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async with _hall(monkeypatch) as hall:
-        hall.desk.key(hall.here[0])
+        hall.coordinator.key(hall.here[0])
         hall.ended.add("stranger")
         for _ in range(5):
             await asyncio.sleep(coordinator.LOOK_SECONDS)
@@ -116,7 +116,7 @@ async def test_who_keeps_the_key_and_leaves_is_shut_out_after_a_while_and_not_ev
     async with _hall(monkeypatch) as hall:
         first = hall.relays.carrying["0"]
         watcher = hall.watch("mallory")
-        hall.desk.key(watcher)
+        hall.coordinator.key(watcher)
         hall.here.remove(watcher)
         hall.now += coordinator.STRAY_SECONDS + 1
         for _ in range(5):
@@ -125,7 +125,7 @@ async def test_who_keeps_the_key_and_leaves_is_shut_out_after_a_while_and_not_ev
         hall.now += coordinator.RENEW_SECONDS
         second = await hall.another(first)
         assert first.why == coordinator.STRAY
-        hall.desk.key(hall.here[0])
+        hall.coordinator.key(hall.here[0])
         hall.now += coordinator.RENEW_SECONDS + coordinator.STRAY_SECONDS
         for _ in range(5):
             await asyncio.sleep(coordinator.LOOK_SECONDS)
@@ -136,4 +136,4 @@ async def test_a_relay_that_carries_nothing_has_no_key(monkeypatch: pytest.Monke
     async with _hall(monkeypatch) as hall:
         watcher = hall.watch("late")
         watcher.relay = "7"
-        assert hall.desk.key(watcher) is None
+        assert hall.coordinator.key(watcher) is None

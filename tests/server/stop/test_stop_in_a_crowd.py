@@ -31,7 +31,7 @@ async def test_it_waits_behind_the_crowd_on_its_channel_and_for_nobody_over_http
     """What the page does: it says each press on its channels and over HTTP at the same moment."""
     crowd = [_Talker() for _ in range(CROWD)]
     async with running_rig() as rig, rig.peer("observer") as peer:
-        turns = rig.services.media._turns
+        turns = rig.dependencies.media._turns
         monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)  # one datagram in each turn of the loop
         for each in crowd:
             turns.add(each)
@@ -41,7 +41,7 @@ async def test_it_waits_behind_the_crowd_on_its_channel_and_for_nobody_over_http
         rounds = (sum(each.handled for each in crowd) - before) / CROWD
         assert (answer.status_code, answer.json()["press"]) == (200, PRESS)
         assert rounds < 1, "it did not even wait for each of them once"
-        assert rig.services.console.peers.taken == 1
+        assert rig.dependencies.console.peers.taken == 1
         for each in crowd:
             each.goes_on = False
         async with asyncio.timeout(PATIENCE):
@@ -56,7 +56,7 @@ async def test_of_whoever_may_drive_it_waits_for_no_crowd_on_its_channel_either(
 ) -> None:
     crowd = [_Talker() for _ in range(CROWD)]
     async with running_rig() as rig, rig.peer(role) as peer:
-        turns = rig.services.media._turns
+        turns = rig.dependencies.media._turns
         monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)
         for each in crowd:
             turns.add(each)
@@ -79,9 +79,9 @@ async def test_of_operators_who_flood_only_whoever_drives_does_not_wait_for_the_
         driver.send("session", SeatRequest())
         async with asyncio.timeout(PATIENCE):
             await driver.until(lambda each: isinstance(each, Seat) and each.holder != "")
-        turns = rig.services.media._turns
+        turns = rig.dependencies.media._turns
         monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)
-        monkeypatch.setattr(rig.services.media._not_driving, "take", lambda now: False)  # others have sent too much
+        monkeypatch.setattr(rig.dependencies.media._not_driving, "take", lambda now: False)  # others have sent too much
         for each in crowd:
             turns.add(each)
         rounds = []

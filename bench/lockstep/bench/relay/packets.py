@@ -40,7 +40,7 @@ def cpu_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-async def feed(plane: MediaHub, camera: str) -> None:
+async def feed(hub: MediaHub, camera: str) -> None:
     """Pictures that no encoder can make small."""
     noise, began, stamp = np.random.default_rng(1), time.monotonic(), 0
     while True:
@@ -50,7 +50,7 @@ async def feed(plane: MediaHub, camera: str) -> None:
         picture = Media(
             stream=camera, codec="yuv420p", stamp=stamp, time=now - began, payload=payload, width=WIDTH, height=HEIGHT
         )
-        plane.feed(picture, now)
+        hub.feed(picture, now)
         await asyncio.sleep(1 / RATE)
 
 
@@ -84,18 +84,16 @@ class _Connect:
 async def measure(host: str, pid: int) -> list[tuple[int, float]]:
     """Packets and seconds of processor time, for each number of subscribers."""
     camera = Camera(name="noise", label="Noise", width=WIDTH, height=HEIGHT, frame_rate=RATE)
-    plane = MediaHub(MediaSettings(), CollectorRegistry())
-    plane.configure(RobotDescription(name="noise", label="Noise", axes=(), cameras=(camera,)))
+    hub = MediaHub(MediaSettings(), CollectorRegistry())
+    hub.configure(RobotDescription(name="noise", label="Noise", axes=(), cameras=(camera,)))
     url, counts, found = f"ws://{host}:{PORT}", [0], []
     watchers: list[RelayMedia] = []
     async with (
         Endpoint([host]) as endpoint,
         open_janus(url) as session,
-        publish(
-            session, lambda each: JanusRoom(each, ROOM, KEYS), _Connect(endpoint), plane, FEED, "VP8"
-        ) as publication,
+        publish(session, lambda each: JanusRoom(each, ROOM, KEYS), _Connect(endpoint), hub, FEED, "VP8") as publication,
     ):
-        feeding = [asyncio.create_task(feed(plane, camera.name)), asyncio.create_task(_talk(publication))]
+        feeding = [asyncio.create_task(feed(hub, camera.name)), asyncio.create_task(_talk(publication))]
         ticket = RelayTicket(
             engine="janus", relay="0", url=url, room=ROOM, pin=KEYS.pin, feed=FEED, streams=publication.streams
         )
@@ -112,7 +110,7 @@ async def measure(host: str, pid: int) -> list[tuple[int, float]]:
         await asyncio.gather(*feeding, return_exceptions=True)
         for watcher in watchers:
             await watcher.close()
-    await plane.close()
+    await hub.close()
     return found
 
 

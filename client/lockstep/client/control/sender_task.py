@@ -15,8 +15,8 @@ __all__ = ["Driver"]
 class Driver:
     """Sends the pilot's commands and rests, at once and at the right times."""
 
-    def __init__(self, pilot: CommandSender, send: Callable[[Command | Rest], None]) -> None:
-        self.pilot = pilot
+    def __init__(self, sender: CommandSender, send: Callable[[Command | Rest], None]) -> None:
+        self.sender = sender
         self.picture_delay = PictureDelay()
         self._send = send
         self._loop = asyncio.get_running_loop()
@@ -27,23 +27,23 @@ class Driver:
 
     def feedback(self, feedback: Feedback) -> bool:
         """Take a feedback; whether it is newer than all before."""
-        newer = self.pilot.feedback(feedback, self._loop.time())
+        newer = self.sender.feedback(feedback, self._loop.time())
         self.pump()
         return newer
 
     def refusal(self, refusal: Refusal) -> None:
-        self.pilot.refusal(refusal)
+        self.sender.refusal(refusal)
         self.pump()
 
     def shown(self, stamp: int) -> None:
         """A picture of the main camera is on screen."""
         self.picture_delay.shown(stamp, self._loop.time())
-        self.pilot.shown(stamp)
+        self.sender.shown(stamp)
         self.pump()
 
     def loss(self) -> None:
         """A message of this connection was lost."""
-        self.pilot.loss(self._loop.time())
+        self.sender.loss(self._loop.time())
 
     async def drive(self, values: Sequence[float]) -> Feedback:
         """Send `values` as soon as the gate opens; the feedback that answers.
@@ -54,25 +54,25 @@ class Driver:
             ConsoleLost: the connection ended.
         """
         answered: asyncio.Future[Feedback] = self._future()
-        self._waiting.append((self.pilot.intend(values, self._loop.time()), answered))
+        self._waiting.append((self.sender.intend(values, self._loop.time()), answered))
         self.pump()
         return await answered
 
     async def arm(self) -> Feedback:
         """Send a neutral command; the feedback that answers it. Raises as `drive`."""
         answered: asyncio.Future[Feedback] = self._future()
-        self._waiting.append((self.pilot.arm(), answered))
+        self._waiting.append((self.sender.arm(), answered))
         self.pump()
         return await answered
 
     def hold_back(self, reason: RefusalReason) -> None:
         """The robot may not move until the program arms again."""
-        self.pilot.hold_back(reason)
+        self.sender.hold_back(reason)
         self.pump()
 
     async def rest(self) -> None:
         """Rest at once; returns when the robot is proven to be at rest. Raises ConsoleLost."""
-        self.pilot.rest(self._loop.time())
+        self.sender.rest(self._loop.time())
         rested: asyncio.Future[None] = self._future()
         self._rested.append(rested)
         self.pump()
@@ -91,17 +91,17 @@ class Driver:
         if self._lost is not None:
             return
         now = self._loop.time()
-        for message in self.pilot.due(now):
+        for message in self.sender.due(now):
             self._send(message)
-        while self.pilot.sent_at:
-            self.picture_delay.sent(*self.pilot.sent_at.popleft())
+        while self.sender.sent_at:
+            self.picture_delay.sent(*self.sender.sent_at.popleft())
         self._hand_out()
-        wake_at = self.pilot.wake_at(now)
+        wake_at = self.sender.wake_at(now)
         if wake_at < float("inf"):
             self._timer = self._loop.call_at(wake_at, self.pump)
 
     def _hand_out(self) -> None:
-        for outcome in self.pilot.outcomes():
+        for outcome in self.sender.outcomes():
             while self._waiting and self._waiting[0][0] <= outcome.ticket:
                 _, waiting = self._waiting.pop(0)
                 if waiting.done():
@@ -110,7 +110,7 @@ class Driver:
                     waiting.set_result(outcome.feedback)
                 elif outcome.refusal is not None:
                     waiting.set_exception(_error(outcome.refusal))
-        if not self.pilot.resting:
+        if not self.sender.resting:
             for rested in self._rested:
                 if not rested.done():
                     rested.set_result(None)

@@ -65,7 +65,7 @@ async def run_console(
         http = guarded_by(settings, application)
         async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
             if certificate is not None:
-                application.state.house.metrics.certificate_end.set(ends_at(certificate))
+                application.state.context.metrics.certificate_end.set(ends_at(certificate))
             _calm_garbage_collection()
             background = [tasks.create_task(bridge.watch()) for bridge in bridges.values()]
             url = listening_url(settings, listener)
@@ -163,10 +163,10 @@ async def _announce(application: FastAPI, links: ConsoleLinks, as_json: bool) ->
     """
     fleet = getattr(application.state, "fleet", None)
     if isinstance(fleet, Fleet):
-        robots = {name: each.services.console.robot for name, each in fleet.sessions.items() if each.services}
+        robots = {name: each.dependencies.console.robot for name, each in fleet.sessions.items() if each.dependencies}
         links = links._replace(robot="", robots={name: each.settings.robot for name, each in fleet.sessions.items()})
     else:
-        robots = {"": application.state.services.console.robot}
+        robots = {"": application.state.dependencies.console.robot}
     if not as_json or links.robots:
         await _wait_for_all(robots)
         for name, robot in robots.items():

@@ -25,13 +25,13 @@ from lockstep.server.state.persistent_state import ConsoleState, open_state
 from lockstep.server.util.rate_limits import RateLimits
 from lockstep.server.webrtc.media_endpoint import MediaEndpoint
 
-__all__ = ["bare_app", "guard_app", "open_house"]
+__all__ = ["bare_app", "guard_app", "open_context"]
 
 log = structlog.get_logger(__name__)
 
 
 def bare_app(title: str, settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
-    """Without a route. It needs `app.state.house` before the first request.
+    """Without a route. It needs `app.state.context` before the first request.
 
     `app.state.failed` is set when what its lifespan runs has failed: then it serves nobody any more.
     """
@@ -62,7 +62,7 @@ def _noticed(lifespan: Lifespan[FastAPI]) -> Lifespan[FastAPI]:
     return noticed
 
 
-def open_house(
+def open_context(
     app: FastAPI,
     settings: Settings,
     state: ConsoleState | None,
@@ -76,10 +76,10 @@ def open_house(
     endpoint = MediaEndpoint(settings)
     if settings.media_port:  # which somebody else might take meanwhile
         endpoint.open()
-    house = ConsoleContext(opened, RequestRateLimits(settings), metrics, endpoint, max_peers, reserved)
-    app.state.house = house
+    context = ConsoleContext(opened, RequestRateLimits(settings), metrics, endpoint, max_peers, reserved)
+    app.state.context = context
     log.info("audit and recordings are signed", public_key=opened.signer.public_key)
-    return house
+    return context
 
 
 def guard_app(app: FastAPI, settings: Settings) -> None:
@@ -112,12 +112,12 @@ def guard_app(app: FastAPI, settings: Settings) -> None:
 def _link_of(scope: Scope, known: KnownTokens) -> str:
     """The link whose good token a request brings; "" without one. What it opens is each route's to say."""
     token = bearer_token(Headers(scope=scope).get("authorization"))
-    house = getattr(scope["app"].state, "house", None)
-    if not token or not isinstance(house, ConsoleContext):
+    context = getattr(scope["app"].state, "context", None)
+    if not token or not isinstance(context, ConsoleContext):
         return ""
     try:
         # Enough to stop the robot with, so also while nobody knows which links are revoked.
-        link = house.state.access.at(None).bearer_to_stop(f"Bearer {token}").token_id
+        link = context.state.access.at(None).bearer_to_stop(f"Bearer {token}").token_id
     except AccessError:
         known.forget(token)
         return ""
@@ -126,14 +126,14 @@ def _link_of(scope: Scope, known: KnownTokens) -> str:
 
 
 def _is_silenced(scope: Scope, link: str) -> bool:
-    house = getattr(scope["app"].state, "house", None)
-    return isinstance(house, ConsoleContext) and house.is_silenced(link)
+    context = getattr(scope["app"].state, "context", None)
+    return isinstance(context, ConsoleContext) and context.is_silenced(link)
 
 
 def _caught(scope: Scope, error: Exception) -> None:
-    house = scope["app"].state.house
-    if isinstance(house, ConsoleContext):
-        house.metrics.faults.caught("http", error, method=scope.get("method", ""), route=_route(scope))
+    context = scope["app"].state.context
+    if isinstance(context, ConsoleContext):
+        context.metrics.faults.caught("http", error, method=scope.get("method", ""), route=_route(scope))
 
 
 def _route(scope: Scope) -> str:

@@ -9,7 +9,7 @@ import msgspec
 from fastapi import FastAPI, Response
 from starlette.types import Lifespan
 
-from lockstep.server.composition.app_factory import bare_app, guard_app, open_house
+from lockstep.server.composition.app_factory import bare_app, guard_app, open_context
 from lockstep.server.composition.robot_session import run_on, running_session
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.static_files import page_router
@@ -32,13 +32,13 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         metrics = Metrics()
-        with closing(open_house(app, settings, state, metrics)) as house:
-            async with running_session(settings, house, metrics, house.state.directory) as made:
+        with closing(open_context(app, settings, state, metrics)) as context:
+            async with running_session(settings, context, metrics, context.state.directory) as made:
                 attach_session(app, made)
                 peers, clock = made.console.peers, made.console.clock
                 async with asyncio.TaskGroup() as tasks:
                     running = [
-                        tasks.create_task(house.run(), name="links"),
+                        tasks.create_task(context.run(), name="links"),
                         tasks.create_task(
                             run_on(
                                 "sweeper",
@@ -60,7 +60,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
 
 
 def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
-    """The routes of one robot but for its pages. They need `app.state.house`, and answer by `attach_session`."""
+    """The routes of one robot but for its pages. They need `app.state.context`, and answer by `attach_session`."""
     app = bare_app("Lockstep", settings, lifespan)
     app.include_router(whep.router)
     app.include_router(whip.router)
@@ -77,7 +77,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
 
 def attach_session(app: FastAPI, session: Dependencies | None) -> None:
     """From now on the routes speak for that session; None: it has failed, and they say so."""
-    app.state.services = session
+    app.state.dependencies = session
     app.state.recordings = None if session is None else session.recordings
 
 

@@ -40,7 +40,7 @@ RESTART_AFTER = 1.0  # s until a background task that failed runs again
 @asynccontextmanager
 async def running_session(
     settings: Settings,
-    house: ConsoleContext,
+    context: ConsoleContext,
     metrics: Metrics,
     directory: StateDir,
     robot: str = "",
@@ -53,26 +53,26 @@ async def running_session(
         robot: its name in a fleet; "" is the only robot of a console
         stops: what is known of stops, where that outlives the session; whoever has it runs it. None: it has its own
     """
-    with open_audit_log(directory, settings, robot, house.state.signer) as audit:
+    with open_audit_log(directory, settings, robot, context.state.signer) as audit:
         async with (
-            _running_stops(settings, house, directory, stops, metrics) as keeper,
-            _session(settings, house, metrics, directory, robot, audit, keeper) as made,
+            _running_stops(settings, context, directory, stops, metrics) as keeper,
+            _session(settings, context, metrics, directory, robot, audit, keeper) as made,
         ):
-            house.wardens.append(made.warden)
+            context.revocations.append(made.revocation)
             try:
                 yield made
             finally:
-                house.wardens.remove(made.warden)
+                context.revocations.remove(made.revocation)
 
 
 @asynccontextmanager
 async def _running_stops(
-    settings: Settings, house: ConsoleContext, directory: StateDir, stops: StopKeeper | None, metrics: Metrics
+    settings: Settings, context: ConsoleContext, directory: StateDir, stops: StopKeeper | None, metrics: Metrics
 ) -> AsyncIterator[StopKeeper]:
     if stops is not None:
         yield stops
         return
-    keeper = StopKeeper(directory.path, settings.robot, lasts=house.state.lasts)
+    keeper = StopKeeper(directory.path, settings.robot, lasts=context.state.lasts)
     await keeper.load()
     async with asyncio.TaskGroup() as tasks:
         running = tasks.create_task(run_on("kept stops", keeper.run, metrics.faults), name="kept stops")
@@ -95,19 +95,19 @@ async def run_on(name: str, run: Callable[[], Awaitable[None]], faults: Faults) 
 @asynccontextmanager
 async def _session(
     settings: Settings,
-    house: ConsoleContext,
+    context: ConsoleContext,
     metrics: Metrics,
     directory: StateDir,
     robot: str,
     audit: AuditLog,
     stops: StopKeeper,
 ) -> AsyncIterator[Dependencies]:
-    access = house.state.access.at(robot)
+    access = context.state.access.at(robot)
     media = MediaHub(settings.media, metrics.registry, settings.sources, on_fault=metrics.faults.caught)
     scene = SceneView(settings.scene_hz, settings.max_scene_viewers, metrics) if settings.scene else None
     clock = EventClock()
     shelf = RecordingStore(recordings_directory(settings.recording, directory.path), settings.recording)
-    signing = RecordingSigning(house.state.signer, lambda: anchor_text(audit.newest_anchor()))
+    signing = RecordingSigning(context.state.signer, lambda: anchor_text(audit.newest_anchor()))
     recorder = Recorder(
         settings.recording,
         shelf,
@@ -117,8 +117,8 @@ async def _session(
         signing,
         lambda what, detail: console.audit.record("recording", what=what, detail=detail),
     )
-    engine = JanusEngine(settings, house.endpoint, media, house.state.signing_key(settings) + robot)
-    relays = SfuCoordinator(settings, engine, lambda: console.peers, house.state.invitations.has_ended)
+    engine = JanusEngine(settings, context.endpoint, media, context.state.signing_key(settings) + robot)
+    relays = SfuCoordinator(settings, engine, lambda: console.peers, context.state.invitations.has_ended)
     console = Console(
         settings,
         metrics,
@@ -128,10 +128,10 @@ async def _session(
         clock,
         recorder,
         stops=stops,
-        silenced=house.silenced,
+        silenced=context.silenced,
     )
     console.peers.relays.append(relays)
-    console.peers.further_bounds.append(house.check_room)
+    console.peers.further_bounds.append(context.check_room)
     console.further_news.append(recorder.state)
     sources = SourceManager(
         settings.sources, console.clock, media, metrics.registry, lambda news: console.peers.tell("session", news)
@@ -146,8 +146,10 @@ async def _session(
     )
     if voice.enabled:
         console.further_news.append(voice.state)
-    warden = TokenRevocation(house.state.invitations, console.peers, console.audit, robot, console.stops.show_silence)
-    publishers = Publishers(sources.published, warden.ended, console.audit, metrics.faults, metrics.registry)
+    revocation = TokenRevocation(
+        context.state.invitations, console.peers, console.audit, robot, console.stops.show_silence
+    )
+    publishers = Publishers(sources.published, revocation.ended, console.audit, metrics.faults, metrics.registry)
     follow_clock(console.clock, robot)
     audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
     made = Dependencies(
@@ -156,10 +158,10 @@ async def _session(
         metrics=metrics,
         console=console,
         media=media,
-        house=house,
+        context=context,
         access=access,
         audit=audit,
-        warden=warden,
+        revocation=revocation,
         scene=scene,
         recorder=recorder,
         relays=relays,

@@ -99,31 +99,31 @@ class Console:
         settings: Settings,
         metrics: Metrics,
         media: MediaFeed,
-        viewer: SceneFeed | None,
+        scene: SceneFeed | None,
         audit_log: RecordKeeper,
         clock: EventClock | None = None,
-        tap: SessionListener | None = None,
+        listener: SessionListener | None = None,
         *,
         stops: StopKeeper,
         silenced: SilencedLinks | None = None,
     ) -> None:
         """`silenced`: of all robots of this console; None: this one has its own."""
         self.clock = clock or EventClock()
-        self._tap = tap or SessionListener()
+        self._listener = listener or SessionListener()
         self.audit = AuditTrail(self.clock, audit_log)
         self.robot = RobotConnection(settings, self)
-        self.peers = PeerRegistry(settings, metrics, self._joined, self._tap.told)
+        self.peers = PeerRegistry(settings, metrics, self._joined, self._listener.told)
         times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
         self.people = ParticipantList(self.peers, self.clock, self.audit, self.seat.renamed, self._refuse_request)
         self.further_news: list[Callable[[], ServerMessage]] = []  # what else newcomers are told
         self._metrics = metrics
         self._media = media
-        self._viewer = viewer or NoSceneFeed()
+        self._scene = scene or NoSceneFeed()
         self.speed_cap = SpeedCap(settings.speed_cap)
-        self._desk = CommandArbiter(self.clock, self.seat.rules, stops.presses, self.speed_cap)
+        self._arbiter = CommandArbiter(self.clock, self.seat.rules, stops.presses, self.speed_cap)
         self.stops = StopService(
-            self.robot, stops, self.peers, self.clock, self._holder, self.audit, metrics, self._tap, silenced
+            self.robot, stops, self.peers, self.clock, self._holder, self.audit, metrics, self._listener, silenced
         )
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self._is_driven_by, self.peers.drivers, self.peers.observers
@@ -203,7 +203,7 @@ class Console:
             case Command():
                 self._command(peer, message, now)
             case Rest():
-                self._rest(peer, self._desk.rest(peer.id, message))
+                self._rest(peer, self._arbiter.rest(peer.id, message))
             case Ping():
                 peer.send("control", Pong(id=message.id))
             case Stop():
@@ -249,10 +249,10 @@ class Console:
 
     def rest_robot(self, why: str) -> None:
         """Before anybody else drives: what the last holder has under way is void too."""
-        outcome = self._desk.abandon()
+        outcome = self._arbiter.abandon()
         if isinstance(outcome, ForwardRest) and self.robot.send(outcome.rest):
             self._metrics.rests.labels(why).inc()
-            self._tap.rest(Actor(), outcome.rest, why)
+            self._listener.rest(Actor(), outcome.rest, why)
 
     def refuse(self, peer: Peer, refusal: SeatRefusal) -> None:
         self._refuse_request(peer, refusal.reason, refusal.detail)
@@ -262,14 +262,14 @@ class Console:
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
         """References of different epochs are never compared: every peer starts anew."""
         self.stops.epoch_ends(self.clock.stop)
-        self._desk.epoch_ends()
+        self._arbiter.epoch_ends()
         self.clock.begin(epoch)
         self.speed_cap.forget()
         self.audit.epoch(description.label, description_hash(description))
         self._shown_stop = StopState()
         self.peers.end_all("new epoch")
         self._media.configure(description)
-        self._viewer.configure(description)
+        self._scene.configure(description)
 
     def link_up(self) -> None:
         if self.robot.description is None:
@@ -277,7 +277,7 @@ class Console:
         self._link_was_up = True
         self._metrics.link_up.set(1)
         self.stops.link_up()
-        self._desk.link_up(self.robot.description)
+        self._arbiter.link_up(self.robot.description)
         self.audit.record("link_up")
         self.peers.tell("session", self.state_of_robot(self.robot.description))
 
@@ -293,7 +293,7 @@ class Console:
             self.peers.tell("session", Notice(level="error", text=TAKEN))
         self._link_was_up = False
         self._metrics.link_up.set(0)
-        self._desk.link_down()
+        self._arbiter.link_down()
         self.stops.link_down(detail)
         if self.robot.description is not None:
             self.peers.tell("session", self.state_of_robot(self.robot.description))
@@ -302,13 +302,13 @@ class Console:
         now = time.monotonic()
         if not self.clock.observe(feedback, now):
             return
-        answered = self._desk.in_flight
-        self._desk.feedback(feedback)
+        answered = self._arbiter.in_flight
+        self._arbiter.feedback(feedback)
         self.stops.feedback(feedback.stop)
-        self._tap.feedback(feedback, now)
+        self._listener.feedback(feedback, now)
         self._fanout.publish(encode_console_message(feedback))
         self.speed_cap.fed_back(feedback, now)
-        if answered is not None and self._desk.in_flight is None:
+        if answered is not None and self._arbiter.in_flight is None:
             self._metrics.robot_turnaround.observe(now - self._forwarded_at)
         self._metrics.feedback.inc()
         self._metrics.event.set(feedback.event)
@@ -317,20 +317,20 @@ class Console:
         if feedback.stop != self._shown_stop:
             self._shown_stop = feedback.stop
             self.peers.tell("stop", StopStateNotice(stop=feedback.stop, event=feedback.event))
-        self._viewer.feedback(feedback)
+        self._scene.feedback(feedback)
 
     def refusal_received(self, refusal: Refusal) -> None:
         if self.stops.refused(refusal):
             return
         self._metrics.refusals.labels(refusal.reason).inc()
-        peer = self.peers.by_id(self._desk.refused(refusal))
-        self._tap.refused(Actor() if peer is None else peer.actor, refusal, "robot")
+        peer = self.peers.by_id(self._arbiter.refused(refusal))
+        self._listener.refused(Actor() if peer is None else peer.actor, refusal, "robot")
         if peer is not None:
             self.audit.refused(peer.actor, refusal.reason)
             peer.send("control", refusal)
 
     def stop_taken(self, taken: StopTaken) -> None:
-        self._desk.stop_taken(taken)
+        self._arbiter.stop_taken(taken)
         self.stops.taken(taken)
 
     def media_received(self, media: Media) -> None:
@@ -342,7 +342,7 @@ class Console:
     # what follows from the cores' outcomes
 
     def _command(self, peer: Peer, command: Command, now: float) -> None:
-        outcome = self._desk.command(peer.id, command, now)
+        outcome = self._arbiter.command(peer.id, command, now)
         if isinstance(outcome, Forward) and not self._forward(outcome):
             outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
         if isinstance(outcome, Answer) and not peer.may_be_answered_again():
@@ -354,15 +354,15 @@ class Console:
                 self._refuse(peer, "control", refusal)
                 if refusal.reason in ("out_of_order", "unseen", "late") and self.clock.feedback is not None:
                     peer.send_feedback(encode_console_message(self.clock.feedback))
-            case Forward(forwarded) if self._desk.moves(forwarded):
+            case Forward(forwarded) if self._arbiter.moves(forwarded):
                 self.seat.moved(peer)
-        self._tap.command(peer.actor, command, outcome)
+        self._listener.command(peer.actor, command, outcome)
         self._metrics.commands.labels(type(outcome).__name__.lower()).inc()
 
     def _rest(self, peer: Peer, outcome: RestOutcome) -> None:
         if isinstance(outcome, ForwardRest):
             if self.robot.send(outcome.rest):
-                self._tap.rest(peer.actor, outcome.rest, "")
+                self._listener.rest(peer.actor, outcome.rest, "")
                 return
             outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
         if isinstance(outcome, Refuse):
@@ -374,7 +374,7 @@ class Console:
         except Silenced as error:
             self._metrics.refusals.labels("silenced").inc()
             refusal = Refusal(event=0, reason="silenced", current=self.clock.event, detail=error.detail)
-            self._tap.refused(peer.actor, refusal, "console")
+            self._listener.refused(peer.actor, refusal, "console")
             peer.send("stop", refusal)
 
     def _silence(self, peer: Peer, message: SilenceStops) -> None:
@@ -399,18 +399,18 @@ class Console:
     def _refuse(self, peer: Peer, channel: ChannelName, refusal: Refusal) -> None:
         self._metrics.refusals.labels(refusal.reason).inc()
         self.audit.refused(peer.actor, refusal.reason)
-        self._tap.refused(peer.actor, refusal, "console")
+        self._listener.refused(peer.actor, refusal, "console")
         peer.send(channel, refusal)
 
     def _forward(self, outcome: Forward) -> bool:
         self._forwarded_at = time.monotonic()
-        self._viewer.command(outcome.command)
+        self._scene.command(outcome.command)
         return self.robot.send(outcome.command)
 
     def _report_speed(self, peer: Peer, report: Report) -> None:
         if not self.seat.rules.holds(peer.id):
             return
-        self._tap.report(peer.actor, report)
+        self._listener.report(peer.actor, report)
         now = time.monotonic()
         self.speed_cap.reported(peer.id, report, now)
         news = self.speed_cap.news(now)

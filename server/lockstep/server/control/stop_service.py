@@ -127,7 +127,7 @@ class StopService:
         holder: Callable[[], str],
         audit: AuditTrail,
         metrics: Metrics,
-        tap: SessionListener,
+        listener: SessionListener,
         silenced: SilencedLinks | None = None,
     ) -> None:
         """`holder`: the peer that holds the control seat, or "". `silenced`: of all robots; None: this one's alone."""
@@ -139,7 +139,7 @@ class StopService:
         self._holder = holder
         self._audit = audit
         self._metrics = metrics
-        self._tap = tap
+        self._listener = listener
         self._silenced = SilencedLinks() if silenced is None else silenced
         self._resets: ResetAttempts[_Asker] = ResetAttempts()
         self._link_resets = RateLimits(RESET_RATE, RESETS)
@@ -222,7 +222,7 @@ class StopService:
 
     def _send_new(self, press: Press) -> None:
         sent = self._robot.send_stop(press.message())
-        self._tap.stop_asked(press.by, press.where, press.reason, press.id, delivered=sent)
+        self._listener.stop_asked(press.by, press.where, press.reason, press.id, delivered=sent)
         if self._logged.spend(press.by.link or press.by.name, time.monotonic()):
             log.warning("stop", by=press.by.name, where=press.where, reason=press.reason, sent=sent)
         if not sent:
@@ -329,7 +329,7 @@ class StopService:
             more = "" if answer.kept else ", not on the robot's disk"
             more += ", reset before" if self._is_released(answer) else ""
             self._record(press, f"{press.where}{', sent again' if late else ''}, stop {answer.number}{more}")
-            self._tap.stop_taken(press.by, answer)
+            self._listener.stop_taken(press.by, answer)
             self._answer(press.id, answer)
         self._spread()
 
@@ -376,7 +376,7 @@ class StopService:
                 refusal = Refusal(
                     event=0, reason=outcome.reason, current=event, detail=outcome.detail[:500], stop=outcome.number
                 )
-                self._tap.refused(peer.actor, refusal, "console")
+                self._listener.refused(peer.actor, refusal, "console")
                 peer.send("stop", refusal)
 
         self._ask_reset(_Asker(peer.actor, "stop", tell), number)
@@ -425,7 +425,7 @@ class StopService:
             if outcome.reason is None:
                 self._metrics.resets.inc()
                 self._audit.record("reset", by, where, f"stop {outcome.number}")
-                self._tap.reset_done(by, where, outcome.number)
+                self._listener.reset_done(by, where, outcome.number)
                 log.warning("reset", by=by.name, where=where, stop=outcome.number)
             else:
                 self._audit.again("reset", by, f"{where}, refused {outcome.reason}")

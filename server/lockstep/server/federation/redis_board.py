@@ -77,7 +77,7 @@ class RedisBoard:
         self._store: RedisStore | None = None  # None while there is no session
         self._tasks: asyncio.TaskGroup | None = None  # of the session
         self._others = OtherConsoles(self.id, self.name)
-        self._desk = PendingStops()
+        self._pending = PendingStops()
         self._tiles: tuple[Tile, ...] = ()
         self._n = 0  # of the last sign of life
         self._loud = False  # whether the others should look at once
@@ -143,16 +143,16 @@ class RedisBoard:
             console=self.id, request=secrets.token_hex(8), robots=wanted, by=by.name[:60], role=by.role[:60],
             link=by.link[:64], reason=press.reason[:500], press=press.id,
         )  # fmt: skip
-        if self._desk.waiting >= MAX_STOPS:
+        if self._pending.waiting >= MAX_STOPS:
             await self._say(request)
             return dict.fromkeys(wanted, TOO_MANY)
-        asked = self._desk.ask(request)
+        asked = self._pending.ask(request)
         try:
             with suppress(TimeoutError):
                 async with asyncio.timeout(STOP_PATIENCE):
                     await self._ask(asked.request, asked.complete)
         finally:
-            self._desk.end(asked)
+            self._pending.end(asked)
         silent = {robot: self._unconfirmed(robot) for robot in wanted if robot not in asked.answers}
         answers = {**asked.answers, **silent}
         for each in answers.values():
@@ -276,7 +276,7 @@ class RedisBoard:
                 self._revocations.look()
                 self._wake.set()
             case StopReply():
-                self._desk.replied(news)
+                self._pending.replied(news)
             case StopRequest():
                 await self._hear_stop(store, news)
 
@@ -287,7 +287,7 @@ class RedisBoard:
         own = sorted(self._own() & set(request.robots))
         if not own:
             return
-        if not self._desk.is_new(request):
+        if not self._pending.is_new(request):
             await self._reply(store, request)
         elif self._tasks is not None:
             self._tasks.create_task(self._obey(store, request, own), name="board stop")
@@ -306,11 +306,11 @@ class RedisBoard:
             )
             for robot, each in zip(own, answers, strict=True)
         )
-        self._desk.obeyed(request, outcomes)
+        self._pending.obeyed(request, outcomes)
         await self._reply(store, request)
 
     async def _reply(self, store: RedisStore, request: StopRequest) -> None:
-        outcomes = self._desk.outcomes(request)
+        outcomes = self._pending.outcomes(request)
         if outcomes:
             await store.tell(self._pack(StopReply(console=self.id, request=request.request, robots=outcomes)))
 

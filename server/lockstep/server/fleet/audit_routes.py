@@ -51,6 +51,6 @@ def _own(fleet: Fleet, limit: int) -> list[SharedRecord]:
     return [
         SharedRecord(console="", robot=name, record=record)
         for name, session in fleet.sessions.items()
-        if session.services is not None
-        for record in session.services.audit.tail.after(-1, limit)
+        if session.dependencies is not None
+        for record in session.dependencies.audit.tail.after(-1, limit)
     ]

@@ -63,21 +63,21 @@ class Fleet:
         self.sessions = {name: FleetSession(name, settings) for name, settings in robots.items()}
         self.board: Board = MemoryBoard()
         self.metrics.robots.set(len(self.sessions))
-        self._house: ConsoleContext | None = None
+        self._context: ConsoleContext | None = None
         self._door: Access | None = None
 
     @asynccontextmanager
-    async def running(self, house: ConsoleContext, board: Board) -> AsyncIterator[None]:
+    async def running(self, context: ConsoleContext, board: Board) -> AsyncIterator[None]:
         """While entered, all sessions run. On entering it waits for their starts, but not long for one that hangs."""
-        self._house, self._door, self.board = house, house.state.access.at(None), board
-        directory = house.state.directory.path
+        self._context, self._door, self.board = context, context.state.access.at(None), board
+        directory = context.state.directory.path
         async with asyncio.TaskGroup() as tasks:
             running = [
-                tasks.create_task(self._run_session(each, house, directory), name=f"robot {name}")
+                tasks.create_task(self._run_session(each, context, directory), name=f"robot {name}")
                 for name, each in self.sessions.items()
             ]
             running += [
-                tasks.create_task(house.run(), name="links"),
+                tasks.create_task(context.run(), name="links"),
                 tasks.create_task(self._guard("fleet", self._look), name="fleet"),
                 tasks.create_task(self._guard("board", board.run), name="board"),
                 tasks.create_task(
@@ -102,7 +102,7 @@ class Fleet:
     @property
     def lets_in(self) -> bool:
         """False while nobody knows which links are revoked."""
-        return self._house is None or not self._house.state.invitations.trouble
+        return self._context is None or not self._context.state.invitations.trouble
 
     def may(self, identity: Identity, name: str) -> bool:
         """Whether that link is good for that robot."""
@@ -121,7 +121,7 @@ class Fleet:
 
     def _tile(self, session: FleetSession, now: float) -> Tile:
         """A fault with one robot must not hide the others."""
-        here = session.services
+        here = session.dependencies
         if here is None:
             return absent_tile(session.name)
         try:
@@ -145,7 +145,7 @@ class Fleet:
         """`robots`: with the consoles that have them."""
         if not robots:
             return []
-        if self._house is not None and self._house.is_silenced(press.by.link):
+        if self._context is not None and self._context.is_silenced(press.by.link):
             return [Stopped(name, False, 0, SILENCED, 0, console) for name, console in robots.items()]
         answers = await self.board.stop(robots.keys(), press)
         return [
@@ -176,21 +176,21 @@ class Fleet:
         return StopAnswer(True, stopped.delivered, stopped.event, stopped.detail, stopped.number, stopped.kept)
 
     def silences(self) -> dict[str, float]:
-        return {} if self._house is None else self._house.silences()
+        return {} if self._context is None else self._context.silences()
 
     def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
-        if self._house is not None:
-            self._house.silenced_elsewhere(console, links)
+        if self._context is not None:
+            self._context.silenced_elsewhere(console, links)
 
     def links_revoked(self, ended: list[Invitation]) -> None:
-        if self._house is not None:
-            self._house.enforce(ended, ELSEWHERE)
+        if self._context is not None:
+            self._context.enforce(ended, ELSEWHERE)
 
     # background tasks
 
-    async def _run_session(self, session: FleetSession, house: ConsoleContext, directory: Path) -> None:
+    async def _run_session(self, session: FleetSession, context: ConsoleContext, directory: Path) -> None:
         """Each has a directory of its own for recordings and audit."""
-        await session.run(house, robot_place(directory, session.name), self.metrics, self._recorded)
+        await session.run(context, robot_place(directory, session.name), self.metrics, self._recorded)
 
     def _recorded(self, robot: str, record: AuditRecord) -> None:
         try:

@@ -8,7 +8,7 @@ import msgspec
 from fastapi import FastAPI, Request, Response
 from starlette.routing import Mount
 
-from lockstep.server.composition.app_factory import bare_app, guard_app, open_house
+from lockstep.server.composition.app_factory import bare_app, guard_app, open_context
 from lockstep.server.errors import NotFound
 from lockstep.server.federation import make_board
 from lockstep.server.fleet import audit_routes, fleet_routes
@@ -29,17 +29,17 @@ def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: 
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        opened = open_house(app, settings, state, fleet.metrics, settings.max_total_peers, settings.reserved_places)
-        with closing(opened) as house:
+        opened = open_context(app, settings, state, fleet.metrics, settings.max_total_peers, settings.reserved_places)
+        with closing(opened) as context:
             board = make_board(
                 settings,
-                house.state.signing_key(settings),
+                context.state.signing_key(settings),
                 fleet,
-                house.state.invitations,
+                context.state.invitations,
                 settings.public_url,
                 fleet.metrics.registry,
             )
-            async with fleet.running(house, board):
+            async with fleet.running(context, board):
                 yield
 
     app = bare_app("Lockstep fleet", settings, lifespan)

@@ -53,24 +53,24 @@ class FleetSession:
         self._backoff = Backoff(FIRST_WAIT, LONGEST_WAIT)
         self._stops: StopKeeper | None = None  # None before `run`
         self._access: Access | None = None
-        self._house: ConsoleContext | None = None
+        self._context: ConsoleContext | None = None
         self._ended_before = 0  # connections of earlier sessions
 
     @property
-    def services(self) -> Dependencies | None:
+    def dependencies(self) -> Dependencies | None:
         """None while the session has failed."""
-        found: Dependencies | None = self.app.state.services
+        found: Dependencies | None = self.app.state.dependencies
         return found
 
     @property
     def ended(self) -> int:
         """Connections, ever."""
-        here = self.services
+        here = self.dependencies
         return self._ended_before + (0 if here is None else here.console.peers.ended)
 
     @property
     def moving(self) -> bool:
-        here = self.services
+        here = self.dependencies
         return here is not None and here.console.clock.moving
 
     @property
@@ -82,13 +82,13 @@ class FleetSession:
 
     async def stop(self, press: Press) -> StopAnswer:
         """What became of it. Without a session the stop is the first that the next one does. Raises Silenced."""
-        here = self.services
+        here = self.dependencies
         if here is not None:
             return await here.stop(press)
         stops = self._stops
-        if stops is None or self._house is None:
+        if stops is None or self._context is None:
             raise TypeError("the fleet is not running")
-        if press.by.link and self._house.is_silenced(press.by.link):
+        if press.by.link and self._context.is_silenced(press.by.link):
             raise Silenced(SILENCED)
         stops.presses.forget(press.id)  # nobody knows here whether what it became still holds: the robot says it
         pressed = stops.presses.press(press)
@@ -100,25 +100,25 @@ class FleetSession:
         return StopAnswer(StopOutcome(press.id, None, detail), 0, up=False)
 
     async def run(
-        self, house: ConsoleContext, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
+        self, context: ConsoleContext, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
     ) -> None:
         """Until cancelled. `told` hears every record of its audit."""
-        self.app.state.house = self._house = house
-        self._access = house.state.access.at(self.name)
-        stops = self._stops = StopKeeper(directory, self.settings.robot, lasts=house.state.lasts)
+        self.app.state.context = self._context = context
+        self._access = context.state.access.at(self.name)
+        stops = self._stops = StopKeeper(directory, self.settings.robot, lasts=context.state.lasts)
         self.app.state.stop_keeper = self
         name_robot(self.name)
         await stops.load()
         async with asyncio.TaskGroup() as tasks:
             keeping = tasks.create_task(stops.run(), name=f"kept stops {self.name}")
             try:
-                await self._live_on(house, directory, metrics, told, stops)
+                await self._live_on(context, directory, metrics, told, stops)
             finally:
                 keeping.cancel()
 
     async def _live_on(
         self,
-        house: ConsoleContext,
+        context: ConsoleContext,
         directory: Path,
         metrics: FleetMetrics,
         told: Callable[[str, AuditRecord], None],
@@ -129,7 +129,7 @@ class FleetSession:
         while True:
             since = loop.time()
             try:
-                await attempt(self._live(house, directory, metrics, told, stops))
+                await attempt(self._live(context, directory, metrics, told, stops))
             except Exception:
                 metrics.session_failures.labels(self.name).inc()
                 log.exception("the session of this robot has failed")
@@ -140,14 +140,14 @@ class FleetSession:
 
     async def _live(
         self,
-        house: ConsoleContext,
+        context: ConsoleContext,
         directory: Path,
         metrics: FleetMetrics,
         told: Callable[[str, AuditRecord], None],
         stops: StopKeeper,
     ) -> None:
         own = Metrics(process=False)
-        async with running_session(self.settings, house, own, StateDir(directory), self.name, stops) as made:
+        async with running_session(self.settings, context, own, StateDir(directory), self.name, stops) as made:
             made.audit.on_record = lambda record: told(self.name, record)
             attach_session(self.app, made)
             metrics.watch(self.name, made)
@@ -161,7 +161,7 @@ class FleetSession:
 
     def look(self, now: float) -> None:
         """Once a second: how it does."""
-        here = self.services
+        here = self.dependencies
         if here is None:
             self.pulse.look(now, up=False, epoch="", event=1)
         else:

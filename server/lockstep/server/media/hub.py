@@ -24,7 +24,7 @@ from lockstep.server.media.pipeline.audio_stream import AudioStream
 from lockstep.server.media.pipeline.capture_clock import CaptureClock
 from lockstep.server.media.pipeline.fanout import FanOut
 from lockstep.server.media.pipeline.frame_queue import Outbox
-from lockstep.server.media.pipeline.recorded_layer import FrameTaker, RecordedLayer
+from lockstep.server.media.pipeline.recorded_encoding import FrameTaker, RecordedEncoding
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.pipeline.video_stream import VideoStream
 from lockstep.server.media.quality.bandwidth_estimator import RateLimits
@@ -154,7 +154,7 @@ class MediaHub:
             stream.record(
                 None
                 if self._recorder is None
-                else RecordedLayer(
+                else RecordedEncoding(
                     _recorded_codecs(stream),
                     "high" if video else "operator",
                     self._recorder,

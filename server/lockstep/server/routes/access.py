@@ -15,7 +15,7 @@ from lockstep.server.auth.tokens import MAX_ROBOTS, HasRole, Identity, Right, Ro
 from lockstep.server.errors import NotAllowed, Silenced, StateUnavailable
 from lockstep.server.http.request_body import read_json
 from lockstep.server.state.console_links import console_link
-from lockstep.server.state.dependencies import Dependencies, authorized, services
+from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
 from lockstep.server.util.state_dir import StateDirUnusable
 
 __all__ = ["AuditPage", "InvitationInfo", "InvitationList", "InvitationRequest", "NewInvitation", "router"]
@@ -76,7 +76,7 @@ class AuditPage(msgspec.Struct, frozen=True, kw_only=True):
 
 @router.get("/api/invitations")
 async def invitations(request: Request, caller: Caller) -> Response:
-    here = services(request)
+    here = dependencies(request)
     _require_inviter(caller)
     found = _shown(here.state.invitations.known.visible(caller.identity), here.state.invitations.now())
     return _json(InvitationList(invitations=_infos(here, found), may_invite=list(may_invite(caller.role))))
@@ -84,10 +84,10 @@ async def invitations(request: Request, caller: Caller) -> Response:
 
 @router.post("/api/invitations")
 async def invite(request: Request, caller: Caller) -> Response:
-    here = services(request)
+    here = dependencies(request)
     wanted = await read_json(request, InvitationRequest)
     _require_inviter(caller)
-    if here.house.is_silenced(caller.identity.token_id):
+    if here.context.is_silenced(caller.identity.token_id):
         raise Silenced("a supervisor has silenced the STOP of your link; until that ends it invites nobody")
     robots = _wanted_robots(here, wanted)
     by = caller.actor
@@ -99,7 +99,7 @@ async def invite(request: Request, caller: Caller) -> Response:
         )
     except StateDirUnusable as error:
         raise StateUnavailable(f"nothing was changed: {error.reason}") from error
-    here.house.enforce([made], by)
+    here.context.enforce([made], by)
     base = here.settings.public_url or str(request.base_url).rstrip("/")
     if made.robots == (here.robot,):
         base += str(request.scope.get("root_path", ""))  # to this robot, past the overview
@@ -110,18 +110,18 @@ async def invite(request: Request, caller: Caller) -> Response:
 @router.delete("/api/invitations/{invitation_id}")
 async def revoke(request: Request, caller: Caller, invitation_id: str) -> Response:
     """It, and all that was invited with it, ends at once; so do the peers that are here with them."""
-    here = services(request)
+    here = dependencies(request)
     _require_inviter(caller)
     by = caller.actor
     if here.state.invitations.end_at_once(caller.identity, invitation_id):
-        here.house.enforce([], by)
+        here.context.enforce([], by)
     try:
         revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
     except StateDirUnusable as error:
         here.state.invitations.write_later(invitation_id)
         here.console.audit.record("revocation", by, "not on the disk yet", invitation_id)
         raise StateUnavailable(f"{await _noted(here)}: {error.reason}") from error
-    here.house.enforce(revoked, by)
+    here.context.enforce(revoked, by)
     return _json(InvitationList(invitations=_infos(here, revoked), may_invite=[]))
 
 
@@ -144,7 +144,7 @@ async def audit(
 ) -> Response:
     """Records behind number `after`; the newest ones for -1; the last ones in front of `before`."""
     require_role(caller, "supervisor")
-    log = services(request).audit
+    log = dependencies(request).audit
     found = log.tail.before(before, limit) if before else log.tail.after(after, limit)
     return _json(AuditPage(records=found, last=log.next_number - 1, trouble=log.trouble))
 
@@ -181,7 +181,7 @@ def _shown(found: Iterable[Invitation], now: float) -> list[Invitation]:
 
 
 def _infos(here: Dependencies, found: Iterable[Invitation]) -> list[InvitationInfo]:
-    connected = here.house.connected()
+    connected = here.context.connected()
     return [
         InvitationInfo(
             id=each.id,

@@ -18,7 +18,7 @@ __all__ = ["answer_errors", "count_refused"]
 
 
 def answer_errors(app: FastAPI) -> None:
-    """Everything that a route of `app` raises on purpose. It needs `app.state.house`."""
+    """Everything that a route of `app` raises on purpose. It needs `app.state.context`."""
     app.add_exception_handler(ConsoleError, _answer_console_error)
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(RequestValidationError, _answer_validation_error)
@@ -31,13 +31,13 @@ def count_refused(scope: Scope, name: str) -> None:
 
 def _bad_input(state: object) -> Counter:
     """Of the robot whose routes these are; of the house while it has no session, and where there is no robot."""
-    here = getattr(state, "services", None)
-    counted: Counter = here.metrics.bad_input if isinstance(here, Dependencies) else _house(state).metrics.bad_input
+    here = getattr(state, "dependencies", None)
+    counted: Counter = here.metrics.bad_input if isinstance(here, Dependencies) else _context(state).metrics.bad_input
     return counted
 
 
-def _house(state: object) -> ConsoleContext:
-    found = getattr(state, "house", None)
+def _context(state: object) -> ConsoleContext:
+    found = getattr(state, "context", None)
     if not isinstance(found, ConsoleContext):
         raise TypeError("the app is not running")
     return found
@@ -49,7 +49,7 @@ async def _answer_console_error(request: Request, error: Exception) -> Response:
     entry = http_error(error)
     if entry.status == HTTPStatus.FORBIDDEN:
         _audit_refused(request, entry.name)
-    if entry.status == HTTPStatus.UNAUTHORIZED and not _house(request.app.state).guard.may_fail(request.scope):
+    if entry.status == HTTPStatus.UNAUTHORIZED and not _context(request.app.state).guard.may_fail(request.scope):
         error = TooManyRequests("too many requests without a valid token from this address")
         entry = http_error(error)
     return _error_response(request, entry.status, entry.name, error.detail, entry.headers)
@@ -57,7 +57,7 @@ async def _answer_console_error(request: Request, error: Exception) -> Response:
 
 def _audit_refused(request: Request, name: str) -> None:
     """Merged, as all refusals are: by the route, of which there are few, and never by the path, of which are many."""
-    actor, here = getattr(request.state, "actor", None), getattr(request.app.state, "services", None)
+    actor, here = getattr(request.state, "actor", None), getattr(request.app.state, "dependencies", None)
     if isinstance(actor, Actor) and isinstance(here, Dependencies):
         route = getattr(request.scope.get("route"), "path", "")
         here.console.audit.refused(actor, f"{name}: {request.method} {route}")

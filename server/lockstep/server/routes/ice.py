@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from lockstep.server.auth.tokens import Identity, Right
 from lockstep.server.settings import Settings
-from lockstep.server.state.dependencies import authorized, services
+from lockstep.server.state.dependencies import authorized, dependencies
 from lockstep.server.webrtc.ice_servers import IceServers, ice_servers
 
 __all__ = ["router", "servers_for"]
@@ -18,7 +18,7 @@ router = APIRouter()
 
 @router.get("/api/ice")
 async def ice(request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
-    body = msgspec.json.encode(servers_for(services(request).settings, caller.identity))
+    body = msgspec.json.encode(servers_for(dependencies(request).settings, caller.identity))
     return Response(body, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 

@@ -11,7 +11,7 @@ from lockstep.server.errors import ConsoleError, NotFound, RobotUnreachable
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.security_headers import check_origin
 from lockstep.server.peers.websocket_peer import POLICY_VIOLATION, TICKET_SECONDS, LineEnded, WebSocketPeer
-from lockstep.server.state.dependencies import authorized, services
+from lockstep.server.state.dependencies import authorized, dependencies
 
 __all__ = ["WatchTicket", "router"]
 
@@ -32,7 +32,7 @@ async def invite(
     relay: Annotated[str, Query(pattern=r"^\d{1,3}$")],
 ) -> Response:
     """Admit an observer that has its media from `relay`. Its place is free again when no line comes in time."""
-    here = services(request)
+    here = dependencies(request)
     require_role(caller, "observer")
     identity = caller.identity
     if here.console.robot.description is None:
@@ -49,7 +49,7 @@ async def invite(
 @router.delete("/watch/{ticket}")
 async def decline(ticket: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
     """Give a ticket back that cannot be used, as behind a proxy that lets no WebSocket pass."""
-    watcher = services(request).console.peers.by_ticket(ticket)
+    watcher = dependencies(request).console.peers.by_ticket(ticket)
     if watcher.identity.token_id != caller.token_id:
         raise NotFound("no such ticket")
     watcher.end("deleted")
@@ -59,7 +59,7 @@ async def decline(ticket: str, request: Request, caller: Annotated[Right, Depend
 @router.websocket("/watch/{ticket}")
 async def line(websocket: WebSocket, ticket: str) -> None:
     try:
-        here = services(websocket)
+        here = dependencies(websocket)
     except ConsoleError:
         await websocket.close(TRY_AGAIN_LATER)  # this robot's session is started again
         return

@@ -20,7 +20,7 @@ from lockstep.server.auth.tokens import SceneTicket
 from lockstep.server.errors import BadParameter, ConsoleError, NotFound
 from lockstep.server.http.security_headers import check_origin
 from lockstep.server.scene.view import SceneView
-from lockstep.server.state.dependencies import services
+from lockstep.server.state.dependencies import dependencies
 from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["is_allowed", "router", "scene_query"]
@@ -46,7 +46,7 @@ router = APIRouter()
 @router.get("/scene/{ticket}/")
 async def client(request: Request, ticket: str) -> Response:
     """viser's client for whoever has a ticket."""
-    here = services(request)
+    here = dependencies(request)
     here.access.verify_ticket(ticket)
     _check_query(request, ticket)
     scene = here.scene_or_error()
@@ -83,7 +83,7 @@ def _check_query(request: Request, ticket: str) -> None:
 @router.websocket("/scene/ws/{ticket}")
 async def stream(websocket: WebSocket, ticket: str) -> None:
     try:
-        here = services(websocket)
+        here = dependencies(websocket)
     except ConsoleError:
         await websocket.close(TRY_AGAIN_LATER)  # this robot's session is started again
         return
@@ -144,7 +144,7 @@ async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> 
         await websocket.accept(subprotocol=upstream.subprotocol)
         up = asyncio.create_task(_viewer_to_scene(websocket, upstream))
         down = asyncio.create_task(_scene_to_viewer(websocket, upstream))
-        ended = asyncio.create_task(services(websocket).warden.ended(ticket.link, ticket.ends))
+        ended = asyncio.create_task(dependencies(websocket).revocation.ended(ticket.link, ticket.ends))
         try:
             await asyncio.wait((up, down, ended), return_when=asyncio.FIRST_COMPLETED)
             if ended.done():
@@ -156,7 +156,7 @@ async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> 
 
 
 async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> None:
-    here, clock = services(websocket), asyncio.get_running_loop().time
+    here, clock = dependencies(websocket), asyncio.get_running_loop().time
     budget = TokenBucket(UP_RATE, UP_BURST, clock())
     try:
         while True:

@@ -14,7 +14,7 @@ from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json
 from lockstep.server.routes.scene_proxy import scene_query
 from lockstep.server.routes.stop_body import read_stop
-from lockstep.server.state.dependencies import authorized, services, takes_stops
+from lockstep.server.state.dependencies import authorized, dependencies, takes_stops
 from lockstep.server.stop.stop_presses import new_press, told_id
 
 __all__ = ["Delivered", "Health", "Released", "ResetRequest", "ScenePath", "SessionInfo", "router"]
@@ -86,7 +86,7 @@ class Released(msgspec.Struct, frozen=True):
 
 @router.get("/api/session")
 async def session(request: Request, caller: Caller) -> Response:
-    console = services(request).console
+    console = dependencies(request).console
     return json_answer(
         SessionInfo(
             epoch=console.clock.epoch,
@@ -98,8 +98,8 @@ async def session(request: Request, caller: Caller) -> Response:
             link=LinkInfo(up=console.robot.up, detail=console.robot.detail),
             you={"role": caller.role, "name": caller.name},
             peers={peer.id: peer.streams for peer in console.peers},
-            streams=services(request).media.offers,
-            voice=services(request).voice.enabled,
+            streams=dependencies(request).media.offers,
+            voice=dependencies(request).voice.enabled,
             description=console.robot.description,
             feedback=console.clock.feedback,
         )
@@ -127,7 +127,7 @@ async def reset(request: Request, caller: Caller) -> Response:
     """The holder of the control seat, or a supervisor. The right is looked at again once the body has come."""
     wanted = await read_json(request, ResetRequest)
     caller = await authorized(request)
-    console = services(request).console
+    console = dependencies(request).console
     await console.stops.reset(caller.actor, "http", wanted.number)
     return json_answer(Released(True, console.clock.event, wanted.number))
 
@@ -135,7 +135,7 @@ async def reset(request: Request, caller: Caller) -> Response:
 @router.post("/api/scene")
 async def scene(request: Request, caller: Caller) -> Response:
     """A path for an iframe that shows the 3D scene; its ticket is good for a few minutes."""
-    here = services(request)
+    here = dependencies(request)
     await here.scene_or_error().open()
     root = str(request.scope.get("root_path", ""))
     ticket = here.access.issue_ticket(caller.identity)
@@ -145,7 +145,7 @@ async def scene(request: Request, caller: Caller) -> Response:
 @router.get("/healthz")
 async def healthz(request: Request) -> Response:
     """For anyone, so it says no address and no reason; the log does."""
-    here = services(request)
+    here = dependencies(request)
     up, readable = here.console.robot.up, not here.state.invitations.trouble
     health = Health(
         status="ok" if up and readable else "degraded",
@@ -157,6 +157,6 @@ async def healthz(request: Request) -> Response:
 
 @router.get("/metrics")
 async def metrics(request: Request) -> Response:
-    here = services(request)
+    here = dependencies(request)
     text = await here.metrics.exposition.text(here.collect)
     return Response(text, media_type="text/plain; version=0.0.4", headers={"Cache-Control": "no-store"})

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from lockstep.server.auth.tokens import Right
 from lockstep.server.sfu.tickets import RelayAnswer, RelayTicket, without_key
-from lockstep.server.state.dependencies import authorized, services
+from lockstep.server.state.dependencies import authorized, dependencies
 
 __all__ = ["router"]
 
@@ -25,7 +25,7 @@ async def relay(
 
     Only such a one gets what lets it in, so everyone who watches is a participant. `lost`: RELAY-FEED, which it lost.
     """
-    here = services(request)
+    here = dependencies(request)
     ticket: RelayTicket | None = None
     if caller.role == "observer":
         known = here.console.peers.by_id(peer) if peer else None

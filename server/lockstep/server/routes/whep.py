@@ -31,7 +31,7 @@ from lockstep.server.http.static_files import takes_coding
 from lockstep.server.peers.agreed_channels import agreed_channels
 from lockstep.server.peers.webrtc_peer import WebRtcPeer
 from lockstep.server.routes.ice import servers_for
-from lockstep.server.state.dependencies import Dependencies, authorized, services
+from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
 from lockstep.server.webrtc.ice_servers import link_headers
 from lockstep.server.webrtc.ice_session import IceSession
 from lockstep.server.webrtc.sdp_offer import MAX_SECTIONS, parse_fragment, parse_offer
@@ -74,7 +74,7 @@ async def create(
     role of who asks.
     `sections`: an offer with fewer media sections than there are streams is refused, for the peer to make a larger one.
     """
-    here = services(request)
+    here = dependencies(request)
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(caller.token_id)  # before it costs anything
@@ -120,7 +120,7 @@ async def nothing_to_get() -> Response:
 @router.patch("/whep/{resource}")
 async def patch(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
     """More candidates (RFC 8840), or an ICE restart, which says `If-Match: *` (RFC 9725 4.3.1, 4.3.3)."""
-    here = services(request)
+    here = dependencies(request)
     peer = _own(here, resource, caller)
     peer.take_request()
     return await patched(request, here, peer.ice, lambda: _own(here, resource, caller))
@@ -157,7 +157,7 @@ def _precondition(request: Request, tag: str) -> str:
 
 @router.delete("/whep/{resource}")
 async def delete(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
-    _own(services(request), resource, caller).end("deleted")
+    _own(dependencies(request), resource, caller).end("deleted")
     return Response(status_code=200)
 
 
@@ -187,7 +187,7 @@ async def _negotiate(
     turns = here.media.turns_of(waits=observes)
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            connection = await here.house.endpoint.connect(
+            connection = await here.context.endpoint.connect(
                 turns=turns, servers=servers, settings=OF_OBSERVERS if observes else OF_DRIVERS
             )
     except TimeoutError as error:

@@ -26,7 +26,7 @@ from lockstep.server.media.published.published_camera import PublishedCamera
 from lockstep.server.publishing.publisher import Publisher
 from lockstep.server.routes.ice import servers_for
 from lockstep.server.routes.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, patched
-from lockstep.server.state.dependencies import Dependencies, authorized, services
+from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
 from lockstep.server.webrtc.ice_servers import link_headers
 from lockstep.server.webrtc.sdp_offer import parse_offer
 
@@ -147,7 +147,7 @@ def _pictures(offer: SessionDescription) -> MediaSection:
 
 def _enabled(request: Request) -> Dependencies:
     """Raises NotFound where nobody may publish anything."""
-    here = services(request)
+    here = dependencies(request)
     if not here.publishers.enabled:
         raise NotFound("nothing can be published to this console: LOCKSTEP_WHIP names no camera")
     return here
@@ -169,7 +169,7 @@ async def _negotiate(
     publisher = Publisher(camera, caller.identity, here.settings)
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            connection = await here.house.endpoint.connect(publisher.heard, turns=here.media.turns, servers=servers)
+            connection = await here.context.endpoint.connect(publisher.heard, turns=here.media.turns, servers=servers)
     except TimeoutError as error:
         raise BadSdp("the offer cannot be answered in time") from error
     except TooManyPeers as error:

@@ -64,7 +64,7 @@ class ConsoleContext:
         self.state = state
         self.guard = guard
         self.metrics = metrics
-        self.wardens: list[TokenRevocation] = []
+        self.revocations: list[TokenRevocation] = []
         self.silenced = SilencedLinks(state.invitations.invited_with)
         self._max_peers = max_peers
         self._reserved = reserved
@@ -132,12 +132,12 @@ class ConsoleContext:
     def enforce(self, changed: list[Invitation], by: Actor) -> None:
         """Act, at every robot, on what `by` has invited or revoked, and on what has expired."""
         now = self.state.invitations.now()
-        for warden in self.wardens:
-            warden.enforce(changed, by, now)
+        for revocation in self.revocations:
+            revocation.enforce(changed, by, now)
 
     def connected(self) -> Counter[str]:
         """Peers that are here, at any robot, by the ids of their links."""
-        return Counter(peer.identity.token_id for warden in self.wardens for peer in warden.peers)
+        return Counter(peer.identity.token_id for revocation in self.revocations for peer in revocation.peers)
 
     # silence
 
@@ -158,13 +158,13 @@ class ConsoleContext:
 
     def _end_silences(self) -> None:
         for link in self.silenced.ended(time.monotonic()):
-            for warden in self.wardens:
-                warden.silence_ended(link)
+            for revocation in self.revocations:
+                revocation.silence_ended(link)
 
     def check_room(self, identity: Identity) -> None:
         """Raises TooManyPeers when there is no place for another peer at any robot."""
         if self._max_peers is None:
             return
-        held = sum(warden.peers.taken_by(identity.token_id) for warden in self.wardens)
-        taken = sum(warden.peers.taken for warden in self.wardens)
+        held = sum(revocation.peers.taken_by(identity.token_id) for revocation in self.revocations)
+        taken = sum(revocation.peers.taken for revocation in self.revocations)
         check_place(identity.role, held, taken, self._max_peers, self._reserved)

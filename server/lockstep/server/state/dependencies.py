@@ -30,7 +30,7 @@ from lockstep.server.stop.stop_presses import Press
 from lockstep.server.talkback.talkback import Talkback
 from lockstep.server.telemetry.metrics import Metrics
 
-__all__ = ["Dependencies", "TakesStops", "authorized", "known_caller", "services", "takes_stops"]
+__all__ = ["Dependencies", "TakesStops", "authorized", "known_caller", "dependencies", "takes_stops"]
 
 
 class TakesStops(Protocol):
@@ -51,10 +51,10 @@ class Dependencies:
     metrics: Metrics
     console: Console
     media: MediaHub
-    house: ConsoleContext
+    context: ConsoleContext
     access: Access
     audit: AuditLog
-    warden: TokenRevocation
+    revocation: TokenRevocation
     scene: SceneView | None  # None when it is switched off or could not start
     recorder: Recorder
     relays: SfuCoordinator
@@ -64,11 +64,11 @@ class Dependencies:
 
     @property
     def state(self) -> ConsoleState:
-        return self.house.state
+        return self.context.state
 
     @property
     def guard(self) -> RequestRateLimits:
-        return self.house.guard
+        return self.context.guard
 
     async def stop(self, press: Press) -> StopAnswer:
         """Latched at once; returns when the robot has answered, or that it has not. Raises Silenced."""
@@ -81,7 +81,7 @@ class Dependencies:
         self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
         self.metrics.links_unreadable.set(bool(self.state.invitations.trouble))
         self.metrics.collect_audit(self.audit.lost, self.audit.failures)
-        self.house.collect()
+        self.context.collect()
         self.publishers.collect()
         self.metrics.recording_failed.set(self.recorder.state().state == "failed")
         self.metrics.free_bytes.set(free_bytes(self.recorder.shelf.directory))
@@ -101,9 +101,9 @@ def free_bytes(directory: Path) -> float:
     return math.nan
 
 
-def services(connection: HTTPConnection) -> Dependencies:
+def dependencies(connection: HTTPConnection) -> Dependencies:
     """Raises RobotFailed while the session has failed and is started again."""
-    found = connection.app.state.services
+    found = connection.app.state.dependencies
     if found is None:
         raise RobotFailed("the console's session of this robot has failed; it is started again")
     if not isinstance(found, Dependencies):
@@ -114,12 +114,12 @@ def services(connection: HTTPConnection) -> Dependencies:
 def takes_stops(connection: HTTPConnection) -> TakesStops:
     """In a fleet there is somebody also while the session has failed."""
     keeper: TakesStops | None = getattr(connection.app.state, "stop_keeper", None)
-    return services(connection) if keeper is None else keeper
+    return dependencies(connection) if keeper is None else keeper
 
 
 async def authorized(request: Request) -> Right:
     """What whoever asks may do. Raises AccessError, StateUnavailable."""
-    return known_caller(request, services(request).access.bearer(request.headers.get("authorization")))
+    return known_caller(request, dependencies(request).access.bearer(request.headers.get("authorization")))
 
 
 def known_caller(request: Request, caller: Right) -> Right:

@@ -42,7 +42,7 @@ class Talkback:
         tell: Callable[[Voice], None],
     ) -> None:
         self._speaker = None if spec is None else Speaker(spec, self._speaker_changed)
-        self._desk = TalkbackArbiter(holds)
+        self._arbiter = TalkbackArbiter(holds)
         self._tell = tell
         self._told = Voice()
         self._timer: asyncio.TimerHandle | None = None
@@ -62,7 +62,7 @@ class Talkback:
         return VoiceLine(self) if self.enabled and role != "observer" else None
 
     def state(self) -> Voice:
-        return self._desk.state(time.monotonic())
+        return self._arbiter.state(time.monotonic())
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -76,16 +76,16 @@ class Talkback:
 
     def heard(self, peer: "Peer", packet: VoicePacket) -> None:
         now = time.monotonic()
-        outcome: str = self._desk.packet(peer.id, peer.name, packet, now)
+        outcome: str = self._arbiter.packet(peer.id, peer.name, packet, now)
         if outcome == "played" and self._speaker is not None and not self._speaker.play(packet.payload):
             outcome = "speaker_busy"
         self._packets.labels(outcome).inc()
-        if self._timer is None and self._desk.speaks(now):
+        if self._timer is None and self._arbiter.speaks(now):
             self._look()
 
     def _speaker_changed(self) -> None:
         if self._speaker is not None:
-            self._desk.trouble = self._speaker.trouble
+            self._arbiter.trouble = self._speaker.trouble
             self._works.set(not self._speaker.trouble)
         self._announce()
 
@@ -93,7 +93,7 @@ class Talkback:
         """Whether somebody still speaks; again and again while so."""
         self._timer = None
         self._announce()
-        if self._desk.speaks(time.monotonic()):
+        if self._arbiter.speaks(time.monotonic()):
             self._timer = asyncio.get_running_loop().call_later(SPEAKS_FOR / 2, self._look)
 
     def _announce(self) -> None:

@@ -43,7 +43,7 @@ class LogContext:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        found = getattr(scope["app"].state, "services", None) if "app" in scope else None
+        found = getattr(scope["app"].state, "dependencies", None) if "app" in scope else None
         if found is not None:
             follow_clock(found.console.clock, found.robot)
         await self._app(scope, receive, send)

@@ -84,7 +84,7 @@ async def test_a_body_that_does_not_come_is_refused_by_name() -> None:
 async def test_a_stop_whose_body_does_not_come_is_a_stop_all_the_same() -> None:
     async with guarded_console(request_timeout=0.2) as (rig, port):
         assert b'"delivered":true' in await _answer_to_half_a_body(rig, port, b"POST /api/stop")
-        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
         assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
 
 
@@ -96,7 +96,7 @@ async def test_a_stop_does_not_wait_for_a_body_that_the_network_holds_up() -> No
         writer.write(head + authorization + b"\r\nContent-Length: 9\r\n\r\n{")
         async with asyncio.timeout(PATIENCE):
             assert b'"delivered":true' in await reader.readuntil(b"}")
-            await eventually(lambda: rig.services.console.clock.stop.stopped)
+            await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
             writer.write(b'"a": 10}' + HEAD + b"\r\n")
             assert b'"robot_link"' in await reader.readuntil(b"}"), "the connection serves on"
         writer.close()
@@ -143,7 +143,7 @@ async def test_a_stop_with_a_body_in_broken_chunks_is_a_stop_all_the_same() -> N
         )
         assert (await _said(reader)).startswith(b"HTTP/1.1 400")
         writer.close()
-        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
         assert not any(rig.count("lockstep_internal_errors_total", where=where) for where in ("http", "loop"))
 
 
@@ -263,7 +263,7 @@ async def test_a_link_that_floods_comes_first_no_more_but_its_stops_do(monkeypat
         await _answer(reader)
         writer.close()
         assert came_first == [True, True]
-        await eventually(lambda: rig.services.console.clock.stop.stopped)
+        await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
 
 
 async def test_a_link_that_has_ended_is_a_strangers_and_no_longer_comes_first() -> None:
@@ -275,7 +275,7 @@ async def test_a_link_that_has_ended_is_a_strangers_and_no_longer_comes_first() 
         await reader.readuntil(b"}")
         assert token in rig.app.state.known_tokens
         assert rig.app.state.connection_places.known == 1
-        assert rig.services.state.invitations.revoked_elsewhere({"id": math.inf})
+        assert rig.dependencies.state.invitations.revoked_elsewhere({"id": math.inf})
         writer.write(request)
         assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
         assert token not in rig.app.state.known_tokens
@@ -392,7 +392,7 @@ async def test_silent_tls_connections_hold_no_more_than_their_places_and_a_stop_
     names = {"localhost", "127.0.0.1"}
     certificate = self_signed(tmp_path, names, datetime.datetime.now(datetime.UTC))
     async with guarded_console(certificate=certificate, max_connections=20) as (rig, port):
-        await rig.services.console.robot.reached.wait()
+        await rig.dependencies.console.robot.reached.wait()
         before = len(os.listdir("/proc/self/fd"))
         silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(100)]
         await eventually(

@@ -18,16 +18,16 @@ from tests.server.media.viewer import Viewer, high_profiles, picture, running_pl
 NATIVE = {EVENT_REFERENCE_URI: 9}
 
 
-async def feed(plane: MediaHub, viewer: Viewer, pictures: list[Media]) -> None:
+async def feed(hub: MediaHub, viewer: Viewer, pictures: list[Media]) -> None:
     """One by one, each when the viewer has the one before."""
     for medium in pictures:
         before = timestamps(viewer, "video")
-        plane.feed(medium, medium.time)
+        hub.feed(medium, medium.time)
         await viewer.until(lambda before=before: timestamps(viewer, "video") > before)  # type: ignore[misc]
 
 
-def encoded(plane: MediaHub, codec: str) -> float:
-    return value(plane, "frames_encoded_total", stream="camera0", codec=codec)
+def encoded(hub: MediaHub, codec: str) -> float:
+    return value(hub, "frames_encoded_total", stream="camera0", codec=codec)
 
 
 def bodies(stream: bytes) -> list[bytes]:
@@ -36,12 +36,12 @@ def bodies(stream: bytes) -> list[bytes]:
 
 async def test_a_cameras_h264_goes_on_as_it_came_from_its_next_keyframe_on() -> None:
     pictures = camera_pictures(12)
-    async with running_plane() as plane, viewing(plane, ["video"], uris=NATIVE) as viewer:
-        await feed(plane, viewer, pictures)
+    async with running_plane() as hub, viewing(hub, ["video"], uris=NATIVE) as viewer:
+        await feed(hub, viewer, pictures)
         frames = viewer.frames("video")
         assert len(frames) == 12
-        assert encoded(plane, "H264-passed") == 12  # the first is a keyframe
-        assert encoded(plane, "H264") == 0
+        assert encoded(hub, "H264-passed") == 12  # the first is a keyframe
+        assert encoded(hub, "H264") == 0
         for medium, frame in zip(pictures, frames, strict=True):
             sent = [part for part in bodies(medium.payload) if part[0] & 0x1F not in (6, 9)]
             assert [part.rstrip(b"\x00") for part in bodies(frame)] == [part.rstrip(b"\x00") for part in sent]
@@ -50,13 +50,13 @@ async def test_a_cameras_h264_goes_on_as_it_came_from_its_next_keyframe_on() -> 
 
 async def test_a_late_joiner_gets_ours_at_once_and_the_cameras_from_its_keyframe() -> None:
     pictures = camera_pictures(10)
-    async with running_plane() as plane:
+    async with running_plane() as hub:
         for medium in pictures[:3]:
-            plane.feed(medium, medium.time)
-        async with viewing(plane, ["video"], uris=NATIVE) as viewer:
-            await feed(plane, viewer, pictures[3:])
-            assert encoded(plane, "H264") == 2
-            assert encoded(plane, "H264-passed") == 5
+            hub.feed(medium, medium.time)
+        async with viewing(hub, ["video"], uris=NATIVE) as viewer:
+            await feed(hub, viewer, pictures[3:])
+            assert encoded(hub, "H264") == 2
+            assert encoded(hub, "H264-passed") == 5
             assert inspect(viewer.frames("video")[0]).keyframe
             stamps = [read_stamp("native", each) for each in viewer.of("video") if each.packet.marker]
             assert stamps == [4, 5, 6, 7, 8, 9, 10]
@@ -73,62 +73,62 @@ async def test_a_late_joiner_gets_ours_at_once_and_the_cameras_from_its_keyframe
 
 @pytest.mark.parametrize(("codecs", "profile", "codec"), [(["VP8"], "baseline", "VP8"), (["H264"], "high", "H264")])
 async def test_who_cannot_take_the_cameras_pictures_gets_ours(codecs: list[str], profile: str, codec: str) -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], codecs=codecs, uris=NATIVE) as viewer:
-        await feed(plane, viewer, camera_pictures(7, profile=profile))
+    async with running_plane() as hub, viewing(hub, ["video"], codecs=codecs, uris=NATIVE) as viewer:
+        await feed(hub, viewer, camera_pictures(7, profile=profile))
         assert viewer.media.streams[0].codec == codec
-        assert encoded(plane, codec) == 7
-        assert encoded(plane, "H264-passed") == 0
+        assert encoded(hub, codec) == 7
+        assert encoded(hub, "H264-passed") == 0
 
 
 async def test_main_and_high_go_to_who_offers_them_once_the_camera_is_known_to_give_h264() -> None:
     pictures = camera_pictures(6, profile="high")
     with high_profiles():
-        async with running_plane() as plane:
-            plane.feed(pictures[0], 0.0)
-            async with viewing(plane, ["video"], codecs=["VP8", "H264"], uris=NATIVE) as viewer:
-                await feed(plane, viewer, pictures[1:])
+        async with running_plane() as hub:
+            hub.feed(pictures[0], 0.0)
+            async with viewing(hub, ["video"], codecs=["VP8", "H264"], uris=NATIVE) as viewer:
+                await feed(hub, viewer, pictures[1:])
                 assert viewer.media.streams[0].codec == "H264"
                 assert "profile-level-id=64001f" in viewer.answer
-                assert encoded(plane, "H264-passed") == 1  # the second keyframe
+                assert encoded(hub, "H264-passed") == 1  # the second keyframe
 
 
 async def test_a_lost_picture_is_made_up_for_by_a_keyframe_of_ours() -> None:
     pictures = camera_pictures(11)
-    async with running_plane() as plane, viewing(plane, ["video"], uris=NATIVE) as viewer:
-        await feed(plane, viewer, pictures[:2])
+    async with running_plane() as hub, viewing(hub, ["video"], uris=NATIVE) as viewer:
+        await feed(hub, viewer, pictures[:2])
         delivery = viewer.media.deliveries[0]
         delivery.stream.request_keyframe("H264", delivery.target, "pli")
-        await feed(plane, viewer, pictures[2:4])
+        await feed(hub, viewer, pictures[2:4])
         # The camera's own picture and ours come both while the keyframe is made.
         await viewer.until(lambda: any(inspect(frame).keyframe for frame in viewer.frames("video")[2:]))
-        await feed(plane, viewer, pictures[4:])
-        assert 1 <= encoded(plane, "H264") <= 3
-        assert encoded(plane, "H264-passed") >= 8
-        assert value(plane, "keyframe_requests_total", stream="camera0", cause="pli") == 1
+        await feed(hub, viewer, pictures[4:])
+        assert 1 <= encoded(hub, "H264") <= 3
+        assert encoded(hub, "H264-passed") >= 8
+        assert value(hub, "keyframe_requests_total", stream="camera0", cause="pli") == 1
 
 
 async def test_a_path_without_room_gets_ours_and_nobody_else_does() -> None:
     pictures = camera_pictures(11)
     async with AsyncExitStack() as stack:
-        plane = await stack.enter_async_context(running_plane(quality=False))  # which would hold nobody back
-        narrow = await stack.enter_async_context(viewing(plane, ["video"], uris=NATIVE))
-        wide = await stack.enter_async_context(viewing(plane, ["video"], uris=NATIVE))
+        hub = await stack.enter_async_context(running_plane(quality=False))  # which would hold nobody back
+        narrow = await stack.enter_async_context(viewing(hub, ["video"], uris=NATIVE))
+        wide = await stack.enter_async_context(viewing(hub, ["video"], uris=NATIVE))
         stream, target = narrow.media.deliveries[0].stream, narrow.media.deliveries[0].target
         cast(Any, stream).hold_back(target, True)
-        await feed(plane, wide, pictures)
+        await feed(hub, wide, pictures)
         await narrow.until(lambda: timestamps(narrow, "video") >= 2)  # ours: what is not encoded in time is left out
-        assert encoded(plane, "H264-passed") == 11
-        assert encoded(plane, "H264") >= 2
+        assert encoded(hub, "H264-passed") == 11
+        assert encoded(hub, "H264") >= 2
         passed = cast(Any, stream)._passing.output
         assert list(passed.targets) == [wide.media.deliveries[0].target]
 
 
 async def test_a_camera_that_gives_other_pictures_is_encoded_from_then_on() -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], uris=NATIVE) as viewer:
-        await feed(plane, viewer, camera_pictures(3))
-        await feed(plane, viewer, [picture(stamp, stamp / 30) for stamp in range(4, 8)])
-        assert encoded(plane, "H264-passed") == 3
-        assert encoded(plane, "H264") == 4
+    async with running_plane() as hub, viewing(hub, ["video"], uris=NATIVE) as viewer:
+        await feed(hub, viewer, camera_pictures(3))
+        await feed(hub, viewer, [picture(stamp, stamp / 30) for stamp in range(4, 8)])
+        assert encoded(hub, "H264-passed") == 3
+        assert encoded(hub, "H264") == 4
 
 
 def test_a_group_is_kept_from_its_keyframe_on_and_within_its_bound() -> None:

@@ -85,29 +85,29 @@ async def test_no_medium_of_an_attached_source_is_stamped_newer_than_the_truth(
     log, clock = tmp_path / "events.jsonl", EventClock()
     async with AsyncExitStack() as stack:
         attached = await stack.enter_async_context(attach(tmp_path, monkeypatch))
-        plane = Plane(attached.captured)
+        hub = Plane(attached.captured)
         specs = [parse_source("video" if attached.kind == "video" else "audio", text) for text in attached.texts]
-        desk = SourceManager(specs, clock, plane, CollectorRegistry(), lambda _: None)
+        manager = SourceManager(specs, clock, hub, CollectorRegistry(), lambda _: None)
         async with Bridge(create(), BridgeSettings(port=0, event_log=log)) as bridge, operator(bridge) as driver:
             clock.begin(bridge.epoch)
             clock.observe(driver.feedback, time.monotonic())
-            running = asyncio.create_task(desk.run())
+            running = asyncio.create_task(manager.run())
             try:
                 async with asyncio.timeout(60):
-                    while not all(delivered(plane, spec.name) >= WANTED for spec in specs):
+                    while not all(delivered(hub, spec.name) >= WANTED for spec in specs):
                         clock.observe(await driver.drive([0.1, 0.0, 0.2]), time.monotonic())
             finally:
                 running.cancel()
                 await asyncio.gather(running, return_exceptions=True)
     times, events = truth(log)
-    for media, captured in plane.media:
+    for media, captured in hub.media:
         assert media.time <= captured
         assert media.stamp <= events[bisect_right(times, captured) - 1], media.stream
-    assert len({media.stamp for media, _ in plane.media}) > 5, "the stamps did not move"
+    assert len({media.stamp for media, _ in hub.media}) > 5, "the stamps did not move"
 
 
-def delivered(plane: Plane, stream: str) -> int:
-    return sum(media.stream == stream for media, _ in plane.media)
+def delivered(hub: Plane, stream: str) -> int:
+    return sum(media.stream == stream for media, _ in hub.media)
 
 
 def truth(log: Path) -> tuple[list[float], list[int]]:

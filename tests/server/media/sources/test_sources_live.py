@@ -36,7 +36,7 @@ async def test_attached_media_come_after_the_robots_and_their_state_is_told(tmp_
         assert rig.count("lockstep_media_source_live", source="front") == 1
         assert rig.count("lockstep_media_source_failures_total", source="gone", reason="refused") >= 1
         text = (await rig.http.get("/metrics", headers=rig.token("observer"))).text
-        assert "geheim" not in text + repr(rig.services.settings)
+        assert "geheim" not in text + repr(rig.dependencies.settings)
 
 
 def test_bad_sources_are_refused_at_the_start_without_a_word_of_their_password() -> None:

@@ -21,10 +21,10 @@ from lockstep.server.media.codecs.sound_encoder import (
 )
 from lockstep.server.media.errors import MediaError, PayloadError, UnsupportedCodecError
 from lockstep.server.media.metrics import MediaMetrics
-from lockstep.server.media.pipeline.encoding_layer import EncodingLayer
 from lockstep.server.media.pipeline.fanout import FanOut
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.stream import Encoded, Stream
+from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.media.quality.expected_loss import ExpectedLoss
 from lockstep.server.media.settings import MediaSettings
 
@@ -39,7 +39,7 @@ FASTEST = 1.25  # s of it in a second, afterwards
 class SoundJob(NamedTuple):
     media: Media
     capture_time: float
-    outputs: list[tuple[EncodingLayer, frozenset[bool]]]  # with the variants to be packetised in the worker
+    outputs: list[tuple[TierEncoding, frozenset[bool]]]  # with the variants to be packetised in the worker
     expected_loss: int  # percent
 
 
@@ -91,7 +91,7 @@ class AudioStream(Stream[SoundJob]):
         self._expected.update(loss, now)
 
     def _work(self, job: SoundJob) -> list[Encoded]:
-        orders: dict[str, list[tuple[EncodingLayer, frozenset[bool]]]] = {}
+        orders: dict[str, list[tuple[TierEncoding, frozenset[bool]]]] = {}
         for order in sorted(job.outputs, key=lambda order: order[0].tier == "crowd"):  # see `_finish`
             orders.setdefault(order[0].codec, []).append(order)
         self._encoders = {codec: encoder for codec, encoder in self._encoders.items() if codec in orders}
@@ -124,7 +124,7 @@ class AudioStream(Stream[SoundJob]):
 
     def _packed(
         self,
-        output: EncodingLayer,
+        output: TierEncoding,
         sounds: Sequence[EncodedSound] | MediaError,
         variants: frozenset[bool],
         seconds: float,
@@ -145,7 +145,7 @@ class AudioStream(Stream[SoundJob]):
                 frame.payloads(trailer)
         return Encoded(output, frames, seconds, whole=whole)
 
-    def _admit(self, output: EncodingLayer, frame: EncodedFrame) -> None:
+    def _admit(self, output: TierEncoding, frame: EncodedFrame) -> None:
         """Nobody: `_finish` says when."""
 
     def _finish(self, encoded: Encoded) -> None:
@@ -169,7 +169,7 @@ def _segment(job: SoundJob) -> Segment:
     return Segment(samples, media.sample_rate, media.channels, media.stamp, media.time, job.capture_time)
 
 
-def _frame(output: EncodingLayer, sound: EncodedSound) -> EncodedFrame:
+def _frame(output: TierEncoding, sound: EncodedSound) -> EncodedFrame:
     # Only this stream's worker calls this, so the output's last capture time has one writer.
     return EncodedFrame(
         sound.data,

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 
 from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.h264 import Profile, accepts, inspect
-from lockstep.server.media.pipeline.encoding_layer import EncodingLayer
+from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.media.quality.encoding_target import PictureTier
 from lockstep.server.media.subscription import Subscription
 
@@ -26,7 +26,7 @@ PASSED = "H264-passed"  # the codec that counts what goes on as it came
 class Passthrough:
     """Who gets the camera's own pictures. Part of one stream, which tells of joins, moves and leaves."""
 
-    def __init__(self, output: EncodingLayer, encoded: Callable[[PictureTier], EncodingLayer]) -> None:
+    def __init__(self, output: TierEncoding, encoded: Callable[[PictureTier], TierEncoding]) -> None:
         """`output`: of the camera's own pictures. `encoded`: ours in H.264, of a tier."""
         self.output = output
         self.profile: Profile | None = None  # of the camera's pictures; None while it gives no H.264
@@ -69,7 +69,7 @@ class Passthrough:
             if self.holds(target):
                 self.return_to_ours(target)
 
-    def begin(self, keyframe: Media, outputs: Iterable[EncodingLayer]) -> None:
+    def begin(self, keyframe: Media, outputs: Iterable[TierEncoding]) -> None:
         """A keyframe of the camera: who can take it comes over, who no longer can goes back."""
         access = inspect(keyframe.payload)
         if access.profile is not None:

@@ -13,11 +13,11 @@ from lockstep.protocol.serial import event_gap
 from lockstep.robot_bridge.thread_name import name_thread
 from lockstep.server.media.errors import MediaError
 from lockstep.server.media.metrics import MediaMetrics
-from lockstep.server.media.pipeline.encoding_layer import EncodingLayer
 from lockstep.server.media.pipeline.fanout import FanOut
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.keyframes import KeyframeScheduler
-from lockstep.server.media.pipeline.recorded_layer import RecordedLayer
+from lockstep.server.media.pipeline.recorded_encoding import RecordedEncoding
+from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
 from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.subscription import Subscription
@@ -41,7 +41,7 @@ class Encoded:
 
     def __init__(
         self,
-        output: EncodingLayer,
+        output: TierEncoding,
         frames: Sequence[EncodedFrame],
         seconds: float,
         error: MediaError | None = None,
@@ -80,9 +80,9 @@ class Stream(ABC, Generic[Job]):
         )
         self._peers = metrics.peers.labels(name)
         self._frames_in = metrics.frames_in.labels(name)
-        self._outputs: dict[tuple[str, PictureTier], EncodingLayer] = {}
+        self._outputs: dict[tuple[str, PictureTier], TierEncoding] = {}
         self._members: dict[Subscription, None] = {}  # an ordered set
-        self._recorded: RecordedLayer | None = None  # None: nothing is recorded
+        self._recorded: RecordedEncoding | None = None  # None: nothing is recorded
 
     @property
     def full_plan(self) -> EncodingTarget:
@@ -90,16 +90,16 @@ class Stream(ABC, Generic[Job]):
         return EncodingTarget(self._settings.video_bitrate_bps, 1.0)
 
     @property
-    def outputs(self) -> Mapping[tuple[str, PictureTier], EncodingLayer]:
+    def outputs(self) -> Mapping[tuple[str, PictureTier], TierEncoding]:
         """By codec and tier, as far as they exist."""
         return self._outputs
 
     @property
-    def passed(self) -> EncodingLayer | None:
+    def passed(self) -> TierEncoding | None:
         """What goes on as its source encoded it, while it gives something that can; None for most."""
         return None
 
-    def record(self, recorded: RecordedLayer | None) -> None:
+    def record(self, recorded: RecordedEncoding | None) -> None:
         """Hand what `recorded` chooses to it from now on; None: no more."""
         if self._recorded is not None:
             self._recorded.close()
@@ -110,13 +110,13 @@ class Stream(ABC, Generic[Job]):
         if self._recorded is not None:
             self._recorded.request_keyframe()
 
-    def output(self, codec: str, tier: PictureTier) -> EncodingLayer:
+    def output(self, codec: str, tier: PictureTier) -> TierEncoding:
         """Made when it is first asked for; it costs nothing while nobody is in it."""
         found = self._outputs.get((codec, tier))
         if found is None:
             settings = self._settings
             keyframes = KeyframeScheduler(settings.keyframe_interval_seconds, settings.keyframe_spacing_seconds)
-            found = EncodingLayer(self.name, codec, tier, self.full_plan, keyframes, self._metrics)
+            found = TierEncoding(self.name, codec, tier, self.full_plan, keyframes, self._metrics)
             self._outputs[codec, tier] = found
         return found
 
@@ -126,7 +126,7 @@ class Stream(ABC, Generic[Job]):
             return wanted
         return next((output.codec for output in self._outputs.values() if output.targets), self.codecs[0])
 
-    def outputs_of(self, tier: PictureTier) -> list[EncodingLayer]:
+    def outputs_of(self, tier: PictureTier) -> list[TierEncoding]:
         """Of all codecs, as far as they exist."""
         return [output for output in self._outputs.values() if output.tier == tier]
 
@@ -149,7 +149,7 @@ class Stream(ABC, Generic[Job]):
             self.output(codec, tier).expect(target, source)
 
     def request_keyframe(self, codec: str, target: Subscription, cause: str) -> None:
-        """For `target`; see `EncodingLayer.request_keyframe`."""
+        """For `target`; see `TierEncoding.request_keyframe`."""
         for output in self._outputs.values():
             if target in output.targets:
                 output.request_keyframe(cause)
@@ -183,14 +183,14 @@ class Stream(ABC, Generic[Job]):
     def _drop(self, stage: str, count: int = 1) -> None:
         self._metrics.dropped.labels(self.name, stage).inc(count)
 
-    def _publish(self, output: EncodingLayer, frame: EncodedFrame) -> None:
+    def _publish(self, output: TierEncoding, frame: EncodedFrame) -> None:
         output.count(frame)
         self._admit(output, frame)
         self._fan_out.publish(frame, output.targets)
         if self._recorded is not None:
             self._recorded.published(self.name, output, frame)
 
-    def _admit(self, output: EncodingLayer, frame: EncodedFrame) -> None:
+    def _admit(self, output: TierEncoding, frame: EncodedFrame) -> None:
         """Let those who come from another tier begin with this frame, if they can."""
         if frame.keyframe and output.arriving:
             output.arrive()

@@ -13,13 +13,13 @@ from lockstep.server.media.codecs.picture import PictureDecoder
 from lockstep.server.media.codecs.picture_encoder import VIDEO_CODECS, PictureEncoder, create_picture_encoder
 from lockstep.server.media.errors import MediaError, PayloadError
 from lockstep.server.media.metrics import MediaMetrics
-from lockstep.server.media.pipeline.encoding_layer import EncodingLayer
 from lockstep.server.media.pipeline.fanout import FanOut
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.frame_rate_limiter import FrameRateLimiter
 from lockstep.server.media.pipeline.media_clock import PictureClock
 from lockstep.server.media.pipeline.passthrough import PASSED, Passthrough
 from lockstep.server.media.pipeline.stream import Encoded, Stream
+from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
 from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.subscription import Subscription
@@ -67,12 +67,12 @@ class PictureJob(NamedTuple):
     """One picture for one output."""
 
     source: SourcePicture
-    output: EncodingLayer
+    output: TierEncoding
     plan: EncodingTarget
     keyframe: bool
     variants: frozenset[bool]  # with and without trailer, to be packetised in the worker
     capture_time: float
-    needed: frozenset[EncodingLayer]  # outputs that keep their encoders
+    needed: frozenset[TierEncoding]  # outputs that keep their encoders
 
     @property
     def media(self) -> Media:
@@ -99,14 +99,14 @@ class VideoStream(Stream[PictureJob]):
         self._pace = FrameRateLimiter(settings.video_frames_per_second)
         self._newest: tuple[Media, float, float] | None = None  # medium, now, capture time
         self._source: SourcePicture | None = None  # of the orders
-        self._orders: list[EncodingLayer] = []  # that are still to be encoded from it
+        self._orders: list[TierEncoding] = []  # that are still to be encoded from it
         self._began = 0.0  # when it came
         self._others_served = 0  # observers' tiers that were encoded from it
         self._taken = metrics.taken.labels(camera.name)
         self._decoder = PictureDecoder()
         self._group = GroupOfPictures()
         self._passing = Passthrough(self.output(PASSED, "operator"), lambda tier: self.output("H264", tier))
-        self._encoders: dict[EncodingLayer, PictureEncoder] = {}
+        self._encoders: dict[TierEncoding, PictureEncoder] = {}
         self._open = {codec: metrics.encoders.labels(camera.name, codec) for codec in VIDEO_CODECS}
 
     @property
@@ -166,7 +166,7 @@ class VideoStream(Stream[PictureJob]):
             return
         self._publish(output, frame)
 
-    def _ours(self, codec: str | None = None) -> list[EncodingLayer]:
+    def _ours(self, codec: str | None = None) -> list[TierEncoding]:
         """The outputs that we encode, of one codec or all."""
         passed = self._passing.output
         return [each for each in self._outputs.values() if each is not passed and codec in (None, each.codec)]
@@ -192,7 +192,7 @@ class VideoStream(Stream[PictureJob]):
         self._passing.hold_back(target, wanted)
 
     @property
-    def passed(self) -> EncodingLayer | None:
+    def passed(self) -> TierEncoding | None:
         return None if self._passing.profile is None else self._passing.output
 
     def measured(self, target: Subscription) -> tuple[float, float] | None:
@@ -227,7 +227,7 @@ class VideoStream(Stream[PictureJob]):
         self._taken.inc(bool(due))
         self._orders = sorted(due, key=lambda output: (output.tier != "operator", output.encoded_at))
 
-    def _due(self, output: EncodingLayer, time: float, now: float) -> bool:
+    def _due(self, output: TierEncoding, time: float, now: float) -> bool:
         if not output.needed or not output.cadence.take(time, output.plan.frame_rate, self.frame_rate):
             return False
         if now < output.paused_until or output.held_up:
@@ -235,7 +235,7 @@ class VideoStream(Stream[PictureJob]):
             return False
         return True
 
-    def _job(self, source: SourcePicture, output: EncodingLayer) -> PictureJob:
+    def _job(self, source: SourcePicture, output: TierEncoding) -> PictureJob:
         output.encoded_at = self._began
         self._others_served += output.tier != "operator"
         return PictureJob(
@@ -274,7 +274,7 @@ class VideoStream(Stream[PictureJob]):
             packed.payloads(trailer)
         return [Encoded(output, (packed,), time.perf_counter() - started)]
 
-    def _encoder(self, output: EncodingLayer, plan: EncodingTarget) -> PictureEncoder:
+    def _encoder(self, output: TierEncoding, plan: EncodingTarget) -> PictureEncoder:
         encoder = self._encoders.get(output)
         if encoder is None:
             encoder = create_picture_encoder(output.codec, plan.bitrate_bps, plan.frame_rate)

@@ -9,7 +9,7 @@ from lockstep.protocol.serial import event_gap
 from lockstep.server.media.pipeline.rtp_sender import SenderStats
 from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits, Reason
 from lockstep.server.media.quality.encoding_target import PictureTier
-from lockstep.server.media.quality.observer_layer import ObserverLayer
+from lockstep.server.media.quality.observer_tier import ObserverTier
 from lockstep.server.media.subscription import Subscription
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class PeerQuality:
         self.sounds: list[SoundLink] = []
         self.pace: Callable[[float | None], None] = lambda rate: None  # bit/s that the path carries; None: no limit
         self.path = BandwidthEstimator(limits, clock())
-        self.choice = ObserverLayer(clock())
+        self.choice = ObserverTier(clock())
         self.tier = tier  # what its pictures are made for
         self.encoded_as: PictureTier = tier  # whose pictures it gets: a tier may be served by another's encoder
         self.hears_as: PictureTier = "operator"  # whose packets of sound it gets: a crowd's are longer

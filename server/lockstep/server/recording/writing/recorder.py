@@ -18,7 +18,7 @@ from lockstep.server.control.session_listener import SessionListener
 from lockstep.server.errors import AlreadyRecording, RecordingFailed
 from lockstep.server.event_clock import EventClock
 from lockstep.server.media.pipeline.frame import EncodedFrame
-from lockstep.server.media.pipeline.recorded_layer import FrameTaker
+from lockstep.server.media.pipeline.recorded_encoding import FrameTaker
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.records import (
     CommandOutcome,

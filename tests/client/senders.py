@@ -10,10 +10,10 @@ NEUTRAL = [0.0]
 
 
 def new_pilot(event: int = 1, min_interval: float = 0.0) -> CommandSender:
-    pilot = CommandSender(CommandGate("feedback", 4, min_interval), NEUTRAL)
-    pilot.feedback(feedback(event), 0.0)
-    pilot.ready = True
-    return pilot
+    sender = CommandSender(CommandGate("feedback", 4, min_interval), NEUTRAL)
+    sender.feedback(feedback(event), 0.0)
+    sender.ready = True
+    return sender
 
 
 def commands(messages: list[Command | Rest]) -> list[Command]:
@@ -24,7 +24,7 @@ def rests(messages: list[Command | Rest]) -> list[Rest]:
     return [message for message in messages if isinstance(message, Rest)]
 
 
-def flying(pilot: CommandSender, now: float = 0.0) -> Command:
-    pilot.intend(FAST, now)
-    [command] = commands(pilot.due(now))
+def flying(sender: CommandSender, now: float = 0.0) -> Command:
+    sender.intend(FAST, now)
+    [command] = commands(sender.due(now))
     return command

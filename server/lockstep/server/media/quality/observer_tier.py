@@ -10,14 +10,14 @@
 from lockstep.protocol.console import Tier
 from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator
 
-__all__ = ["ObserverLayer"]
+__all__ = ["ObserverTier"]
 
 ENOUGH = 0.6
 TRIAL = 20.0  # s
 PATIENCE, MOST_PATIENCE = 10.0, 160.0  # s
 
 
-class ObserverLayer:
+class ObserverTier:
     """One per observer; begins in the high tier."""
 
     def __init__(self, now: float) -> None:

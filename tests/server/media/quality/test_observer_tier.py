@@ -1,5 +1,5 @@
 from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits
-from lockstep.server.media.quality.observer_layer import MOST_PATIENCE, PATIENCE, ObserverLayer
+from lockstep.server.media.quality.observer_tier import MOST_PATIENCE, PATIENCE, ObserverTier
 
 HIGH = 1_000_000.0
 LIMITS = RateLimits(80_000, HIGH, HIGH)
@@ -11,7 +11,7 @@ class Observer:
     def __init__(self, capacity: float) -> None:
         self.capacity = capacity
         self.path = BandwidthEstimator(LIMITS, 0.0)
-        self.choice = ObserverLayer(0.0)
+        self.choice = ObserverTier(0.0)
         self.moves: list[tuple[float, str]] = []
         self._octets = 0.0
         self._queue = 0.0  # s

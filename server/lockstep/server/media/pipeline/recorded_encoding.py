@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Protocol
 
-from lockstep.server.media.pipeline.encoding_layer import EncodingLayer
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.passthrough import PASSED
+from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
 
-__all__ = ["FrameTaker", "RecordedLayer", "RecordedStream"]
+__all__ = ["FrameTaker", "RecordedEncoding", "RecordedStream"]
 
 TIERS: tuple[PictureTier, ...] = ("operator", "high", "crowd", "low")
 HALF_A_PACKET = 0.010  # s of sound
@@ -29,13 +29,13 @@ class RecordedStream(Protocol):
     @property
     def full_plan(self) -> EncodingTarget: ...
     @property
-    def outputs(self) -> Mapping[tuple[str, PictureTier], EncodingLayer]: ...
+    def outputs(self) -> Mapping[tuple[str, PictureTier], TierEncoding]: ...
     @property
-    def passed(self) -> EncodingLayer | None: ...
-    def output(self, codec: str, tier: PictureTier) -> EncodingLayer: ...
+    def passed(self) -> TierEncoding | None: ...
+    def output(self, codec: str, tier: PictureTier) -> TierEncoding: ...
 
 
-class RecordedLayer:
+class RecordedEncoding:
     """Call `choose` before each medium, `published` with each frame, `close` at the end.
 
     The operator's encoding comes first; then what a camera encoded itself; then that of observers. Where nobody takes
@@ -68,10 +68,10 @@ class RecordedLayer:
         self._keyframe_seconds = keyframe_seconds
         self._attached = attached
         self._sound = sound
-        self._last: tuple[EncodingLayer, float] | None = None  # what was taken, and its time
-        self._current: EncodingLayer | None = None
-        self._next: EncodingLayer | None = None  # from its next keyframe on
-        self._meanwhile: EncodingLayer | None = None  # ours, until the camera's own first keyframe
+        self._last: tuple[TierEncoding, float] | None = None  # what was taken, and its time
+        self._current: TierEncoding | None = None
+        self._next: TierEncoding | None = None  # from its next keyframe on
+        self._meanwhile: TierEncoding | None = None  # ours, until the camera's own first keyframe
 
     def choose(self, stream: RecordedStream) -> None:
         wanted = self._best(stream)
@@ -87,20 +87,20 @@ class RecordedLayer:
                 self._meanwhile = self._ours(stream)
                 self._begin(self._meanwhile, stream)
 
-    def _begin(self, output: EncodingLayer, stream: RecordedStream) -> None:
+    def _begin(self, output: TierEncoding, stream: RecordedStream) -> None:
         if not output.needed:
             output.plan = stream.full_plan
         output.recorded = True
         output.keyframes.longest = self._keyframe_seconds
         output.request_keyframe("record")
 
-    def _best(self, stream: RecordedStream) -> EncodingLayer:
+    def _best(self, stream: RecordedStream) -> TierEncoding:
         operators = stream.outputs.get((self._codecs[0], "operator"))
         if operators is not None and operators.targets:
             return operators
         return stream.passed or self._ours(stream)
 
-    def _ours(self, stream: RecordedStream) -> EncodingLayer:
+    def _ours(self, stream: RecordedStream) -> TierEncoding:
         """What we encode for somebody; where that is nobody, for the recording."""
         for codec in self._codecs:
             for tier in TIERS:
@@ -109,7 +109,7 @@ class RecordedLayer:
                     return stream.output(codec, "high") if tier == "crowd" else found  # all pictures, not a crowd's
         return stream.output(self._codecs[0], self._own_tier)
 
-    def published(self, stream: str, output: EncodingLayer, frame: EncodedFrame) -> None:
+    def published(self, stream: str, output: TierEncoding, frame: EncodedFrame) -> None:
         if frame.keyframe and output is self._next:
             self._drop(self._current)
             self._drop(self._meanwhile)
@@ -121,7 +121,7 @@ class RecordedLayer:
             codec = self._codecs[0] if output.codec == PASSED else output.codec
             self._take(stream, codec, frame, attached=self._attached)
 
-    def _was_taken(self, output: EncodingLayer, frame: EncodedFrame) -> bool:
+    def _was_taken(self, output: TierEncoding, frame: EncodedFrame) -> bool:
         """Whether this sound is recorded already, in another codec."""
         if not self._sound or self._last is None or self._last[0] is output:
             return False
@@ -145,7 +145,7 @@ class RecordedLayer:
         self._current = self._next = self._meanwhile = None
 
     @staticmethod
-    def _drop(output: EncodingLayer | None) -> None:
+    def _drop(output: TierEncoding | None) -> None:
         if output is not None:
             output.recorded = False
             output.keyframes.longest = None

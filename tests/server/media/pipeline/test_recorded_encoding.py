@@ -40,26 +40,26 @@ class Taken:
         """s from one to the next."""
         return [round(after.time - before.time, 4) for before, after in pairwise(self.frames)]
 
-    async def feed(self, plane: MediaHub, media: list[Media]) -> None:
+    async def feed(self, hub: MediaHub, media: list[Media]) -> None:
         """One by one, each when the one before was recorded."""
         for medium in media:
             self._news.clear()
-            plane.feed(medium, medium.time)
+            hub.feed(medium, medium.time)
             async with asyncio.timeout(TIMEOUT):
                 await self._news.wait()
 
-    async def hear(self, plane: MediaHub, media: list[Media]) -> None:
+    async def hear(self, hub: MediaHub, media: list[Media]) -> None:
         """As `feed`. A resampler holds some sound back, so that the newest packets come later."""
         for medium in media:
-            plane.feed(medium, medium.time)
+            hub.feed(medium, medium.time)
             async with asyncio.timeout(TIMEOUT):
                 while medium.stamp > 2 and (not self.frames or self.stamps[-1] < medium.stamp - 2):
                     self._news.clear()
                     await self._news.wait()
 
 
-def encoded(plane: MediaHub, codec: str) -> float:
-    return value(plane, "frames_encoded_total", stream="camera0", codec=codec)
+def encoded(hub: MediaHub, codec: str) -> float:
+    return value(hub, "frames_encoded_total", stream="camera0", codec=codec)
 
 
 def plain(first: int, last: int) -> list[Media]:
@@ -80,14 +80,14 @@ def decoded(frames: list[EncodedFrame]) -> int:
 async def test_what_the_operator_gets_in_h264_is_recorded_and_encoded_once() -> None:
     taken = Taken()
     async with (
-        running_plane(description(microphones=0)) as plane,
-        viewing(plane, ["video"], priority=True) as operator,
+        running_plane(description(microphones=0)) as hub,
+        viewing(hub, ["video"], priority=True) as operator,
     ):
-        plane.record(taken)
-        await taken.feed(plane, plain(1, 6))
+        hub.record(taken)
+        await taken.feed(hub, plain(1, 6))
         await operator.until(lambda: timestamps(operator, "video") == 6)
         assert taken.stamps == [1, 2, 3, 4, 5, 6]
-        assert encoded(plane, "H264") == 6
+        assert encoded(hub, "H264") == 6
         assert [slices(frame) for frame in operator.frames("video")] == [slices(frame.data) for frame in taken.frames]
 
 
@@ -96,18 +96,18 @@ async def test_where_all_take_vp8_that_is_recorded_and_nothing_is_encoded_for_it
     """As it was sent, byte for byte; an operator's and an observer's."""
     taken = Taken()
     async with (
-        running_plane(description(microphones=0)) as plane,
-        viewing(plane, ["video"], codecs=["VP8"], priority=priority) as viewer,
+        running_plane(description(microphones=0)) as hub,
+        viewing(hub, ["video"], codecs=["VP8"], priority=priority) as viewer,
     ):
-        plane.record(taken)
-        await taken.feed(plane, plain(1, 4))
+        hub.record(taken)
+        await taken.feed(hub, plain(1, 4))
         await viewer.until(lambda: timestamps(viewer, "video") == 4)
         assert (taken.stamps, set(taken.codecs)) == ([1, 2, 3, 4], {"VP8"})
-        assert (encoded(plane, "H264"), encoded(plane, "VP8")) == (0, 4)
+        assert (encoded(hub, "H264"), encoded(hub, "VP8")) == (0, 4)
         assert viewer.frames("video") == [frame.data for frame in taken.frames]
-        plane.record_keyframes()
+        hub.record_keyframes()
         for medium in plain(5, 40):
-            await taken.feed(plane, [medium])
+            await taken.feed(hub, [medium])
             if taken.frames[-1].keyframe:
                 break
         assert taken.frames[-1].keyframe
@@ -116,20 +116,20 @@ async def test_where_all_take_vp8_that_is_recorded_and_nothing_is_encoded_for_it
 async def test_the_codec_changes_with_a_keyframe_when_who_takes_h264_goes_and_comes() -> None:
     taken = Taken()
     async with (
-        running_plane(description(microphones=0)) as plane,
-        viewing(plane, ["video"], codecs=["VP8"]),
+        running_plane(description(microphones=0)) as hub,
+        viewing(hub, ["video"], codecs=["VP8"]),
     ):
-        async with viewing(plane, ["video"], priority=True):
-            plane.record(taken)
-            await taken.feed(plane, plain(1, 4))
+        async with viewing(hub, ["video"], priority=True):
+            hub.record(taken)
+            await taken.feed(hub, plain(1, 4))
             assert taken.codecs == ["H264"] * 4
-        await taken.feed(plane, plain(5, 30))
+        await taken.feed(hub, plain(5, 30))
         assert taken.codecs[-1] == "VP8"
-        before = encoded(plane, "H264")
-        await taken.feed(plane, plain(31, 34))
-        assert encoded(plane, "H264") == before
-        async with viewing(plane, ["video"], priority=True):
-            await taken.feed(plane, plain(35, 60))
+        before = encoded(hub, "H264")
+        await taken.feed(hub, plain(31, 34))
+        assert encoded(hub, "H264") == before
+        async with viewing(hub, ["video"], priority=True):
+            await taken.feed(hub, plain(35, 60))
         assert taken.codecs[-1] == "H264"
     assert sorted(set(taken.stamps)) == list(range(1, 61))  # one with which another begins may be there in both
     assert taken.stamps == sorted(taken.stamps)
@@ -140,15 +140,15 @@ async def test_the_codec_changes_with_a_keyframe_when_who_takes_h264_goes_and_co
 
 async def test_with_nobody_there_h264_is_made_until_somebody_takes_vp8() -> None:
     taken = Taken()
-    async with running_plane(description(microphones=0)) as plane:
-        plane.record(taken)
-        await taken.feed(plane, plain(1, 3))
-        assert (taken.codecs, encoded(plane, "H264")) == (["H264"] * 3, 3)
-        async with viewing(plane, ["video"], codecs=["VP8"]):
-            await taken.feed(plane, plain(4, 30))
-            before = encoded(plane, "H264")
-            await taken.feed(plane, plain(31, 34))
-            assert (taken.codecs[-4:], encoded(plane, "H264")) == (["VP8"] * 4, before)
+    async with running_plane(description(microphones=0)) as hub:
+        hub.record(taken)
+        await taken.feed(hub, plain(1, 3))
+        assert (taken.codecs, encoded(hub, "H264")) == (["H264"] * 3, 3)
+        async with viewing(hub, ["video"], codecs=["VP8"]):
+            await taken.feed(hub, plain(4, 30))
+            before = encoded(hub, "H264")
+            await taken.feed(hub, plain(31, 34))
+            assert (taken.codecs[-4:], encoded(hub, "H264")) == (["VP8"] * 4, before)
     assert sorted(set(taken.stamps)) == list(range(1, 35))
 
 
@@ -157,12 +157,12 @@ async def test_a_cameras_own_h264_is_recorded_as_it_came(codecs: list[str]) -> N
     """Also when the operator takes another codec: nothing is encoded for the recording."""
     taken, pictures = Taken(), camera_pictures(8)
     async with (
-        running_plane(description(microphones=0)) as plane,
-        viewing(plane, ["video"], codecs=codecs, priority=True),
+        running_plane(description(microphones=0)) as hub,
+        viewing(hub, ["video"], codecs=codecs, priority=True),
     ):
-        plane.feed(pictures[0], 0.0)
-        plane.record(taken)
-        await taken.feed(plane, camera_pictures(8, first=2))
+        hub.feed(pictures[0], 0.0)
+        hub.record(taken)
+        await taken.feed(hub, camera_pictures(8, first=2))
         assert taken.stamps == list(range(2, 10))
         assert [frame.data for frame in taken.frames] == [medium.payload for medium in pictures]
         assert [frame.time for frame in taken.frames] == [stamp / 30 for stamp in range(2, 10)]
@@ -170,23 +170,23 @@ async def test_a_cameras_own_h264_is_recorded_as_it_came(codecs: list[str]) -> N
 
 async def test_with_nobody_there_a_cameras_own_h264_costs_no_encoder() -> None:
     taken = Taken()
-    async with running_plane(description(microphones=0)) as plane:
-        plane.record(taken)
-        await taken.feed(plane, camera_pictures(1))  # what it gives was not known before
-        await taken.feed(plane, camera_pictures(6, first=2))
-        before = encoded(plane, "H264")
-        await taken.feed(plane, camera_pictures(6, first=8))
-        assert encoded(plane, "H264") == before <= 1
+    async with running_plane(description(microphones=0)) as hub:
+        hub.record(taken)
+        await taken.feed(hub, camera_pictures(1))  # what it gives was not known before
+        await taken.feed(hub, camera_pictures(6, first=2))
+        before = encoded(hub, "H264")
+        await taken.feed(hub, camera_pictures(6, first=8))
+        assert encoded(hub, "H264") == before <= 1
         assert taken.stamps == list(range(1, 14))
 
 
 async def test_until_a_cameras_next_keyframe_ours_is_recorded() -> None:
     taken, pictures = Taken(), camera_pictures(9, gop=6)
-    async with running_plane(description(microphones=0)) as plane:
+    async with running_plane(description(microphones=0)) as hub:
         for medium in pictures[:3]:
-            plane.feed(medium, medium.time)
-        plane.record(taken)
-        await taken.feed(plane, pictures[3:])
+            hub.feed(medium, medium.time)
+        hub.record(taken)
+        await taken.feed(hub, pictures[3:])
         assert taken.stamps == [4, 5, 6, 7, 8, 9]
         assert [inspect(frame.data).keyframe for frame in taken.frames] == [True, False, False, True, False, False]
         assert [frame.data for frame in taken.frames[3:]] == [medium.payload for medium in pictures[6:]]
@@ -195,13 +195,13 @@ async def test_until_a_cameras_next_keyframe_ours_is_recorded() -> None:
 
 async def test_a_new_file_begins_with_a_keyframe_though_the_cameras_own_is_far() -> None:
     taken, pictures = Taken(), camera_pictures(8, gop=6)
-    async with running_plane(description(microphones=0)) as plane:
-        plane.feed(pictures[0], 0.0)
-        plane.record(taken)
-        await taken.feed(plane, camera_pictures(2, first=2, gop=6))
-        plane.record_keyframes()
+    async with running_plane(description(microphones=0)) as hub:
+        hub.feed(pictures[0], 0.0)
+        hub.record(taken)
+        await taken.feed(hub, camera_pictures(2, first=2, gop=6))
+        hub.record_keyframes()
         del taken.frames[:]
-        await taken.feed(plane, camera_pictures(8, first=2, gop=6)[2:])
+        await taken.feed(hub, camera_pictures(8, first=2, gop=6)[2:])
         assert taken.frames[0].keyframe
         assert taken.stamps == [4, 5, 6, 7, 8, 9]
         assert decoded(taken.frames) == 6
@@ -209,14 +209,14 @@ async def test_a_new_file_begins_with_a_keyframe_though_the_cameras_own_is_far()
 
 async def test_a_camera_that_gives_other_pictures_is_recorded_on() -> None:
     taken = Taken()
-    async with running_plane(description(microphones=0)) as plane:
-        plane.record(taken)
-        await taken.feed(plane, camera_pictures(3))
-        await taken.feed(plane, plain(4, 7))
+    async with running_plane(description(microphones=0)) as hub:
+        hub.record(taken)
+        await taken.feed(hub, camera_pictures(3))
+        await taken.feed(hub, plain(4, 7))
         assert taken.stamps == [1, 2, 3, 4, 5, 6, 7]
         assert decoded(taken.frames) == 7
-        plane.record(None)
-        plane.feed(picture(8, 8 / 30), 8 / 30)
+        hub.record(None)
+        hub.feed(picture(8, 8 / 30), 8 / 30)
         assert len(taken.frames) == 7
 
 
@@ -225,22 +225,22 @@ def heard(first: int, last: int) -> list[Media]:
     return [sound(stamp, stamp * 0.02) for stamp in range(first, last + 1)]
 
 
-def encoded_sound(plane: MediaHub, codec: str) -> float:
-    return value(plane, "frames_encoded_total", stream="microphone0", codec=codec)
+def encoded_sound(hub: MediaHub, codec: str) -> float:
+    return value(hub, "frames_encoded_total", stream="microphone0", codec=codec)
 
 
 async def test_where_all_take_pcmu_that_is_recorded_and_no_opus_is_encoded_for_it() -> None:
     """As it was sent, byte for byte."""
     taken = Taken("microphone0")
     async with (
-        running_plane(description(cameras=0)) as plane,
-        viewing(plane, ["audio"], codecs=["PCMU"]) as viewer,
+        running_plane(description(cameras=0)) as hub,
+        viewing(hub, ["audio"], codecs=["PCMU"]) as viewer,
     ):
-        plane.record(taken)
-        await taken.hear(plane, heard(1, 6))
+        hub.record(taken)
+        await taken.hear(hub, heard(1, 6))
         await viewer.until(lambda: timestamps(viewer, "audio") == len(taken.frames))
         assert (taken.stamps, set(taken.codecs)) == (list(range(1, len(taken.frames) + 1)), {"PCMU"})
-        assert (encoded_sound(plane, "opus"), encoded_sound(plane, "PCMU")) == (0, len(taken.frames))
+        assert (encoded_sound(hub, "opus"), encoded_sound(hub, "PCMU")) == (0, len(taken.frames))
         assert viewer.frames("audio") == [frame.data for frame in taken.frames]
 
 
@@ -248,33 +248,33 @@ async def test_where_all_take_pcmu_that_is_recorded_and_no_opus_is_encoded_for_i
 async def test_opus_is_recorded_where_somebody_takes_it_and_encoded_once(offered: tuple[str, ...]) -> None:
     taken = Taken("microphone0")
     async with (
-        running_plane(description(cameras=0), sound_codecs=offered) as plane,
-        viewing(plane, ["audio"], codecs=["PCMU"]),
-        viewing(plane, ["audio"], codecs=["opus"]),
+        running_plane(description(cameras=0), sound_codecs=offered) as hub,
+        viewing(hub, ["audio"], codecs=["PCMU"]),
+        viewing(hub, ["audio"], codecs=["opus"]),
     ):
-        plane.record(taken)
-        await taken.hear(plane, heard(1, 5))
+        hub.record(taken)
+        await taken.hear(hub, heard(1, 5))
         assert (set(taken.steps), set(taken.codecs)) == ({0.02}, {"opus"})
-        assert encoded_sound(plane, "opus") == len(taken.frames)
+        assert encoded_sound(hub, "opus") == len(taken.frames)
 
 
 async def test_the_codec_of_sound_changes_with_who_listens_and_nothing_is_lost_or_there_twice() -> None:
     taken = Taken("microphone0")
-    async with running_plane(description(cameras=0)) as plane:
-        plane.record(taken)
-        await taken.hear(plane, heard(1, 5))
+    async with running_plane(description(cameras=0)) as hub:
+        hub.record(taken)
+        await taken.hear(hub, heard(1, 5))
         assert set(taken.codecs) == {"opus"}  # made for the recording
-        async with viewing(plane, ["audio"], codecs=["PCMU"]):
-            await taken.hear(plane, heard(6, 12))
-            before = encoded_sound(plane, "opus")
-            await taken.hear(plane, heard(13, 15))
-            assert encoded_sound(plane, "opus") == before
-            async with viewing(plane, ["audio"], codecs=["opus"]):
-                await taken.hear(plane, heard(16, 25))
+        async with viewing(hub, ["audio"], codecs=["PCMU"]):
+            await taken.hear(hub, heard(6, 12))
+            before = encoded_sound(hub, "opus")
+            await taken.hear(hub, heard(13, 15))
+            assert encoded_sound(hub, "opus") == before
+            async with viewing(hub, ["audio"], codecs=["opus"]):
+                await taken.hear(hub, heard(16, 25))
                 assert taken.codecs[-1] == "opus"
-            await taken.hear(plane, heard(26, 35))
+            await taken.hear(hub, heard(26, 35))
             assert taken.codecs[-1] == "PCMU"
-        await taken.hear(plane, heard(36, 45))
+        await taken.hear(hub, heard(36, 45))
         assert taken.codecs[-1] == "opus"
     assert set(taken.steps) == {0.02}
     assert [codec for codec, _ in groupby(taken.codecs)] == ["opus", "PCMU", "opus", "PCMU", "opus"]
@@ -285,25 +285,25 @@ async def test_sound_in_long_segments_is_there_once_where_its_codec_changes() ->
     taken = Taken("microphone0")
     segments = [sound(stamp, stamp * 0.1, payload=sound(stamp, 0.0).payload * 5) for stamp in range(1, 13)]
     async with (
-        running_plane(description(cameras=0)) as plane,
-        viewing(plane, ["audio"], codecs=["PCMU"]),
+        running_plane(description(cameras=0)) as hub,
+        viewing(hub, ["audio"], codecs=["PCMU"]),
     ):
-        async with viewing(plane, ["audio"], codecs=["opus"]):
-            plane.record(taken)
-            await taken.hear(plane, segments[:4])
-        await taken.hear(plane, segments[4:8])
-        async with viewing(plane, ["audio"], codecs=["opus"]):
-            await taken.hear(plane, segments[8:])
+        async with viewing(hub, ["audio"], codecs=["opus"]):
+            hub.record(taken)
+            await taken.hear(hub, segments[:4])
+        await taken.hear(hub, segments[4:8])
+        async with viewing(hub, ["audio"], codecs=["opus"]):
+            await taken.hear(hub, segments[8:])
     assert [codec for codec, _ in groupby(taken.codecs)] == ["opus", "PCMU", "opus"]
     assert set(taken.steps) == {0.02}
 
 
 async def test_a_clock_that_jumped_back_where_the_codec_changes_does_not_end_the_record() -> None:
     taken = Taken("microphone0")
-    async with running_plane(description(cameras=0)) as plane:
-        plane.record(taken)
-        await taken.hear(plane, [sound(1, 5000.0), sound(2, 5000.02)])
-        async with viewing(plane, ["audio"], codecs=["PCMU"]):
-            await taken.hear(plane, heard(3, 10))
+    async with running_plane(description(cameras=0)) as hub:
+        hub.record(taken)
+        await taken.hear(hub, [sound(1, 5000.0), sound(2, 5000.02)])
+        async with viewing(hub, ["audio"], codecs=["PCMU"]):
+            await taken.hear(hub, heard(3, 10))
     assert taken.codecs[-1] == "PCMU"
     assert taken.steps[-3:] == [0.02] * 3

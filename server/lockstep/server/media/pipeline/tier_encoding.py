@@ -7,12 +7,12 @@ from lockstep.server.media.quality.encoding_target import EncodingTarget, Pictur
 from lockstep.server.media.quality.frame_decimator import FrameDecimator
 from lockstep.server.media.subscription import Subscription
 
-__all__ = ["KEYFRAME_CAUSES", "EncodingLayer"]
+__all__ = ["KEYFRAME_CAUSES", "TierEncoding"]
 
 KEYFRAME_CAUSES = ("join", "pli", "drop", "tier", "record")
 
 
-class EncodingLayer:
+class TierEncoding:
     """Nothing is encoded for an output that nobody needs.
 
     A target that changes its tier goes on with the old output until the new one has a keyframe for it: it misses no
@@ -34,7 +34,7 @@ class EncodingLayer:
         self.keyframes = keyframes
         self.cadence = FrameDecimator()
         self.targets: dict[Subscription, None] = {}  # an ordered set
-        self.arriving: dict[Subscription, EncodingLayer] = {}  # and where each comes from
+        self.arriving: dict[Subscription, TierEncoding] = {}  # and where each comes from
         self.recorded = False  # whether a recording takes it
         self.paused_until = 0.0  # no picture before; on the clock of `Stream.feed`
         self.encoded_at = 0.0  # when the last picture was taken, on the same clock
@@ -62,7 +62,7 @@ class EncodingLayer:
         self.targets[target] = None
         self._ask_for_join("join")
 
-    def expect(self, target: Subscription, source: "EncodingLayer") -> None:
+    def expect(self, target: Subscription, source: "TierEncoding") -> None:
         """`target` comes over from `source` with the next keyframe."""
         self.arriving[target] = source
         self._ask_for_join("tier")

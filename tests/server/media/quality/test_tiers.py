@@ -14,29 +14,29 @@ from tests.server.media.feeding import timestamps, value
 from tests.server.media.viewer import HEIGHT, TIMEOUT, WIDTH, Viewer, description, noise, running_plane, viewing
 
 
-def desk(plane: MediaHub) -> Any:
-    return cast(Any, plane)._quality
+def controller(hub: MediaHub) -> Any:
+    return cast(Any, hub)._quality
 
 
-def encoders(plane: MediaHub) -> int:
-    return len(cast(Any, plane)._streams["camera0"]._encoders)
+def encoders(hub: MediaHub) -> int:
+    return len(cast(Any, hub)._streams["camera0"]._encoders)
 
 
-async def show(plane: MediaHub, viewers: list[Viewer], first: int, count: int = 1) -> None:
+async def show(hub: MediaHub, viewers: list[Viewer], first: int, count: int = 1) -> None:
     """Feed pictures; each was received by all viewers before the next."""
     for i in range(first, first + count):
         before = [timestamps(viewer, "video") for viewer in viewers]
-        plane.feed(noise(i, i / 30), i / 30)
+        hub.feed(noise(i, i / 30), i / 30)
         for viewer, seen in zip(viewers, before, strict=True):
             await viewer.until(lambda viewer=viewer, seen=seen: timestamps(viewer, "video") > seen)  # type: ignore[misc]
 
 
-async def size_of_next(plane: MediaHub, viewer: Viewer, number: int) -> tuple[int, int]:
+async def size_of_next(hub: MediaHub, viewer: Viewer, number: int) -> tuple[int, int]:
     """Feeds pictures until one was decoded; its size."""
     track = viewer.pc.getTransceivers()[0].receiver.track
     decoded = asyncio.ensure_future(cast(Any, track).recv())
     for i in range(number, number + 30):
-        await show(plane, [viewer], i)
+        await show(hub, [viewer], i)
         if decoded.done():
             break
         await asyncio.sleep(0.01)
@@ -47,22 +47,22 @@ async def size_of_next(plane: MediaHub, viewer: Viewer, number: int) -> tuple[in
 
 async def test_observers_on_good_paths_share_one_encoder_and_one_on_a_bad_path_gets_its_own() -> None:
     async with AsyncExitStack() as stack:
-        plane = await stack.enter_async_context(running_plane())
-        good = await stack.enter_async_context(viewing(plane, ["video"]))
-        bad = await stack.enter_async_context(viewing(plane, ["video"]))
-        await show(plane, [good, bad], 1, 2)
-        assert encoders(plane) == 1
+        hub = await stack.enter_async_context(running_plane())
+        good = await stack.enter_async_context(viewing(hub, ["video"]))
+        bad = await stack.enter_async_context(viewing(hub, ["video"]))
+        await show(hub, [good, bad], 1, 2)
+        assert encoders(hub) == 1
         assert bad.media.tier == "high"
         bad.media.quality.path.rate = 100_000
         for _ in range(11):
-            desk(plane).tick()
+            controller(hub).tick()
         assert (good.media.tier, bad.media.tier) == ("high", "low")
-        await show(plane, [good, bad], 3, 3)
-        assert encoders(plane) == 2
-        assert value(plane, "keyframe_requests_total", stream="camera0", cause="tier") == 1
+        await show(hub, [good, bad], 3, 3)
+        assert encoders(hub) == 2
+        assert value(hub, "keyframe_requests_total", stream="camera0", cause="tier") == 1
         await bad.media.close()
-        await show(plane, [good], 6)
-        assert encoders(plane) == 1
+        await show(hub, [good], 6)
+        assert encoders(hub) == 1
 
 
 class HalfSize:
@@ -74,67 +74,67 @@ class HalfSize:
 
 @pytest.mark.parametrize("codec", ["H264", "VP8"])
 async def test_a_peer_that_changes_its_tier_misses_no_picture_and_decodes_the_new_size(codec: str) -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], codecs=[codec]) as viewer:
-        await show(plane, [viewer], 1, 3)
+    async with running_plane() as hub, viewing(hub, ["video"], codecs=[codec]) as viewer:
+        await show(hub, [viewer], 1, 3)
         quality = viewer.media.quality
-        desk(plane)._ladders["low", "camera0"] = HalfSize()
+        controller(hub)._ladders["low", "camera0"] = HalfSize()
         quality.path.rate = 100_000
         for _ in range(11):
-            desk(plane).tick()
+            controller(hub).tick()
         assert quality.tier == "low"
-        await show(plane, [viewer], 4, 6)
+        await show(hub, [viewer], 4, 6)
         sequence = [received.packet.sequence_number for received in viewer.of("video")]
         assert [(later - earlier) % 65536 for earlier, later in zip(sequence, sequence[1:], strict=False)] == [1] * (
             len(sequence) - 1
         )
         times = [received.packet.timestamp for received in viewer.of("video")]
         assert all((later - earlier) % 2**32 < 2**31 for earlier, later in zip(times, times[1:], strict=False))
-        while await size_of_next(plane, viewer, 20) != (WIDTH // 2, HEIGHT // 2):
+        while await size_of_next(hub, viewer, 20) != (WIDTH // 2, HEIGHT // 2):
             pass
 
 
 async def test_an_observer_gets_the_operators_pictures_while_those_are_whole() -> None:
     async with AsyncExitStack() as stack:
-        plane = await stack.enter_async_context(running_plane())
-        operator = await stack.enter_async_context(viewing(plane, ["video"], priority=True))
-        observer = await stack.enter_async_context(viewing(plane, ["video"]))
-        await show(plane, [operator, observer], 1, 2)
-        assert encoders(plane) == 2
-        desk(plane)._whole_since = float("-inf")
-        desk(plane).tick()
-        await show(plane, [operator, observer], 3, 3)
-        assert encoders(plane) == 1
+        hub = await stack.enter_async_context(running_plane())
+        operator = await stack.enter_async_context(viewing(hub, ["video"], priority=True))
+        observer = await stack.enter_async_context(viewing(hub, ["video"]))
+        await show(hub, [operator, observer], 1, 2)
+        assert encoders(hub) == 2
+        controller(hub)._whole_since = float("-inf")
+        controller(hub).tick()
+        await show(hub, [operator, observer], 3, 3)
+        assert encoders(hub) == 1
         assert (operator.media.tier, observer.media.tier) == ("operator", "high")
         operator.media.quality.path.limited_at = 0.0
         operator.media.quality.path.rate = 200_000
-        desk(plane)._plan_operator(desk(plane).leaders(), 0.0)
-        desk(plane).tick()
-        await show(plane, [operator, observer], 6, 3)
-        assert encoders(plane) == 2
+        controller(hub)._plan_operator(controller(hub).leaders(), 0.0)
+        controller(hub).tick()
+        await show(hub, [operator, observer], 6, 3)
+        assert encoders(hub) == 2
 
 
 async def test_the_operators_tier_is_for_who_holds_the_seat() -> None:
     async with AsyncExitStack() as stack:
-        plane = await stack.enter_async_context(running_plane())
-        first = await stack.enter_async_context(viewing(plane, ["video"], priority=True))
-        second = await stack.enter_async_context(viewing(plane, ["video"], priority=True))
-        supervisor = await stack.enter_async_context(viewing(plane, ["video"]))
+        hub = await stack.enter_async_context(running_plane())
+        first = await stack.enter_async_context(viewing(hub, ["video"], priority=True))
+        second = await stack.enter_async_context(viewing(hub, ["video"], priority=True))
+        supervisor = await stack.enter_async_context(viewing(hub, ["video"]))
         assert [peer.media.tier for peer in (first, second, supervisor)] == ["operator", "operator", "high"]
         supervisor.media.drives(True)
-        desk(plane).tick()
+        controller(hub).tick()
         assert [peer.media.tier for peer in (first, second, supervisor)] == ["high", "high", "operator"]
         assert supervisor.media.deliveries[0].target.priority
         supervisor.media.drives(False)
-        desk(plane).tick()
+        controller(hub).tick()
         assert [peer.media.tier for peer in (first, second, supervisor)] == ["operator", "operator", "high"]
 
 
 async def test_what_was_decided_is_told_once() -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], priority=True) as viewer:
+    async with running_plane() as hub, viewing(hub, ["video"], priority=True) as viewer:
         told: list[Quality] = []
         viewer.media.on_quality(told.append)
         for _ in range(25):
-            desk(plane).tick()
+            controller(hub).tick()
         assert len(told) == 1
         assert [(each.stream, each.tier, each.width, each.height) for each in told[0].streams] == [
             ("camera0", "operator", WIDTH, HEIGHT)
@@ -142,12 +142,12 @@ async def test_what_was_decided_is_told_once() -> None:
         viewer.media.quality.path.rate = 80_000
         viewer.media.quality.path.reason = "gap"
         for _ in range(10):
-            desk(plane).tick()
+            controller(hub).tick()
         assert [quality.reason for quality in told] == ["", "gap"]
 
 
 async def test_a_clients_report_of_its_gap_reaches_the_controller() -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], priority=True) as viewer:
+    async with running_plane() as hub, viewing(hub, ["video"], priority=True) as viewer:
         path = viewer.media.quality.path
         for lag in (1, 1, 4, 4):
             stream = StreamReport(stream="camera0", carrier="none", stamp=100 - lag, tolerance=4, lag=lag)
@@ -156,65 +156,65 @@ async def test_a_clients_report_of_its_gap_reaches_the_controller() -> None:
 
 
 async def test_receiver_reports_give_loss_and_round_trip() -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], priority=True) as viewer:
+    async with running_plane() as hub, viewing(hub, ["video"], priority=True) as viewer:
         assert viewer.media.loss is None
         assert viewer.media.round_trip_ms is None
-        await show(plane, [viewer], 1, 3)
+        await show(hub, [viewer], 1, 3)
         await viewer.until(lambda: viewer.media.round_trip_ms is not None)
         assert viewer.media.loss == 0
 
 
 async def test_with_quality_off_everybody_gets_one_tier_with_everything() -> None:
     async with AsyncExitStack() as stack:
-        plane = await stack.enter_async_context(running_plane(quality=False))
-        operator = await stack.enter_async_context(viewing(plane, ["video"], priority=True))
-        observer = await stack.enter_async_context(viewing(plane, ["video"]))
-        await show(plane, [operator, observer], 1, 3)
-        assert encoders(plane) == 1
+        hub = await stack.enter_async_context(running_plane(quality=False))
+        operator = await stack.enter_async_context(viewing(hub, ["video"], priority=True))
+        observer = await stack.enter_async_context(viewing(hub, ["video"]))
+        await show(hub, [operator, observer], 1, 3)
+        assert encoders(hub) == 1
 
 
 async def test_while_the_operators_path_is_paused_no_picture_is_encoded_for_it() -> None:
-    async with running_plane() as plane, viewing(plane, ["video"], priority=True) as viewer:
-        await show(plane, [viewer], 1, 2)
+    async with running_plane() as hub, viewing(hub, ["video"], priority=True) as viewer:
+        await show(hub, [viewer], 1, 2)
         viewer.media.quality.path.paused_until = 1e12
-        desk(plane).tick()
-        plane.feed(noise(3, 3 / 30), 3 / 30)
+        controller(hub).tick()
+        hub.feed(noise(3, 3 / 30), 3 / 30)
         async with asyncio.timeout(TIMEOUT):
-            while not value(plane, "frames_dropped_total", stream="camera0", stage="path_busy"):  # noqa: ASYNC110
+            while not value(hub, "frames_dropped_total", stream="camera0", stage="path_busy"):  # noqa: ASYNC110
                 await asyncio.sleep(0)
         viewer.media.quality.path.paused_until = 0.0
-        desk(plane).tick()
-        await show(plane, [viewer], 4)
-        assert value(plane, "frames_encoded_total", stream="camera0", codec="H264") == 3
+        controller(hub).tick()
+        await show(hub, [viewer], 4)
+        assert value(hub, "frames_encoded_total", stream="camera0", codec="H264") == 3
 
 
 async def test_a_thumbnail_gets_the_first_camera_alone_in_the_lowest_tier_and_stays_there() -> None:
     async with AsyncExitStack() as stack:
-        plane = await stack.enter_async_context(running_plane(description(cameras=2)))
-        good = await stack.enter_async_context(viewing(plane, ["video"]))
-        small = await stack.enter_async_context(viewing(plane, ["video", "audio", "video"], thumbnail=True))
+        hub = await stack.enter_async_context(running_plane(description(cameras=2)))
+        good = await stack.enter_async_context(viewing(hub, ["video"]))
+        small = await stack.enter_async_context(viewing(hub, ["video", "audio", "video"], thumbnail=True))
         assert [each.stream for each in small.media.streams] == ["camera0"]
         assert [each.currentDirection for each in small.pc.getTransceivers()] == ["recvonly", "inactive", "inactive"]
-        await show(plane, [good, small], 1, 2)
+        await show(hub, [good, small], 1, 2)
         for _ in range(200):
-            desk(plane).tick()
+            controller(hub).tick()
         assert (good.media.tier, small.media.tier) == ("high", "low")
-        assert encoders(plane) == 2
-        plan = desk(plane)._plans["low", "camera0"]
+        assert encoders(hub) == 2
+        plan = controller(hub)._plans["low", "camera0"]
         assert plan.bitrate_bps <= LOW_FLOOR_BPS
 
 
 async def test_thumbnails_do_not_lower_the_tier_of_who_watches_over_a_bad_path() -> None:
     async with AsyncExitStack() as stack:
-        plane = await stack.enter_async_context(running_plane())
-        bad = await stack.enter_async_context(viewing(plane, ["video"]))
-        small = await stack.enter_async_context(viewing(plane, ["video"], thumbnail=True))
-        await show(plane, [bad, small], 1, 2)
+        hub = await stack.enter_async_context(running_plane())
+        bad = await stack.enter_async_context(viewing(hub, ["video"]))
+        small = await stack.enter_async_context(viewing(hub, ["video"], thumbnail=True))
+        await show(hub, [bad, small], 1, 2)
         bad.media.quality.path.rate = 300_000
         for _ in range(11):
-            desk(plane).tick()
+            controller(hub).tick()
         assert bad.media.tier == "low"
-        assert desk(plane)._plans["low", "camera0"].bitrate_bps > LOW_FLOOR_BPS
+        assert controller(hub)._plans["low", "camera0"].bitrate_bps > LOW_FLOOR_BPS
 
 
 class Later:
@@ -227,60 +227,60 @@ class Later:
         return self.now
 
 
-def bits(plane: MediaHub, tier: str) -> list[int]:
+def bits(hub: MediaHub, tier: str) -> list[int]:
     """Bits per second that the tier's plans give to two cameras."""
-    desk(plane).tick()
-    return [desk(plane)._plans[tier, name].bitrate_bps for name in ("camera0", "camera1")]
+    controller(hub).tick()
+    return [controller(hub)._plans[tier, name].bitrate_bps for name in ("camera0", "camera1")]
 
 
 async def test_the_share_of_a_camera_that_gives_nothing_is_the_others_until_it_gives() -> None:
     async with (
-        running_plane(description(cameras=2)) as plane,
-        viewing(plane, ["video", "video"], priority=True) as viewer,
+        running_plane(description(cameras=2)) as hub,
+        viewing(hub, ["video", "video"], priority=True) as viewer,
     ):
         clock = Later()
-        desk(plane)._clock = clock
+        controller(hub)._clock = clock
         viewer.media.quality.path.rate = 300_000
-        shared = bits(plane, "operator")
+        shared = bits(hub, "operator")
         assert sum(shared) == 300_000, "before the first picture each has its own"
-        plane.feed(noise(1, clock.now), clock.now)
-        assert bits(plane, "operator") == [300_000, shared[1]], "the other begins with no more than its share"
-        plane.feed(noise(2, clock.now, "camera1"), clock.now)
-        assert bits(plane, "operator") == shared
+        hub.feed(noise(1, clock.now), clock.now)
+        assert bits(hub, "operator") == [300_000, shared[1]], "the other begins with no more than its share"
+        hub.feed(noise(2, clock.now, "camera1"), clock.now)
+        assert bits(hub, "operator") == shared
         clock.now += 1.9
-        plane.feed(noise(3, clock.now, "camera1"), clock.now)
-        assert bits(plane, "operator") == shared
+        hub.feed(noise(3, clock.now, "camera1"), clock.now)
+        assert bits(hub, "operator") == shared
         clock.now += 0.2
-        assert bits(plane, "operator") == [shared[0], 300_000], "also the main camera's, once it gives none any more"
+        assert bits(hub, "operator") == [shared[0], 300_000], "also the main camera's, once it gives none any more"
 
 
 async def test_an_observers_path_need_not_carry_a_camera_that_gives_nothing() -> None:
     async with (
-        running_plane(description(cameras=2), video_bitrate_bps=400_000) as plane,
-        viewing(plane, ["video", "video"]) as viewer,
+        running_plane(description(cameras=2), video_bitrate_bps=400_000) as hub,
+        viewing(hub, ["video", "video"]) as viewer,
     ):
         clock = Later()
-        desk(plane)._clock = clock
+        controller(hub)._clock = clock
         tiers = []
         for camera in ("camera0", "camera1"):
             viewer.media.quality.path.rate = 400_000
-            plane.feed(noise(1, clock.now, camera), clock.now)
+            hub.feed(noise(1, clock.now, camera), clock.now)
             for _ in range(11):
-                desk(plane).tick()
+                controller(hub).tick()
             tiers.append(viewer.media.quality.tier)
         assert tiers == ["high", "low"]
 
 
 async def test_the_gap_of_a_camera_that_gives_nothing_says_nothing_of_the_path() -> None:
     async with (
-        running_plane(description(cameras=2)) as plane,
-        viewing(plane, ["video", "video"], priority=True) as viewer,
+        running_plane(description(cameras=2)) as hub,
+        viewing(hub, ["video", "video"], priority=True) as viewer,
     ):
         path = cast(Any, viewer.media.quality.path)
-        plane.feed(noise(1, 1.0), 1.0)
+        hub.feed(noise(1, 1.0), 1.0)
         for event in range(10, 60, 10):
             now = 10.0 + event
-            plane.feed(noise(event, now, "camera1"), now)
+            hub.feed(noise(event, now, "camera1"), now)
             old = StreamReport(stream="camera0", carrier="none", stamp=1, tolerance=4, lag=0)
             new = StreamReport(stream="camera1", carrier="none", stamp=event, tolerance=4, lag=0)
             viewer.media.report(Report(event=event, streams=[old, new]), now)
