@@ -9,7 +9,7 @@ FAST = [1.0]
 NEUTRAL = [0.0]
 
 
-def new_pilot(event: int = 1, min_interval: float = 0.0) -> CommandSender:
+def new_sender(event: int = 1, min_interval: float = 0.0) -> CommandSender:
     sender = CommandSender(CommandGate("feedback", 4, min_interval), NEUTRAL)
     sender.feedback(feedback(event), 0.0)
     sender.ready = True

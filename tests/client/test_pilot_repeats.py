@@ -3,11 +3,11 @@
 from lockstep.client.control.command_sender import ECHO, ECHOES, LOSSY_SPELL, SALVO, SALVO_SPACING
 from lockstep.client.control.repeat_timer import FLOOR, INITIAL
 from tests.client.helpers import feedback
-from tests.client.senders import FAST, commands, flying, new_pilot
+from tests.client.senders import FAST, commands, flying, new_sender
 
 
 def test_a_repeat_gives_no_sample_of_the_round_trip() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.due(INITIAL)
     sender.feedback(feedback(2), INITIAL + 0.09)
@@ -16,7 +16,7 @@ def test_a_repeat_gives_no_sample_of_the_round_trip() -> None:
 
 
 def test_a_needless_repeat_does_not_keep_the_timer_from_learning() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.due(INITIAL)
     sender.feedback(feedback(2), INITIAL + 0.005)
@@ -27,14 +27,14 @@ def test_a_needless_repeat_does_not_keep_the_timer_from_learning() -> None:
 
 
 def test_a_feedback_that_was_issued_again_by_itself_is_no_sample() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.feedback(feedback(2, 2), 0.09)
     assert sender.timer.round_trip is None
 
 
 def test_pings_stand_in_until_commands_are_known() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.ping_answered(0.3)
     assert sender.timer.round_trip == 0.3
     for event in range(2, 12):
@@ -46,7 +46,7 @@ def test_pings_stand_in_until_commands_are_known() -> None:
 
 
 def test_after_a_loss_commands_are_copied_until_their_answer_for_a_while() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.loss(0.0)
     command = flying(sender)
     assert sender.wake_at(0.0) == ECHO
@@ -61,7 +61,7 @@ def test_after_a_loss_commands_are_copied_until_their_answer_for_a_while() -> No
 
 
 def test_the_answer_ends_the_copies() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.loss(0.0)
     command = flying(sender)
     assert sender.due(1.01 * ECHO) == [command]
@@ -71,7 +71,7 @@ def test_the_answer_ends_the_copies() -> None:
 
 
 def test_on_a_lossy_path_each_repeat_is_a_salvo_that_ends_with_the_answer() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.loss(0.0)
     command = flying(sender)
     sender.due(4 * ECHO)
@@ -87,7 +87,7 @@ def test_on_a_lossy_path_each_repeat_is_a_salvo_that_ends_with_the_answer() -> N
 
 
 def test_a_repeat_that_leaves_before_an_answer_can_have_come_is_single() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.ping_answered(0.6)
     sender.loss(0.0)
     command = flying(sender)
@@ -99,7 +99,7 @@ def test_a_repeat_that_leaves_before_an_answer_can_have_come_is_single() -> None
 
 
 def test_with_a_short_interval_there_is_no_salvo() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     for event in range(2, 20):
         flying(sender, event)
         sender.feedback(feedback(event), event + 0.005)
@@ -111,7 +111,7 @@ def test_with_a_short_interval_there_is_no_salvo() -> None:
 
 
 def test_a_repeat_that_was_needed_is_a_loss() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.due(INITIAL)
     sender.feedback(feedback(2), 2 * INITIAL)

@@ -11,7 +11,7 @@ from lockstep.client.transport.sfu_media import RelayMedia, RelayTicket
 
 
 async def test_a_relay_that_is_no_janus_is_refused_by_name() -> None:
-    told = {"engine": "mediasoup", "sfu_media": "0", "url": "wss://host", "feed": 7, "streams": []}
+    told = {"engine": "mediasoup", "relay": "0", "url": "wss://host", "feed": 7, "streams": []}
     ticket = msgspec.convert(told, RelayTicket)
     with pytest.raises(ConnectFailed, match="not through a mediasoup"):
         RelayMedia(ticket, lambda _: None)
@@ -21,7 +21,7 @@ async def test_a_relay_that_is_no_janus_is_refused_by_name() -> None:
 async def test_a_relay_that_says_nothing_is_given_up_by(late_from: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sfu_media, "SILENCE_SECONDS", 0.02)
     monkeypatch.setattr(sfu_media, "HELD_UP_SECONDS", late_from)
-    told = {"engine": "janus", "sfu_media": "0", "url": "ws://host", "feed": 7, "room": 1, "streams": []}
+    told = {"engine": "janus", "relay": "0", "url": "ws://host", "feed": 7, "room": 1, "streams": []}
     media = RelayMedia(msgspec.convert(told, RelayTicket), lambda _: None)
     try:
         async with asyncio.timeout(20):

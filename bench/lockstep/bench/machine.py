@@ -11,7 +11,7 @@ from typing import Any
 
 __all__ = ["busy_percent", "machine_facts"]
 
-PACKAGES = ("lockstep", "aiortc", "av", "fastapi", "mujoco", "uvloop", "playwright")
+PACKAGES = ("lockstep-console", "aiortc", "av", "fastapi", "mujoco", "uvloop", "playwright")
 
 
 def machine_facts() -> dict[str, Any]:

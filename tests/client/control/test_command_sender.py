@@ -10,11 +10,11 @@ from lockstep.client.control.rest_call import SETTLE
 from lockstep.protocol.messages import Command, Feedback, Rest, StopState
 from lockstep.protocol.serial import MAX_EVENT, event_after
 from tests.client.helpers import feedback, refusal
-from tests.client.senders import FAST, NEUTRAL, commands, flying, new_pilot, rests
+from tests.client.senders import FAST, NEUTRAL, commands, flying, new_sender, rests
 
 
 def test_an_intention_leaves_at_once_and_its_feedback_is_its_outcome() -> None:
-    sender = new_pilot(7)
+    sender = new_sender(7)
     ticket = sender.intend(FAST, 0.0)
     assert sender.due(0.0) == [Command(event=8, issue=1, values=FAST)]
     assert sender.due(0.01) == []
@@ -35,7 +35,7 @@ def test_before_the_first_feedback_nothing_leaves() -> None:
 
 
 def test_the_highest_event_rate_is_kept_and_waited_for() -> None:
-    sender = new_pilot(min_interval=0.04)
+    sender = new_sender(min_interval=0.04)
     flying(sender)
     sender.feedback(feedback(2), 0.01)
     sender.intend(FAST, 0.01)
@@ -45,7 +45,7 @@ def test_the_highest_event_rate_is_kept_and_waited_for() -> None:
 
 
 def test_an_unanswered_command_is_repeated_with_the_newest_intention_and_the_newest_issue() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     assert sender.wake_at(0.0) == INITIAL
     sender.feedback(feedback(1, 2), 0.05)
@@ -56,7 +56,7 @@ def test_an_unanswered_command_is_repeated_with_the_newest_intention_and_the_new
 
 
 def test_an_intention_that_came_while_another_was_in_flight_gets_an_event_of_its_own() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     first = sender.intend(FAST, 0.0)
     sender.due(0.0)
     second = sender.intend([0.5], 0.01)
@@ -68,7 +68,7 @@ def test_an_intention_that_came_while_another_was_in_flight_gets_an_event_of_its
 
 
 def test_who_waited_long_for_an_answer_has_time_to_say_what_comes_next() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.feedback(feedback(2), 3 * IDLE)
     assert sender.due(3 * IDLE) == []
@@ -79,7 +79,7 @@ def test_who_waited_long_for_an_answer_has_time_to_say_what_comes_next() -> None
 
 
 def test_without_a_new_intention_neutral_values_leave_five_times_a_second() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.feedback(feedback(2), 0.01)
     assert sender.wake_at(0.01) == IDLE
@@ -91,13 +91,13 @@ def test_without_a_new_intention_neutral_values_leave_five_times_a_second() -> N
 
 
 def test_not_armed_there_is_silence() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     assert sender.due(10.0) == []
     assert sender.wake_at(10.0) == float("inf")
 
 
 def test_a_late_command_is_tried_again_on_fresh_feedback_only() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.refusal(refusal(2, "late"))
     assert sender.due(0.1) == []
@@ -107,7 +107,7 @@ def test_a_late_command_is_tried_again_on_fresh_feedback_only() -> None:
 
 
 def test_fresh_feedback_that_overtook_the_refusal_is_used() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.feedback(feedback(1, 2), 0.05)
     sender.refusal(refusal(2, "late"))
@@ -115,7 +115,7 @@ def test_fresh_feedback_that_overtook_the_refusal_is_used() -> None:
 
 
 def test_a_refusal_that_time_cannot_cure_is_the_outcome_and_disarms() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.refusal(refusal(2, "stopped"))
     [outcome] = sender.outcomes()
@@ -126,7 +126,7 @@ def test_a_refusal_that_time_cannot_cure_is_the_outcome_and_disarms() -> None:
 
 
 def test_a_refusal_of_another_event_changes_nothing() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.refusal(refusal(9, "stopped"))
     assert sender.outcomes() == []
@@ -134,7 +134,7 @@ def test_a_refusal_of_another_event_changes_nothing() -> None:
 
 
 def test_a_refusal_without_an_event_is_of_the_one_in_flight() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.refusal(refusal(0, "link_down"))
     [outcome] = sender.outcomes()
@@ -143,7 +143,7 @@ def test_a_refusal_without_an_event_is_of_the_one_in_flight() -> None:
 
 
 def test_an_event_voided_by_a_rest_is_used_up_by_a_neutral_command_first() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     ticket = sender.intend(FAST, 0.0)
     sender.due(0.0)
     sender.refusal(refusal(2, "rested"))
@@ -156,7 +156,7 @@ def test_an_event_voided_by_a_rest_is_used_up_by_a_neutral_command_first() -> No
 
 
 def test_arming_sends_one_neutral_command_and_is_done_with_its_feedback() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.seated()
     assert not sender.ready
     assert sender.due(0.0) == []
@@ -171,7 +171,7 @@ def test_arming_sends_one_neutral_command_and_is_done_with_its_feedback() -> Non
 
 @pytest.mark.parametrize("what", ["arm", "drive"])
 def test_an_event_that_somebody_else_executed_is_no_answer_to_a_command_without_the_seat(what: str) -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.unseated()
     sender.outcomes()
     ticket = sender.arm() if what == "arm" else sender.intend(FAST, 0.0)
@@ -186,7 +186,7 @@ def test_an_event_that_somebody_else_executed_is_no_answer_to_a_command_without_
 
 
 def test_whoever_loses_the_seat_hears_at_once_that_a_command_in_flight_was_not_taken() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     ticket = sender.intend(FAST, 0.0)
     sender.due(0.0)
     sender.unseated()
@@ -195,7 +195,7 @@ def test_whoever_loses_the_seat_hears_at_once_that_a_command_in_flight_was_not_t
 
 
 def test_arming_goes_on_over_a_refusal_that_fresh_feedback_cures_and_until_the_robot_asks_for_nothing_more() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.seated()
     sender.arm()
     sender.due(0.0)
@@ -220,7 +220,7 @@ def _again(what: str) -> Feedback:
 def test_after_a_stop_or_whatever_else_asks_for_it_nothing_leaves_by_itself_that_lets_the_robot_move(
     what: str, doing: str
 ) -> None:
-    sender = new_pilot()
+    sender = new_sender()
     ticket = sender.intend(FAST, 0.0)
     if doing != "wanting":
         sender.due(0.0)
@@ -243,7 +243,7 @@ def test_after_a_stop_or_whatever_else_asks_for_it_nothing_leaves_by_itself_that
 
 
 def test_a_refusal_for_want_of_a_neutral_command_is_an_outcome_and_no_reason_to_send_one() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.refusal(refusal(2, "not_neutral"))
     assert [each.refusal.reason for each in sender.outcomes() if each.refusal] == ["not_neutral"]
@@ -251,7 +251,7 @@ def test_a_refusal_for_want_of_a_neutral_command_is_an_outcome_and_no_reason_to_
 
 
 def test_a_stop_ends_arming() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.seated()
     ticket = sender.arm()
     sender.feedback(_again("stopped"), 0.0)
@@ -260,21 +260,21 @@ def test_a_stop_ends_arming() -> None:
 
 
 def test_rest_leaves_at_once_past_the_shut_gate_and_names_the_event_in_flight() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.rest(0.01)
     assert sender.due(0.01) == [Rest(event=2)]
 
 
 def test_rest_disarms() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.rest(0.01)
     assert not sender.armed
 
 
 def test_rest_is_repeated_until_the_feedback_of_the_neutral_command_shows_it() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.feedback(feedback(2, at_rest=False), 0.02)
     sender.rest(0.05)
@@ -289,7 +289,7 @@ def test_rest_is_repeated_until_the_feedback_of_the_neutral_command_shows_it() -
 
 
 def test_the_command_in_flight_repeats_with_neutral_values_after_a_rest() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.rest(0.01)
     sender.due(0.01)
@@ -297,7 +297,7 @@ def test_the_command_in_flight_repeats_with_neutral_values_after_a_rest() -> Non
 
 
 def test_rest_of_a_robot_that_never_moved_is_said_once() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     sender.rest(0.0)
     assert sender.due(0.0) == [Rest(event=1)]
     assert not sender.resting
@@ -305,7 +305,7 @@ def test_rest_of_a_robot_that_never_moved_is_said_once() -> None:
 
 
 def test_a_stopped_robot_at_rest_needs_no_further_proof() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.rest(0.0)
     sender.due(0.0)
@@ -314,7 +314,7 @@ def test_a_stopped_robot_at_rest_needs_no_further_proof() -> None:
 
 
 def test_when_commands_are_refused_a_much_later_feedback_proves_the_rest() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.rest(0.0)
     sender.due(0.0)
@@ -326,7 +326,7 @@ def test_when_commands_are_refused_a_much_later_feedback_proves_the_rest() -> No
 
 
 def test_an_intention_that_a_rest_overtook_is_refused_as_rested() -> None:
-    sender = new_pilot(min_interval=1.0)
+    sender = new_sender(min_interval=1.0)
     flying(sender)
     sender.feedback(feedback(2), 0.01)
     sender.outcomes()
@@ -339,7 +339,7 @@ def test_an_intention_that_a_rest_overtook_is_refused_as_rested() -> None:
 
 
 def test_a_flight_refused_as_rested_after_our_own_rest_is_an_outcome() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.rest(0.01)
     sender.due(0.01)
@@ -350,7 +350,7 @@ def test_a_flight_refused_as_rested_after_our_own_rest_is_an_outcome() -> None:
 
 
 def test_driving_again_ends_a_rest() -> None:
-    sender = new_pilot()
+    sender = new_sender()
     flying(sender)
     sender.feedback(feedback(2, at_rest=False), 0.01)
     sender.rest(0.02)
@@ -380,7 +380,7 @@ class Robot(RuleBasedStateMachine):
         self.event = MAX_EVENT - 3
         self.executed: list[tuple[int, list[float]]] = []
         self.issue = 1
-        self.sender = new_pilot(self.event)
+        self.sender = new_sender(self.event)
         self.network: list[Command] = []
         self.answers: list[tuple[int, int]] = []
         self.resting_since: int | None = None

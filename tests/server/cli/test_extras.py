@@ -23,7 +23,7 @@ def test_a_library_that_is_not_installed_is_named_with_the_extra_that_brings_it(
 
 def test_a_module_of_the_project_that_is_missing_is_no_missing_extra() -> None:
     with pytest.raises(ModuleNotFoundError):
-        load_extra("server.no_such_module", "export")
+        load_extra("lockstep.server.no_such_module", "export")
 
 
 def test_what_is_there_is_returned() -> None:

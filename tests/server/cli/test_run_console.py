@@ -17,7 +17,7 @@ async def run(self):
     raise OSError("planted")
 
 Console.run = run
-from lockstep.server.cli.entry import main
+from lockstep.robot_bridge.entry import main
 main()
 """
 

@@ -49,8 +49,9 @@ async def test_another_interpreter_finds_the_bridges_code_and_none_of_the_consol
     try:
         own, folder = said.read_text().split(":")
         assert own == "/its/own"
-        assert os.listdir(folder) == ["robot_bridge"]
-        assert "__main__.py" in os.listdir(f"{folder}/robot_bridge")
+        assert os.listdir(folder) == ["lockstep"]
+        assert sorted(os.listdir(f"{folder}/lockstep")) == ["protocol", "robot_bridge"]
+        assert "__main__.py" in os.listdir(f"{folder}/lockstep/robot_bridge")
     finally:
         await bridge.close()
     with pytest.raises(FileNotFoundError):

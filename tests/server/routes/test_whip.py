@@ -172,7 +172,7 @@ async def test_a_camera_has_one_publisher_and_a_link_one_camera() -> None:
         assert name(await post(rig, first, path="/whip?camera=phone")) == (409, "already_publishing")
         made = await post(rig, second)  # the first that nobody publishes
         assert made.status_code == 201
-        assert {each.camera.spec.name for each in publishers(rig)} == {"phone", "manager"}
+        assert {each.camera.spec.name for each in publishers(rig)} == {"phone", "desk"}
         full = await post(rig, third)
         assert name(full) == (409, "camera_taken")
         assert int(full.headers["retry-after"]) > 0
@@ -353,7 +353,7 @@ async def test_what_is_no_picture_is_counted_and_disturbs_neither_who_drives_nor
         assert (await bad.post(rig.http, rig.token("operator"))).status_code == 201
         sender.transport._send_rtp = spoil
         assert (await good.post(rig.http, rig.token("operator"))).status_code == 201
-        await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="manager") > 20)
+        await eventually(lambda: rig.count("lockstep_media_frames_in_total", stream="desk") > 20)
         await rig.http.get("/metrics", headers=rig.token("operator"))
         assert rig.count("lockstep_whip_unused_total", reason="malformed") > 0
         assert rig.count("lockstep_media_frames_in_total", stream="phone") == 0

@@ -36,7 +36,7 @@ async def _scene_url(rig: Rig) -> tuple[str, str]:
 
 
 async def test_the_client_is_served_and_its_stream_shows_the_robot() -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         path, address = await _scene_url(rig)
         page = await rig.http.get(path)
         assert page.status_code == 200
@@ -73,7 +73,7 @@ async def test_viser_is_started_once_for_the_first_who_open_the_scene(monkeypatc
         return start()
 
     monkeypatch.setattr(server, "start_viser", count)
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         view = rig.dependencies.scene_or_error()
         assert (view.port, starts) == (0, [])
         await asyncio.gather(*(_scene_url(rig) for _ in range(5)))
@@ -90,10 +90,10 @@ async def test_a_scene_that_does_not_start_is_said_to_be_unavailable_and_tried_a
     monkeypatch.setattr("lockstep.server.scene.view.START_TIMEOUT", 0.2)
     with monkeypatch.context() as broken:
         broken.setattr(server, "start_viser", fail)
-        async with running_rig(view=True) as rig:
+        async with running_rig(scene=True) as rig:
             answer = await rig.http.post("/api/scene", headers=rig.token("observer"))
             assert (answer.status_code, answer.json()["error"]) == (503, "scene_unavailable")
-            assert rig.count("lockstep_internal_errors_total", where="view") == 1
+            assert rig.count("lockstep_internal_errors_total", where="scene") == 1
             broken.undo()
             monkeypatch.setattr("lockstep.server.scene.view.START_TIMEOUT", PATIENCE)
             await _scene_url(rig)
@@ -109,7 +109,7 @@ def test_a_console_that_nobody_asks_for_the_scene_does_not_load_viser() -> None:
 
 
 async def test_the_stream_needs_a_ticket_and_our_own_page() -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         _, address = await _scene_url(rig)
         token = rig.access.issue("operator", "x")
         for wrong, origin in [
@@ -120,12 +120,12 @@ async def test_the_stream_needs_a_ticket_and_our_own_page() -> None:
             with pytest.raises(websockets.InvalidStatus) as refused:
                 await connect(wrong, subprotocols=[VERSION], proxy=None, origin=origin)  # type: ignore[arg-type]
             assert refused.value.response.status_code == 403
-        assert rig.count("lockstep_bad_input_total", where="view", reason="TokenInvalid") == 2
-        assert rig.count("lockstep_bad_input_total", where="view", reason="OriginRefused") == 1
+        assert rig.count("lockstep_bad_input_total", where="scene", reason="TokenInvalid") == 2
+        assert rig.count("lockstep_bad_input_total", where="scene", reason="OriginRefused") == 1
 
 
 async def test_a_viewer_whose_link_is_revoked_is_shown_nothing_more() -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         invited = await rig.http.post("/api/invitations", headers=rig.token("operator"), json={})
         token = {"Authorization": f"Bearer {invited.json()['link'].partition('#token=')[2]}"}
         path = (await rig.http.post("/api/scene", headers=token)).json()["path"]
@@ -142,7 +142,7 @@ async def test_a_viewer_whose_link_is_revoked_is_shown_nothing_more() -> None:
 async def test_whoever_is_revoked_while_the_scene_starts_gets_no_page_ticket_or_stream(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         invited = await rig.http.post("/api/invitations", headers=rig.token("operator"), json={})
         token = {"Authorization": f"Bearer {invited.json()['link'].partition('#token=')[2]}"}
         path = (await rig.http.post("/api/scene", headers=token)).json()["path"]
@@ -173,7 +173,7 @@ async def _scene_with(rig: Rig, token: dict[str, str]) -> str:
 
 
 async def test_a_scene_that_is_open_ends_when_its_link_expires_and_no_other_opens(tmp_path: Path) -> None:
-    async with running_rig(view=True, state_dir=tmp_path) as rig:
+    async with running_rig(scene=True, state_dir=tmp_path) as rig:
         token = rig.access.sign(Identity("observer", "x", "id", time.time() + 2.5), time.time())
         headers = {"Authorization": f"Bearer {token}"}
         path = (await rig.http.post("/api/scene", headers=headers)).json()["path"]
@@ -188,7 +188,7 @@ async def test_a_scene_that_is_open_ends_when_its_link_expires_and_no_other_open
 
 
 async def test_the_page_of_the_scene_comes_from_memory_and_asks_nobody() -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         path, _ = await _scene_url(rig)
         rig.dependencies.scene_or_error().port = 1  # where nobody listens
         for encoding in ("gzip", "identity"):
@@ -198,7 +198,7 @@ async def test_the_page_of_the_scene_comes_from_memory_and_asks_nobody() -> None
 
 
 async def test_the_page_of_the_scene_needs_a_ticket() -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         path, _ = await _scene_url(rig)
         token = rig.access.issue("operator", "x")
         for wrong in (path.replace("/scene/", "/scene/x", 1), f"/scene/{token}/"):
@@ -219,14 +219,14 @@ async def test_the_page_of_the_scene_needs_a_ticket() -> None:
     ],
 )
 async def test_the_page_of_the_scene_takes_no_parameter_but_those_that_the_console_gives_it(further: str) -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         path, _ = await _scene_url(rig)
         answer = await rig.http.get(f"{path}&{further}")
         assert (answer.status_code, answer.json()["error"]) == (422, "bad_parameter")
 
 
 async def test_the_origin_that_is_nobodys_opens_the_stream_with_a_ticket_and_nothing_else() -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         _, address = await _scene_url(rig)
         opaque = websockets.Origin("null")
         async with connect(address, subprotocols=[VERSION], proxy=None, origin=opaque):
@@ -238,7 +238,7 @@ async def test_the_origin_that_is_nobodys_opens_the_stream_with_a_ticket_and_not
 
 
 async def test_only_so_many_may_watch_and_one_link_cannot_take_all_places() -> None:
-    async with running_rig(view=True, max_scene_viewers=8) as rig:
+    async with running_rig(scene=True, max_scene_viewers=8) as rig:
         links = [rig.token("observer") for _ in range(4)]
         async with AsyncExitStack() as open_ones:
             for number, link in enumerate(links):
@@ -258,20 +258,20 @@ async def test_a_link_that_opens_scenes_again_and_again_is_turned_away_and_other
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(view, "OPEN_RATE", 1e-6)
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         address = await _scene_with(rig, rig.token("observer"))
         for _ in range(view.OPENS):
             async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None):
                 pass
         with pytest.raises(websockets.InvalidStatus):
             await connect(address, subprotocols=[VERSION], proxy=None)
-        assert rig.count("lockstep_bad_input_total", where="view", reason="SceneUnavailable") == 1
+        assert rig.count("lockstep_bad_input_total", where="scene", reason="SceneUnavailable") == 1
         async with connect(await _scene_with(rig, rig.token("observer")), subprotocols=[VERSION], proxy=None):
             assert rig.count("lockstep_scene_viewers") >= 1
 
 
 async def test_a_viewer_can_move_the_camera_and_nothing_else() -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         _, address = await _scene_url(rig)
         async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None) as websocket:
             await websocket.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
@@ -279,8 +279,8 @@ async def test_a_viewer_can_move_the_camera_and_nothing_else() -> None:
             async with asyncio.timeout(PATIENCE):
                 await websocket.wait_closed()
             assert websocket.close_code == 1003
-        assert rig.count("lockstep_bad_input_total", where="view", reason="not_allowed") == 1
-        assert rig.count("lockstep_bad_input_total", where="view", reason="text") == 1
+        assert rig.count("lockstep_bad_input_total", where="scene", reason="not_allowed") == 1
+        assert rig.count("lockstep_bad_input_total", where="scene", reason="text") == 1
 
 
 async def test_a_viewer_that_floods_is_read_at_a_pace_and_still_ends_with_its_link(
@@ -288,13 +288,13 @@ async def test_a_viewer_that_floods_is_read_at_a_pace_and_still_ends_with_its_li
 ) -> None:
     monkeypatch.setattr(proxy, "UP_RATE", 1e-6)
     monkeypatch.setattr(proxy, "UP_BURST", 5.0)
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         invited = await rig.http.post("/api/invitations", headers=rig.token("operator"), json={})
         token = {"Authorization": f"Bearer {invited.json()['link'].partition('#token=')[2]}"}
         address = await _scene_with(rig, token)
 
         def read() -> float:
-            return rig.count("lockstep_bad_input_total", where="view", reason="not_allowed")
+            return rig.count("lockstep_bad_input_total", where="scene", reason="not_allowed")
 
         async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None) as websocket:
             for _ in range(100):
@@ -310,7 +310,7 @@ async def test_a_viewer_that_floods_is_read_at_a_pace_and_still_ends_with_its_li
 
 
 async def test_files_that_viser_does_not_have_are_not_found() -> None:
-    async with running_rig(view=True) as rig:
+    async with running_rig(scene=True) as rig:
         for path in ("/scene/nothing", "/scene/..%2f..%2f_viser.py"):
             answer = await rig.http.get(path)
             assert (answer.status_code, answer.json()["error"]) == (404, "not_found")

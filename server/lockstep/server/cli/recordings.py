@@ -141,7 +141,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         """Write a recording in another form."""
         path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         # Loaded only here: parquet and lerobot need pyarrow, the extra "export".
-        exporter: Any = load_extra(f"lockstep.server.recording.export_{to.value}", "export")
+        exporter: Any = load_extra(f"lockstep.server.recording.export.export_{to.value}", "export")
         written = _or_usage(lambda: exporter.export(path, out, task))
         for each in written:
             sys.stdout.write(f"{escaped(each)}\n")

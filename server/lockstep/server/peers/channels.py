@@ -37,7 +37,8 @@ __all__ = [
 ChannelName = Literal["control", "session", "stop"]
 
 
-class _AnyStop(msgspec.Struct, frozen=True, tag_field="type", tag="stop"):
+class _AnyStop(msgspec.Struct, frozen=True, kw_only=True):
+    type: Literal["stop"]  # no tag: msgspec takes what lacks the only tag that there is
     reason: object = ""
     press: object = ""
 

@@ -26,7 +26,8 @@ GO = [0.4, 0.3]
 A_BRIDGE = """
 import ctypes, os, sys, time
 hang, how, settings, state = sys.argv[1:5]
-from lockstep.robot_bridge.robots.ros2 import base_drive, robot
+from lockstep.robot_bridge.robots.ros2 import robot
+from lockstep.robot_bridge.robots.ros2.drives import base_drive
 
 class Robot(robot.Ros2Robot):
     def __init__(self, *arguments):

@@ -29,7 +29,7 @@ def test_what_cannot_be_meant_is_refused(given: list[str]) -> None:
 def test_the_setting_names_published_cameras_and_no_two_sources_have_one_name() -> None:
     settings = Settings(cameras="door=rtsp://h/", whip="phone desk#latency=1")  # type: ignore[arg-type]
     assert [(spec.name, spec.scheme) for spec in settings.sources] == [
-        *(("door", "rtsp"), ("phone", "whip"), ("manager", "whip")),
+        *(("door", "rtsp"), ("phone", "whip"), ("desk", "whip")),
     ]
     assert Settings().whip == ()
     with pytest.raises(ValueError, match="two have the same name, phone"):
