@@ -30,9 +30,9 @@ from lockstep.server.control.stop_service import StopService
 from lockstep.server.errors import ConsoleError, Silenced
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry
-from lockstep.server.stop.kept_stops import KeptStops
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import Press
+from lockstep.server.stop.stop_store import KeptStops
 from lockstep.server.telemetry.metrics import Metrics
 from tests.robot_bridge.bridge_model import BridgeModel
 from tests.robot_bridge.core_helpers import AXES, NEUTRAL

@@ -36,7 +36,7 @@ from lockstep.robot_bridge.robots.registry import create_robot, simulated_names
 from lockstep.robot_bridge.service_manager import ServiceManager
 from lockstep.robot_bridge.settings import BridgeSettings
 from lockstep.robot_bridge.stop.mounts import is_in_memory
-from lockstep.robot_bridge.stop.state_place import default_place, older_places
+from lockstep.robot_bridge.stop.state_directory import default_place, older_places
 from lockstep.robot_bridge.watchdog.liveness import LIMIT, Liveness
 
 __all__ = ["main", "robot_app", "run"]

@@ -8,9 +8,9 @@ import pytest
 
 from lockstep.protocol.messages import StopTaken
 from lockstep.server.stop import stop_keeper
-from lockstep.server.stop.kept_stops import KeptStops, kept_stops_place
 from lockstep.server.stop.stop_keeper import KEPT, KEPT_IN_MEMORY, StopKeeper
 from lockstep.server.stop.stop_presses import Press
+from lockstep.server.stop.stop_store import KeptStops, kept_stops_place
 from tests.server.rig import PATIENCE
 
 ROBOT = "tcp://127.0.0.1:1"

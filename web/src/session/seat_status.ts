@@ -49,6 +49,14 @@ export function seatAction(role: Role | null, status: SeatStatus): SeatAction | 
   return { kind: "request", label: "Request control", why };
 }
 
+/** A finger that was on its way to "Request control" must not give back the seat that came in the meantime. */
+const READ_MS = 400;
+
+/** Whether somebody who presses the button can mean what it says, which it has said for `shownMs`. */
+export function isMeant(kind: SeatAction["kind"], shownMs: number): boolean {
+  return kind !== "release" || shownMs >= READ_MS;
+}
+
 function left(seconds: number, agedMs: number): number {
   return Math.max(0, Math.ceil(seconds - agedMs / 1000));
 }

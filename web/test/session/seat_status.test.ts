@@ -1,5 +1,11 @@
 import { describe, expect, it } from "vitest";
-import { claimsAfter, idleSecondsAfter, seatAction, seatStatus } from "../../src/session/seat_status";
+import {
+  claimsAfter,
+  idleSecondsAfter,
+  isMeant,
+  seatAction,
+  seatStatus,
+} from "../../src/session/seat_status";
 import type { Seat } from "../../src/protocol/wire";
 import { seatOf } from "../messages";
 
@@ -63,5 +69,12 @@ describe("the button beside the seat", () => {
   it("is none for who may only watch", () => {
     expect(seatAction("observer", "free")).toBeNull();
     expect(seatAction(null, "unknown")).toBeNull();
+  });
+
+  it("gives back no seat that came while a finger was on its way to ask for it", () => {
+    expect(isMeant("release", 120)).toBe(false);
+    expect(isMeant("release", 400)).toBe(true);
+    expect(isMeant("request", 0)).toBe(true);
+    expect(isMeant("take", 0)).toBe(true);
   });
 });

@@ -31,7 +31,7 @@ FRONTS = ("direct", "tls", "caddy")  # how the crowd comes
 WARM_UP = 3.0  # s
 INTERVAL = (0.046, 0.054)  # s between commands: spread over two ticks of the robot, or each waits for its tick alike
 ALLOWED = 1.2  # times the undisturbed median
-CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
+CADDYFILE = Path(__file__).resolve().parents[4] / "deploy" / "Caddyfile"
 CROWD_SECONDS = 60.0  # for it to say something
 
 

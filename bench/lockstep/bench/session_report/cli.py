@@ -13,7 +13,7 @@ from lockstep.bench.session_report.session import Session, read_session
 from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.cli.recordings import DirectoryOption, File, recording_file
 from lockstep.server.recording.errors import RecordingError
-from lockstep.server.recording.verify.verifier import Verdict
+from lockstep.server.recording.verify.promises import Verdict
 from lockstep.server.recording.verify.verify_file import verify_file
 from lockstep.server.settings import Settings
 

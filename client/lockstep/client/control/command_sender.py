@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 from lockstep.client.control.command_gate import CommandGate
 from lockstep.client.control.repeat_timer import INITIAL, RepeatTimer
-from lockstep.client.control.rest_call import RestCall
+from lockstep.client.control.resting import RestCall
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest
 from lockstep.protocol.serial import FIRST_EVENT, event_gap
 

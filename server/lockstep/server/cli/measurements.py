@@ -30,6 +30,11 @@ COMMANDS = {
         "Put a bad network between a console and whoever uses it.",
     ),
     "hostile": ("lockstep.bench.hostile.cli", "hostile_command", "Drive among peers that misbehave in every way."),
+    "interoperability": (
+        "lockstep.bench.interoperability.cli",
+        "interoperability_command",
+        "Drive and watch with each client over each kind of network.",
+    ),
     "report": (
         "lockstep.bench.session_report.cli",
         "report_command",

@@ -21,7 +21,7 @@ from lockstep.server.http.robot_paths import ROBOTS
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.recording_store import RecordingEntry, RecordingStore
 from lockstep.server.recording.settings import recordings_directory
-from lockstep.server.recording.verify.verifier import Verdict
+from lockstep.server.recording.verify.promises import Verdict
 from lockstep.server.recording.verify.verify_file import verify_file
 from lockstep.server.recording.verify.verify_signature import SignatureReport
 from lockstep.server.settings import Settings

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import structlog
 
-from lockstep.server.stop.kept_stops import KeptStops, kept_stops_place
 from lockstep.server.stop.stop_presses import Press, StopPresses
+from lockstep.server.stop.stop_store import KeptStops, kept_stops_place
 from lockstep.server.util.uncancelled import in_thread
 
 __all__ = ["KEPT", "KEPT_IN_MEMORY", "StopKeeper"]

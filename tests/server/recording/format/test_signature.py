@@ -25,7 +25,7 @@ from lockstep.server.recording.reading.bookmarks import Mark
 from lockstep.server.recording.reading.raw_records import MAGIC, RawRecord, raw_records
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.reading.scan import complete_file
-from lockstep.server.recording.verify.verifier import Verdict
+from lockstep.server.recording.verify.promises import Verdict
 from lockstep.server.recording.verify.verify_file import verify_file
 from tests.server.recording.makers import INFO, Story
 

@@ -1,4 +1,4 @@
-import { seatAction, seatStatus, type SeatAction } from "../../session/seat_status";
+import { isMeant, seatAction, seatStatus, type SeatAction } from "../../session/seat_status";
 import { robotIsUp } from "../../session/console_state";
 import { seatLabels, type Obstacle } from "../../session/seat_labels";
 import type { SeatNotice } from "../../session/seat_notices";
@@ -16,7 +16,7 @@ export function createSeatBar(engine: ConsoleEngine, talk: Panel): Panel {
   const grant = seatButton("Grant", "F8", () => engine.session.answerShown(true));
   const decline = seatButton("Decline", "F9", () => engine.session.answerShown(false));
   const keep = seatButton("Keep control", "", () => engine.session.keepSeat());
-  const action: HTMLButtonElement = seatButton("", "", () => act(engine, action.dataset.kind));
+  const action: HTMLButtonElement = seatButton("", "", () => act(engine, shown));
   action.classList.add("seat-action");
   const words = h("div", "seat-words", {}, title, text);
   const spoken = h("span", "unseen", { role: "status" }); // without the seconds, which would be read out all the time
@@ -30,6 +30,7 @@ export function createSeatBar(engine: ConsoleEngine, talk: Panel): Panel {
     buttons,
     spoken,
   );
+  const shown: Shown = { kind: null, sinceMs: -Infinity };
   let told: SeatNotice | null = null;
   let toldMs = -Infinity;
   return {
@@ -62,7 +63,10 @@ export function createSeatBar(engine: ConsoleEngine, talk: Panel): Panel {
       setHidden(grant, found.tone !== "asked");
       setHidden(decline, found.tone !== "asked");
       setHidden(keep, found.tone !== "idle");
-      showAction(action, why, actionOf(engine));
+      const offered = actionOf(engine);
+      if ((offered?.kind ?? null) !== shown.kind)
+        Object.assign(shown, { kind: offered?.kind ?? null, sinceMs: now });
+      showAction(action, why, offered);
       talk.update(now);
     },
   };
@@ -80,12 +84,19 @@ function actionOf(engine: ConsoleEngine): SeatAction | null {
   return seatAction(engine.session.role, seatStatus(seat, welcome?.peer ?? null));
 }
 
+/** What the button says, and since when. */
+interface Shown {
+  kind: SeatAction["kind"] | null;
+  sinceMs: number;
+}
+
 /** Does what the button says: the seat may have changed since it was last drawn. */
-function act(engine: ConsoleEngine, shown: string | undefined): void {
-  if (shown === "request") engine.session.requestSeat();
-  else if (shown === "take") engine.session.takeSeat();
-  else if (shown === "withdraw") engine.session.release();
-  else if (shown === "release") engine.releaseSeat();
+function act(engine: ConsoleEngine, { kind, sinceMs }: Shown): void {
+  if (kind === null || !isMeant(kind, performance.now() - sinceMs)) return;
+  if (kind === "request") engine.session.requestSeat();
+  else if (kind === "take") engine.session.takeSeat();
+  else if (kind === "withdraw") engine.session.release();
+  else engine.releaseSeat();
 }
 
 function showAction(element: HTMLButtonElement, why: HTMLElement, action: SeatAction | null): void {

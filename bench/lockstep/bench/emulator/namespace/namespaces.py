@@ -7,6 +7,7 @@ repeats lost packets.
 import asyncio
 import os
 import signal
+import socket
 import sys
 import time
 from collections.abc import Sequence
@@ -47,14 +48,18 @@ class Namespaces:
         NamespacesUnavailable: on entering; names the missing part.
     """
 
-    def __init__(self, profile: Profile | str, *, seed: int = 1, cloud: str | None = None) -> None:
-        """`cloud`: the outer address of the robot's side, which is reached by no other.
+    def __init__(
+        self, profile: Profile | str, *, seed: int = 1, cloud: str | None = None, passes_udp: bool = True
+    ) -> None:
+        """`passes_udp`: False: a network that lets TCP alone out. `cloud`: the outer address of the robot's side, which
+        is reached by no other.
 
         It is then like a machine in a cloud, which only knows its inner address, and the operator's side stands behind
         a firewall, like a browser at home.
         """
         self._nat = OneToOneNat(ROBOT_ADDRESS, cloud) if cloud is not None else None
         self._firewall = Firewall() if cloud is not None else None
+        self._passes_udp = passes_udp
         self.profile = load_profile(profile) if isinstance(profile, str) else profile
         self._client_outages = Outages(self.profile.client_outages)
         self._robot_outages = Outages(self.profile.robot_outages)
@@ -144,6 +149,8 @@ class Namespaces:
             except OSError:
                 return
             kind = self._sorter.kind(packet)
+            if kind is not None and not self._passes_udp and packet[9] == socket.IPPROTO_UDP:
+                continue
             if kind is not None:
                 packet = self._translated(side, packet)
             if kind is None or packet[16:20] != _packed(other.address):

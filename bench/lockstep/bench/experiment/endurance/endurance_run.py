@@ -119,8 +119,9 @@ async def _driven(client: EnduranceClient, stage: Stage, choices: Choices) -> As
 class HeadlessHands:
     """Drives by the script, and connects again when the connection ends."""
 
-    def __init__(self, link: str, choices: Choices) -> None:
+    def __init__(self, link: str, choices: Choices, *, relay_only: bool = False) -> None:
         self._link = link
+        self._relay_only = relay_only
         self._choices = choices
         self._console: Console | None = None
 
@@ -145,6 +146,7 @@ class HeadlessHands:
             name="operator",
             silence_seconds=SILENCE_SECONDS,
             connect_seconds=LIVE_SECONDS,
+            relay_only=self._relay_only,
         ) as console:
             self._console = console
             async with asyncio.TaskGroup() as group:

@@ -9,7 +9,7 @@ from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.raw_records import MAGIC, raw_records
 from lockstep.server.recording.reading.reader import Record, RecordingReader
 from lockstep.server.recording.reading.scan import scan_file
-from lockstep.server.recording.verify.verifier import Verdict, Verifier
+from lockstep.server.recording.verify.promises import Verdict, Verifier
 from lockstep.server.recording.verify.verify_signature import SignatureChecker
 from lockstep.server.util.regular_file import open_regular
 

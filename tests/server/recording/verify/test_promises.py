@@ -12,7 +12,7 @@ from lockstep.protocol.messages import StopState
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, ReportRecord, StopRecord
 from lockstep.server.recording.format.topics import CAMERA
-from lockstep.server.recording.verify.verifier import CheckName
+from lockstep.server.recording.verify.promises import CheckName
 from lockstep.server.recording.verify.verify_file import verify_file
 from lockstep.server.recording.writing.writer import Entry
 from tests.server.recording.makers import EPOCH, Story, own_entry, rewritten

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.robot_bridge.stop.state_place import default_place, older_places
+from lockstep.robot_bridge.stop.state_directory import default_place, older_places
 
 
 @pytest.mark.parametrize("base", ["", "not/absolute"])

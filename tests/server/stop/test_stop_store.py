@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from lockstep.server.audit.records import Actor
-from lockstep.server.stop.kept_stops import UNREADABLE, KeptStops, kept_stops_place
 from lockstep.server.stop.stop_presses import Press
+from lockstep.server.stop.stop_store import UNREADABLE, KeptStops, kept_stops_place
 
 ANN = Actor("Änn", "operator", "p1", "link")
 

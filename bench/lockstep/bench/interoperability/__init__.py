@@ -1,0 +1,1 @@
+"""Which clients get through which kinds of network: `lockstep interoperability`."""

@@ -1,0 +1,122 @@
+"""One client of a cell, in a process that may stand in another network namespace.
+
+`python -m lockstep.bench.interoperability.visitor CLIENT LINK SECONDS [DOOR]`: drives for this time and says in one
+JSON line what came. CLIENT is `headless`, `janus`, `chromium` or `firefox`. DOOR is an address host:port that a port of
+loopback leads to, so that a page is at a secure origin although its console speaks HTTP.
+"""
+
+import asyncio
+import contextlib
+import json
+import sys
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from lockstep.bench.experiment.choices import Choices
+from lockstep.bench.experiment.endurance.endurance import Endurance
+from lockstep.bench.experiment.endurance.endurance_run import Driven, HeadlessHands
+from lockstep.client import Console
+
+__all__ = ["main"]
+
+LIVE_SECONDS = 90.0
+TOLERANCE = 4  # events
+RELAY_ONLY = "&relay=only"  # of a link: through TURN or not at all
+CHUNK = 65536
+
+
+async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    with contextlib.suppress(OSError):
+        while data := await reader.read(CHUNK):
+            writer.write(data)
+            await writer.drain()
+    writer.close()
+
+
+@asynccontextmanager
+async def _door(address: str) -> AsyncIterator[int]:
+    """A port of loopback that leads to `address`."""
+    host, _, port = address.rpartition(":")
+
+    async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            far_reader, far_writer = await asyncio.open_connection(host.strip("[]"), int(port))
+        except OSError:
+            writer.close()
+            return
+        await asyncio.gather(_pipe(reader, far_writer), _pipe(far_reader, writer))
+
+    async with await asyncio.start_server(accept, "127.0.0.1", 0) as server:
+        yield int(server.sockets[0].getsockname()[1])
+
+
+@asynccontextmanager
+async def _driven(client: str, link: str) -> AsyncIterator[Driven]:
+    choices = Choices("perfect", "feedback", 0.0, TOLERANCE, 1)
+    if client == "headless":
+        bare, _, relay = link.partition(RELAY_ONLY)
+        yield HeadlessHands(bare, choices, relay_only=link != bare + relay)
+    elif client in ("chromium", "firefox"):
+        from lockstep.bench.experiment.endurance.endurance_page import driven_page  # needs browsers
+
+        async with driven_page("chromium" if client == "chromium" else "firefox", link, choices) as page:
+            yield page
+    else:
+        raise SystemExit(f"{client} is no client")
+
+
+async def _drive(client: str, link: str, seconds: float) -> dict[str, Any]:
+    endurance = Endurance()
+    async with _driven(client, link) as driven:
+        async with asyncio.timeout(LIVE_SECONDS):
+            await driven.until_live()
+        began = time.monotonic()
+        running = asyncio.ensure_future(driven.run(endurance, lambda: time.monotonic() - began))
+        done, _ = await asyncio.wait([running], timeout=seconds)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        for task in done:
+            task.result()
+    found = endurance.fields()
+    return {
+        "pictures": found["pictures"],
+        "events": round(found["driven_seconds"]),
+        "violations": found["violations"],
+        "reconnections": found["reconnections"],
+    }
+
+
+async def _watch_through_janus(link: str, seconds: float) -> dict[str, Any]:
+    async with Console(link, through_relay=True, name="observer", connect_seconds=LIVE_SECONDS) as console:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                async for _ in console.pictures():
+                    pass
+        found = console.stats()
+        return {
+            "pictures": sum(each.rendered for each in found.streams if each.kind == "video"),
+            "events": found.event or 0,
+            "violations": sum(each.violations for each in found.streams),
+            "reconnections": 0,
+        }
+
+
+async def visit(client: str, link: str, seconds: float, door: str) -> dict[str, Any]:
+    if client == "janus":
+        return await _watch_through_janus(link, seconds)
+    if not door:
+        return await _drive(client, link, seconds)
+    async with _door(door) as port:
+        behind = link.partition("://")[2].partition("/")[2]
+        return await _drive(client, f"http://127.0.0.1:{port}/{behind}", seconds)
+
+
+def main() -> None:
+    client, link, seconds, *door = sys.argv[1:]
+    print(json.dumps(asyncio.run(visit(client, link, float(seconds), "".join(door)))), flush=True)
+
+
+if __name__ == "__main__":
+    main()

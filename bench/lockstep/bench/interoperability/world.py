@@ -1,0 +1,142 @@
+"""What a cell needs besides its client: a robot, a console and a way between them, each process in its own network."""
+
+import asyncio
+import json
+import os
+import shutil
+import signal
+import sys
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from lockstep.bench.emulator.impairment.delay import Constant
+from lockstep.bench.emulator.impairment.impairment import Impairment
+from lockstep.bench.emulator.impairment.profile import Profile, even_profile
+from lockstep.bench.emulator.namespace.namespaces import ROBOT_ADDRESS, Namespaces, Side
+from lockstep.bench.interoperability.names import Client, Way
+from lockstep.bench.relay.janus import JANUS_READY, janus_command
+from lockstep.bench.relay.stage import FIRST_PORT, ROOM, Process
+
+__all__ = ["World", "running_world"]
+
+CLOUD = "203.0.113.7"  # of the block for documentation (RFC 5737)
+ONE_WAY = 0.3  # s
+PORT = 8000
+TURN_PORT, TURN_SECRET = 3478, "only between these two namespaces"
+STOP_SECONDS = 5.0
+
+
+class _Starter:
+    """Starts processes in the networks of both sides; in this machine's own where `spaces` is None."""
+
+    def __init__(self, stack: AsyncExitStack, spaces: Namespaces | None) -> None:
+        self._stack = stack
+        self._spaces = spaces
+
+    async def start(self, side: Side, command: list[str], **environment: str) -> Process:
+        own = os.environ | environment
+        pipe, both = asyncio.subprocess.PIPE, asyncio.subprocess.STDOUT
+        if self._spaces is None:
+            process = await asyncio.create_subprocess_exec(
+                *command, env=own, start_new_session=True, stdout=pipe, stderr=both
+            )
+            self._stack.push_async_callback(_end, process)
+        else:
+            process = await self._spaces.start(side, command, env=own, stdout=pipe, stderr=both)
+        started = Process(process)
+        started.reader = asyncio.get_running_loop().create_task(started.read())
+        self._stack.callback(started.reader.cancel)
+        return started
+
+
+@dataclass(frozen=True)
+class World:
+    """`links`: of each console: "operator" and "observer" as its client reaches it, "near" from beside the console."""
+
+    links: tuple[dict[str, str], ...]
+    doors: tuple[str, ...]  # host:port of each console; "": the link is at loopback
+    starter: _Starter
+
+    async def visit(self, command: list[str]) -> Process:
+        """The client's process, on its side of the way."""
+        return await self.starter.start("operator", command)
+
+    async def drive(self, number: int) -> None:
+        """Somebody drives beside this console, so that events go on for those who only watch."""
+        command = [sys.executable, "-m", "lockstep.bench.relay.driver", self.links[number]["near"], "0"]
+        driver = await self.starter.start("robot", command)
+        await driver.line(r'^\{"at"')
+
+
+@asynccontextmanager
+async def running_world(way: Way, client: Client) -> AsyncIterator[World]:
+    """Raises NamespacesUnavailable, FileNotFoundError (a program is missing), RuntimeError (it did not start)."""
+    async with AsyncExitStack() as stack:
+        folder = Path(stack.enter_context(TemporaryDirectory(prefix="lockstep-interoperability-")))
+        spaces = None
+        if way != "ipv6":
+            profile = even_profile("far", Impairment(delay=Constant(ONE_WAY))) if way == "far" else Profile("perfect")
+            cloud = CLOUD if way == "nat" else None
+            spaces = await stack.enter_async_context(Namespaces(profile, cloud=cloud, passes_udp=way != "tcp"))
+        starter = _Starter(stack, spaces)
+        if way == "turn":
+            await _start_turn(starter, folder)
+        links, doors = [], []
+        for number in range(2 if way == "two" else 1):
+            if client == "janus":
+                janus = await starter.start(
+                    "robot", janus_command(folder / f"janus{number}", ROBOT_ADDRESS, FIRST_PORT + number, number=number)
+                )
+                await janus.line(JANUS_READY)
+            made = await _start_console(starter, way, client, number, folder / f"console{number}")
+            links.append(made)
+            address = CLOUD if way == "nat" else ROBOT_ADDRESS
+            doors.append("" if way == "ipv6" else f"{address}:{PORT + number}")
+        yield World(tuple(links), tuple(doors), starter)
+
+
+async def _start_console(starter: _Starter, way: Way, client: Client, number: int, folder: Path) -> dict[str, str]:
+    host = {"ipv6": "::1", "nat": "0.0.0.0"}.get(way, ROBOT_ADDRESS)
+    port = 0 if way == "ipv6" else PORT + number
+    command = [
+        *(str(Path(sys.executable).with_name("lockstep")), "up", "--json", "--robot", "planar", "--robot-port", "0"),
+        *("--host", host, "--port", str(port), "--state-dir", str(folder), "--quiet"),
+    ]
+    command += ["--media-port", str(40000 + number), "--media-tcp"] if way == "tcp" else []
+    command += ["--advertise", CLOUD] if way == "nat" else []
+    command += [f"--relay=janus:ws://{ROBOT_ADDRESS}:{FIRST_PORT + number}/{ROOM}"] if client == "janus" else []
+    turn = {"LOCKSTEP_TURN": f"turn:{ROBOT_ADDRESS}:{TURN_PORT}?transport=udp", "LOCKSTEP_TURN_SECRET": TURN_SECRET}
+    console = await starter.start("robot", command, **(turn if way == "turn" else {}))
+    said = json.loads(await console.line(r'^\{"console"'))
+    suffix = "&relay=only" if way == "turn" else ""
+    return {
+        "operator": said["operator"] + suffix,
+        "observer": said["observer"] + suffix,
+        "near": said["operator"].replace(CLOUD, ROBOT_ADDRESS),
+    }
+
+
+async def _start_turn(starter: _Starter, folder: Path) -> None:
+    program = shutil.which("turnserver")
+    if program is None:
+        raise FileNotFoundError("coturn is not installed: Debian's package is called coturn")
+    command = [
+        *(program, "-n", f"--listening-ip={ROBOT_ADDRESS}", f"--relay-ip={ROBOT_ADDRESS}"),
+        *(f"--listening-port={TURN_PORT}", "--use-auth-secret", f"--static-auth-secret={TURN_SECRET}"),
+        *("--realm=lockstep.example", "--fingerprint", "--no-tls", "--no-dtls", "--no-cli", "--log-file=stdout"),
+        *(f"--pidfile={folder / 'turn.pid'}", f"--userdb={folder / 'turn.db'}", "--verbose"),
+    ]
+    server = await starter.start("robot", command)
+    await server.line("(?i)listener opened on|IPv4. UDP listener")
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, number)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(STOP_SECONDS):
+                await process.wait()
