@@ -66,7 +66,7 @@ export function createSeatBar(engine: ConsoleEngine, talk: Panel): Panel {
       const offered = actionOf(engine);
       if ((offered?.kind ?? null) !== shown.kind)
         Object.assign(shown, { kind: offered?.kind ?? null, sinceMs: now });
-      showAction(action, why, offered);
+      showAction(action, why, offered, now - shown.sinceMs);
       talk.update(now);
     },
   };
@@ -91,22 +91,27 @@ interface Shown {
 }
 
 /** Does what the button says: the seat may have changed since it was last drawn. */
-function act(engine: ConsoleEngine, { kind, sinceMs }: Shown): void {
-  if (kind === null || !isMeant(kind, performance.now() - sinceMs)) return;
+function act(engine: ConsoleEngine, { kind }: Shown): void {
   if (kind === "request") engine.session.requestSeat();
   else if (kind === "take") engine.session.takeSeat();
   else if (kind === "withdraw") engine.session.release();
-  else engine.releaseSeat();
+  else if (kind === "release") engine.releaseSeat();
 }
 
-function showAction(element: HTMLButtonElement, why: HTMLElement, action: SeatAction | null): void {
+function showAction(
+  element: HTMLButtonElement,
+  why: HTMLElement,
+  action: SeatAction | null,
+  shownMs: number,
+): void {
   setHidden(element, action === null);
   setHidden(why, action === null || action.why === null);
   if (action === null) return;
   setText(element, action.label);
   setText(why, action.why ?? "");
   setData(element, "kind", action.kind);
-  if (element.disabled !== (action.why !== null)) element.disabled = action.why !== null;
+  const disabled = action.why !== null || !isMeant(action.kind, shownMs);
+  if (element.disabled !== disabled) element.disabled = disabled;
 }
 
 /** Keeps no focus: the space bar is the deadman and must not press it again. */
