@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from typing import cast
 
 from lockstep.rtc.addresses import Address, Datagram, Path
 from lockstep.rtc.ice.tcp import TcpFraming, frame
@@ -172,8 +173,7 @@ class _TcpPath(asyncio.Protocol):
         self._look: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = cast(asyncio.Transport, transport)  # no instance of it with uvloop
         local, remote = (transport.get_extra_info(name)[:2] for name in ("sockname", "peername"))
         self.path = Path(local, remote, "tcp")
         self._look_later()

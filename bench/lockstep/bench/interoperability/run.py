@@ -59,7 +59,9 @@ async def _visit(world: World, cell: Cell, number: int, seconds: float) -> dict[
     if cell.client == "gstreamer":
         return await _gstreamer(world, link, seconds)
     command = [sys.executable, "-m", "lockstep.bench.interoperability.visitor", cell.client, link, str(seconds)]
-    return await _last_json(world, [*command, world.doors[number]], seconds)
+    # A headless client at loopback would take loopback for the way of its media too.
+    door = world.doors[number] if cell.client != "headless" else ""
+    return await _last_json(world, [*command, door], seconds)
 
 
 async def _last_json(world: World, command: list[str], seconds: float) -> dict[str, Any]:

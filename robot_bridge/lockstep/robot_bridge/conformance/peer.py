@@ -4,7 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from lockstep.protocol.errors import FramingError, LinkLost, LinkRefused, MessageError
 from lockstep.protocol.framing import MAX_CONTROL_FRAME, MAX_MEDIA_FRAME, FrameReader, frame
@@ -167,8 +167,7 @@ class Peer(asyncio.Protocol):
     # asyncio.Protocol
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)  # TCP
-        self._transport = transport
+        self._transport = cast(asyncio.Transport, transport)  # TCP
 
     def data_received(self, data: bytes) -> None:
         self._frames.feed(data)
