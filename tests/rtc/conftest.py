@@ -1,4 +1,4 @@
-"""Tests of what has sockets run on both event loops: consoles run on uvloop, whose transports are classes of its own."""
+"""Tests of what has sockets run on both event loops: consoles run on uvloop, whose transports are its own classes."""
 
 import asyncio
 from collections.abc import Callable, Mapping

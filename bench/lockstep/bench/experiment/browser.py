@@ -156,7 +156,8 @@ async def browser_client(link: str, choices: Choices) -> AsyncIterator[BrowserCl
 
 
 async def robot_description(link: str) -> RobotDescription:
-    url, _, token = link.partition("/#token=")
+    url, _, fragment = link.partition("/#token=")
+    token = fragment.partition("&")[0]
     async with httpx.AsyncClient(trust_env=False, timeout=CONNECT_SECONDS) as http:
         session = await http.get(f"{url}/api/session", headers={"Authorization": f"Bearer {token}"})
     return msgspec.convert(session.json()["description"], RobotDescription, strict=False)
