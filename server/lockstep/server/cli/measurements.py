@@ -33,7 +33,7 @@ COMMANDS = {
     "interoperability": (
         "lockstep.bench.interoperability.cli",
         "interoperability_command",
-        "Drive and watch with each client over each kind of network.",
+        "Drive with each client over each network.",
     ),
     "report": (
         "lockstep.bench.session_report.cli",
